@@ -1,0 +1,8 @@
+"""What ships: the stateless motion service, its command line and the shared motion floor."""
+
+import os
+
+# onnxruntime's Linux wheels report to their vendor unless told otherwise before they are imported.
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+
+__version__ = "0.1.0"

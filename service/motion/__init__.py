@@ -1,0 +1,1 @@
+"""The floor that the service and the training job share: numpy only."""

@@ -1,0 +1,53 @@
+"""What a model answers: poses or a clip, and how far they may be trusted."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from service.motion.clip import Clip
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Trust:
+    """Where an answer comes from and what it is worth.
+
+    model: name@contenthash. controls: the values that were asked for, in the model's units.
+    duration: natural length of the whole clip at these controls, s. sigma: how far a captured
+    clip at these controls would lie from this one, as a root-mean-square over joints and frames,
+    m. warnings: one sentence for each control outside what was sampled.
+    """
+
+    model: str
+    controls: dict[str, float]
+    duration: float
+    sigma: float
+    warnings: tuple[str, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """The same as plain values, for formats that carry free metadata."""
+        return {
+            "model": self.model,
+            "controls": self.controls,
+            "duration": self.duration,
+            "sigma": self.sigma,
+            "warnings": list(self.warnings),
+        }
+
+
+@dataclass(frozen=True)
+class PoseAnswer:
+    """Poses at times (S,), s: rotations (S, J, 4), root_position (S, 3), bone_offsets (J, 3)."""
+
+    times: Floats
+    rotations: Floats
+    root_position: Floats
+    bone_offsets: Floats
+    trust: Trust
+
+
+@dataclass(frozen=True)
+class ClipAnswer:
+    """A clip sampled at a constant rate."""
+
+    clip: Clip
+    trust: Trust

@@ -1,0 +1,125 @@
+"""The model card: what an .onnx file says of itself in its metadata.
+
+Reader and writer stand in this one file so that they cannot drift apart. Every value is JSON text
+under a key that begins with "posefield."; `FORMAT` changes whenever an older reader would go wrong.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from service.motion.skeleton import Skeleton
+
+FORMAT = 1
+PREFIX = "posefield."
+
+
+@dataclass(frozen=True)
+class Control:
+    """One control parameter, its unit and what of it was sampled.
+
+    default: the sampled value in the middle. values: the distinct sampled values where they are
+    few (a handful of performers, sitting or standing), else empty.
+    """
+
+    name: str
+    unit: str
+    description: str
+    minimum: float
+    maximum: float
+    default: float
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ModelCard:
+    """Everything a client needs to know of a model but its weights.
+
+    cyclic: the last pose leads into the first. root: whether the root travels or stays in place.
+    rate: frames a second of the captured clips. frames, samples: T and N of the motion tensor.
+    durations: shortest and longest captured clip, s. diagnostics: what training measured.
+    provenance: recipe, hashes of the data, versions, licence.
+    """
+
+    name: str
+    description: str
+    controls: tuple[Control, ...]
+    skeleton: Skeleton
+    cyclic: bool
+    root: Literal["travelling", "in_place"]
+    rate: float
+    frames: int
+    samples: int
+    ranks: tuple[int, int, int]
+    durations: tuple[float, float]
+    diagnostics: Mapping[str, Any]
+    provenance: Mapping[str, Any]
+
+    def control(self, name: str) -> Control | None:
+        """The control of that name, if there is one."""
+        return next((c for c in self.controls if c.name == name), None)
+
+
+def dump(card: ModelCard) -> dict[str, str]:
+    """Metadata entries of a card: keys in a fixed order, values JSON text."""
+    plain = {**plain_values(card), "format": FORMAT}
+    return {PREFIX + key: json.dumps(plain[key], sort_keys=True) for key in sorted(plain)}
+
+
+def plain_values(card: ModelCard) -> dict[str, Any]:
+    """The card as numbers, strings, lists and objects."""
+    joints = card.skeleton
+    return {
+        **{key: getattr(card, key) for key in _AS_THEY_ARE},
+        "controls": [{**vars(c), "values": list(c.values)} for c in card.controls],
+        "ranks": list(card.ranks),
+        "durations": list(card.durations),
+        "diagnostics": dict(card.diagnostics),
+        "provenance": dict(card.provenance),
+        "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
+        "skeleton": {
+            "names": list(joints.names),
+            "parents": list(joints.parents),
+            "offsets": np.round(joints.offsets, 6).tolist(),
+            "tip_joints": list(joints.tip_joints),
+            "tip_offsets": np.round(joints.tip_offsets, 6).tolist(),
+        },
+    }
+
+
+_AS_THEY_ARE = ("name", "description", "cyclic", "root", "rate", "frames", "samples")
+
+
+def load(metadata: Mapping[str, str]) -> ModelCard:
+    """Card of a model's metadata entries; ValueError says what is missing or too new."""
+    if PREFIX + "format" not in metadata:
+        raise ValueError("no posefield metadata: it was not written by posefield")
+    plain = {k.removeprefix(PREFIX): json.loads(v) for k, v in metadata.items() if PREFIX in k}
+    if plain["format"] != FORMAT:
+        raise ValueError(f"model format {plain['format']}, this version reads format {FORMAT}")
+    try:
+        return _from_plain(plain)
+    except (KeyError, TypeError) as fault:
+        raise ValueError(f"incomplete posefield metadata: {fault}") from fault
+
+
+def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
+    joints = plain["skeleton"]
+    return ModelCard(
+        **{key: plain[key] for key in _AS_THEY_ARE},
+        controls=tuple(Control(**{**c, "values": tuple(c["values"])}) for c in plain["controls"]),
+        skeleton=Skeleton(
+            tuple(joints["names"]),
+            tuple(joints["parents"]),
+            np.array(joints["offsets"], dtype=float).reshape(-1, 3),
+            tuple(joints["tip_joints"]),
+            np.array(joints["tip_offsets"], dtype=float).reshape(-1, 3),
+        ),
+        ranks=tuple(plain["ranks"]),
+        durations=tuple(plain["durations"]),
+        diagnostics=plain["diagnostics"],
+        provenance=plain["provenance"],
+    )

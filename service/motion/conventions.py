@@ -1,0 +1,16 @@
+"""Units and axes, said once for the whole project.
+
+Lengths are metres, times seconds, angles radians. Y is up, the frame is right-handed, a character
+that faces straight ahead faces +Z. Quaternions are unit, in the order w x y z, and local to the
+parent joint. Array axes run (..., frames, joints, component); leading axes are free. Other units
+exist only where a file or a wire format is read or written, and the functions there have no
+default for them.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+"""Every array of numbers in Python is float64; the model file states its own type."""
+
+UP = np.array([0.0, 1.0, 0.0])

@@ -1,0 +1,1 @@
+"""A model file to poses and clips."""

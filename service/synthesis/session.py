@@ -1,0 +1,96 @@
+"""A model file opened in onnxruntime, checked once so that it can be trusted afterwards."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+
+from service.motion import card as cards
+from service.motion.card import ModelCard
+from service.motion.conventions import Floats
+from service.motion.errors import ModelError
+
+INPUTS = {"controls": 2, "time": 2}
+OUTPUTS = {"rotations": 4, "root_position": 3, "bone_offsets": 3, "duration": 1, "sigma": 1}
+
+
+@dataclass(frozen=True)
+class Session:
+    """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes."""
+
+    card: ModelCard
+    digest: str
+    runtime: Any
+
+    def run(self, controls: Floats, time: Floats, *outputs: str) -> list[Floats]:
+        """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for.
+
+        Only what leads to the outputs is computed.
+        """
+        feed = {"controls": controls.astype(np.float32), "time": time.astype(np.float32)}
+        answers: list[Floats] = self.runtime.run(list(outputs), feed, _ONLY_WHAT_IS_ASKED)
+        return answers
+
+
+_ONLY_WHAT_IS_ASKED = onnxruntime.RunOptions()
+_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True
+
+
+def load(path: Path) -> Session:
+    """Session on one thread; ModelError says why a file cannot be served."""
+    try:
+        content = path.read_bytes()
+    except OSError as fault:
+        raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
+    return open_bytes(content, str(path))
+
+
+def open_bytes(content: bytes, source: str) -> Session:
+    """Session on the bytes of a model; `source` names them in errors."""
+    runtime = _start(content, source)
+    try:
+        card = cards.load(runtime.get_modelmeta().custom_metadata_map)
+    except ValueError as fault:
+        raise ModelError(source, str(fault)) from fault
+    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtime)
+    _check_ports(session, source)
+    _check_answer(session, source)
+    return session
+
+
+def _start(content: bytes, source: str) -> Any:
+    options = onnxruntime.SessionOptions()
+    # A pose takes microseconds: threads would cost more than they bring.
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as fault:  # onnxruntime's exceptions share no base of their own
+        first_line = str(fault).strip().splitlines()[0]
+        raise ModelError(source, f"onnxruntime cannot load it: {first_line}") from fault
+
+
+def _check_ports(session: Session, source: str) -> None:
+    found = {p.name: len(p.shape) for p in session.runtime.get_inputs()}
+    if found != INPUTS:
+        raise ModelError(source, f"inputs (name: axes) {found}, expected {INPUTS}")
+    found = {p.name: len(p.shape) for p in session.runtime.get_outputs()}
+    if found != OUTPUTS:
+        raise ModelError(source, f"outputs (name: axes) {found}, expected {OUTPUTS}")
+
+
+def _check_answer(session: Session, source: str) -> None:
+    """Ask for the pose in the middle: a file whose weights are damaged shows here."""
+    middle = np.array([[control.default for control in session.card.controls]])
+    try:
+        answers = session.run(middle, np.zeros((1, 1)), *OUTPUTS)
+    except Exception as fault:
+        raise ModelError(source, f"does not run: {str(fault).splitlines()[0]}") from fault
+    joints = len(session.card.skeleton)
+    if answers[0].shape != (1, 1, joints, 4):
+        raise ModelError(source, f"rotations {answers[0].shape}, expected (1, 1, {joints}, 4)")
+    if not all(np.isfinite(answer).all() for answer in answers):
+        raise ModelError(source, "answers with numbers that are not finite")

@@ -1,0 +1,158 @@
+"""Questions to a model, checked at the door, and its answers in the project's own types."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from service.motion.answer import ClipAnswer, PoseAnswer, Trust
+from service.motion.card import Control
+from service.motion.clip import assemble
+from service.motion.conventions import Floats
+from service.motion.errors import InvalidField, OutsideSamples
+from service.synthesis.session import OUTPUTS, Session
+
+Policy = Literal["warn", "refuse"]
+"""What to do with controls outside what was sampled."""
+
+RATES = (1.0, 1000.0)
+MOST_POSES = 10_000
+
+
+@dataclass(frozen=True)
+class Synthesizer:
+    """A named model that answers with poses and clips."""
+
+    name: str
+    session: Session
+
+    @property
+    def identity(self) -> str:
+        """name@contenthash: what an answer under this name will always be."""
+        return f"{self.name}@{self.session.digest}"
+
+    def pose(
+        self, controls: Mapping[str, float], times: Sequence[float], extrapolate: Policy
+    ) -> PoseAnswer:
+        """Poses at times (S,), s from the start of the clip.
+
+        Raises InvalidField for a control or time that cannot be used, OutsideSamples where
+        `extrapolate` is "refuse" and a control lies outside its sampled range.
+        """
+        point, warnings = self._door(controls, extrapolate)
+        if not 1 <= len(times) <= MOST_POSES:
+            raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
+        when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
+        duration = float(self.session.run(point, np.zeros((1, 1)), "duration")[0][0])
+        for index, value in enumerate(when):
+            _within(f"times/{index}", value, 0.0, duration, "s")
+        return self._answer(point, when, controls, warnings)
+
+    def clip(
+        self,
+        controls: Mapping[str, float],
+        rate: float,
+        extrapolate: Policy,
+        start: float = 0.0,
+        end: float | None = None,
+    ) -> ClipAnswer:
+        """Clip at `rate` frames a second from `start` to `end`, s; by default the whole of it.
+
+        Frame i is the pose at start + i / rate. Raises as `pose` does.
+        """
+        point, warnings = self._door(controls, extrapolate)
+        _within("fps", _number("fps", rate), *RATES, "frames a second")
+        duration = float(self.session.run(point, np.zeros((1, 1)), "duration")[0][0])
+        last = duration if end is None else _number("end", end)
+        _within("end", last, 0.0, duration, "s")
+        _within("start", _number("start", start), 0.0, last, "s")
+        # A millionth of a frame forgives the rounding of duration * rate.
+        frames = math.floor((last - start) * rate + 1e-6) + 1
+        if frames > MOST_POSES:
+            raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")
+        when = np.minimum(start + np.arange(frames) / rate, duration)
+        answer = self._answer(point, when, controls, warnings)
+        clip = assemble(
+            self.session.card.skeleton,
+            answer.rotations,
+            answer.root_position,
+            answer.bone_offsets,
+            rate,
+        )
+        return ClipAnswer(clip, answer.trust)
+
+    def _door(
+        self, controls: Mapping[str, float], extrapolate: Policy
+    ) -> tuple[Floats, tuple[str, ...]]:
+        """Control point (1, d) and a warning for each control outside its sampled range."""
+        card = self.session.card
+        for name in controls:
+            if card.control(name) is None:
+                known = ", ".join(c.name for c in card.controls)
+                raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+        point = np.array([[_required(control, controls) for control in card.controls]])
+        warnings = tuple(_outside(c, v) for c, v in zip(card.controls, point[0], strict=True))
+        said = tuple(filter(None, warnings))
+        if said and extrapolate == "refuse":
+            raise OutsideSamples("controls", "; ".join(said))
+        return point, said
+
+    def _answer(
+        self,
+        point: Floats,
+        when: Floats,
+        controls: Mapping[str, float],
+        warnings: tuple[str, ...],
+    ) -> PoseAnswer:
+        rotations, root, offsets, duration, sigma = (
+            answer[0].astype(np.float64) for answer in self.session.run(point, when[None], *OUTPUTS)
+        )
+        trust = Trust(
+            self.identity,
+            {name: float(value) for name, value in controls.items()},
+            float(duration),
+            float(sigma),
+            warnings,
+        )
+        return PoseAnswer(when, rotations, root, offsets, trust)
+
+
+def _required(control: Control, controls: Mapping[str, float]) -> float:
+    field = f"controls/{control.name}"
+    if control.name not in controls:
+        raise InvalidField(
+            field,
+            f"missing; give a number in {control.unit}, "
+            f"sampled from {control.minimum:g} to {control.maximum:g}",
+        )
+    value = _number(field, controls[control.name])
+    # Where float32 would overflow there is no answer to give.
+    reach = 100.0 * (control.maximum - control.minimum)
+    _within(field, value, control.minimum - reach, control.maximum + reach, control.unit)
+    return value
+
+
+def _number(field: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidField(field, f"{value!r}, expected a number")
+    if not math.isfinite(value):
+        raise InvalidField(field, f"{value}, expected a finite number")
+    return float(value)
+
+
+def _within(field: str, value: float, low: float, high: float, unit: str) -> None:
+    if not low <= value <= high:
+        raise InvalidField(field, f"{value:g} {unit}, expected {low:g} to {high:g} {unit}")
+
+
+def _outside(control: Control, value: float) -> str | None:
+    # The width of a rounding error in what a client read from the card.
+    slack = 1e-6 * (control.maximum - control.minimum)
+    if control.minimum - slack <= value <= control.maximum + slack:
+        return None
+    return (
+        f"{control.name} = {value:g} {control.unit} lies outside what was sampled, "
+        f"{control.minimum:g} to {control.maximum:g} {control.unit}"
+    )
