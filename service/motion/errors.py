@@ -53,7 +53,7 @@ class UsdError(FileError):
 
 
 class QueryError(MotionError):
-    """A question that has no answer; `field` is a JSON pointer's last part or a parameter's name."""
+    """A question that has no answer; `field` is the path of what is wrong with it."""
 
     def __init__(self, field: str, message: str) -> None:
         super().__init__(f"{field}: {message}")

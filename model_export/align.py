@@ -1,0 +1,155 @@
+"""Clips of different timing to one canonical time, and the warps that lead there and back.
+
+Every clip is compared with a reference by what its joints do around the root. The first reference
+is the medoid, the clip nearest to all others; further rounds take the mean of what was aligned.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import dtw
+from model_export.ingest import Example, heading
+from model_export.warp import DENSE, WarpBasis
+from service.motion import quat, skeleton
+from service.motion.clip import Clip
+from service.motion.conventions import UP, Floats
+
+# Frames at which clips are compared: a medoid needs no more, a warp gains nothing from more.
+COARSE, FINE = 25, 100
+# A landmark is one sample among 501 that the warp has to meet.
+LANDMARK_WEIGHT = 200.0
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """Clips in canonical time.
+
+    rotations (N, T, J, 4) and root_path (N, T, 3). logs (N, knots): the log increments of each
+    clip's warp from its own time to canonical time. durations (N,), s. reference: index of the
+    medoid.
+    """
+
+    rotations: Floats
+    root_path: Floats
+    logs: Floats
+    durations: Floats
+    reference: int
+
+
+def align(
+    examples: Sequence[Example], frames: int, basis: WarpBasis, rounds: int, joint_weights: Floats
+) -> Aligned:
+    """Examples warped to one canonical time and resampled to `frames` frames.
+
+    joint_weights (J,): importance of each joint's position in the comparison. The mean warp is
+    the identity: canonical time is the family's own average, not the reference's.
+    """
+    traces = [_trace(example.clip, np.sqrt(joint_weights)) for example in examples]
+    marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
+    medoid = _medoid(_straight(traces, marks, COARSE))
+    fine = _straight(traces, marks, FINE)
+    logs = _round(fine, fine[medoid], marks, basis)
+    for _ in range(rounds):
+        warped = [_at(trace, basis.invert(log, _even(FINE))) for trace, log in _pairs(traces, logs)]
+        logs = _round(fine, np.mean(_straight(warped, _shared(marks), FINE), axis=0), marks, basis)
+    resampled = [
+        resample(e.clip, basis.invert(log, _even(frames)))
+        for e, log in zip(examples, logs, strict=True)
+    ]
+    return Aligned(
+        np.stack([rotations for rotations, _ in resampled]),
+        np.stack([path for _, path in resampled]),
+        logs,
+        np.array([example.clip.duration for example in examples]),
+        medoid,
+    )
+
+
+def _even(frames: int) -> Floats:
+    return np.linspace(0.0, 1.0, frames)
+
+
+def _pairs(traces: list[Floats], logs: Floats) -> list[tuple[Floats, Floats]]:
+    return list(zip(traces, logs, strict=True))
+
+
+def _trace(clip: Clip, weights: Floats) -> Floats:
+    """Joint positions (F, J * 3) around the root, seen from its heading, m."""
+    positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
+    facing = quat.about(UP, -heading(clip))[:, None]
+    return (quat.rotate(facing, positions) * weights[:, None]).reshape(len(clip), -1)
+
+
+def _at(values: Floats, u: Floats) -> Floats:
+    """Rows (S, features) of values (F, features) at fractions u (S,) of the way through."""
+    place = u * (len(values) - 1)
+    before = np.minimum(place.astype(np.int64), len(values) - 2)
+    share = (place - before)[:, None]
+    return (1.0 - share) * values[before] + share * values[before + 1]
+
+
+def _shared(marks: Floats) -> Floats:
+    """The landmarks' canonical times, for every clip."""
+    return np.repeat(marks.mean(axis=0, keepdims=True), len(marks), axis=0)
+
+
+def _knees(marks: Floats) -> tuple[Floats, Floats]:
+    """Clip times (N, M + 2) and canonical times (M + 2,) between which time runs evenly."""
+    ends = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
+    knees = np.hstack([ends[0], marks, ends[1]])
+    return knees, knees.mean(axis=0)
+
+
+def _straight(traces: list[Floats], marks: Floats, frames: int) -> Floats:
+    """Traces (N, frames, features) with their landmarks brought together by straight lines."""
+    knees, canonical = _knees(marks)
+    times = [np.interp(_even(frames), canonical, own) for own in knees]
+    return np.stack([_at(trace, u) for trace, u in zip(traces, times, strict=True)])
+
+
+def _medoid(traces: Floats) -> int:
+    totals = [float(np.sum(np.sqrt(dtw.total_cost(traces, reference)))) for reference in traces]
+    return int(np.argmin(np.round(totals, 9)))
+
+
+def _round(traces: Floats, reference: Floats, marks: Floats, basis: WarpBasis) -> Floats:
+    """Log increments (N, knots) of the warps to a reference, their mean warp the identity."""
+    knees, canonical = _knees(marks)
+    straight = np.stack([np.interp(DENSE, own, canonical) for own in knees])
+    phases = dtw.warp(traces, reference)
+    warps = np.stack([np.interp(s, _even(FINE), p) for s, p in zip(straight, phases, strict=True)])
+    weights = _weights(marks)
+    fitted = [basis.fit(warp, w) for warp, w in zip(warps, weights, strict=True)]
+    return _gauge(np.stack(fitted), weights, basis)
+
+
+def _weights(marks: Floats) -> Floats:
+    weights = np.ones((len(marks), len(DENSE)))
+    for row, own in zip(weights, marks, strict=True):
+        row[np.rint(own * (len(DENSE) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
+    return weights
+
+
+def _gauge(logs: Floats, weights: Floats, basis: WarpBasis) -> Floats:
+    """The same warps followed by the one that makes their mean inverse the identity."""
+    mean_inverse = np.mean([basis.invert(log, DENSE) for log in logs], axis=0)
+    even = [np.interp(basis.evaluate(log, DENSE), DENSE, mean_inverse) for log in logs]
+    return np.stack([basis.fit(warp, w) for warp, w in zip(even, weights, strict=True)])
+
+
+def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
+    """Rotations (S, J, 4) and root path (S, 3) at fractions u (S,) of the clip's duration."""
+    place = np.clip(u, 0.0, 1.0) * (len(clip) - 1)
+    before = np.minimum(place.astype(np.int64), len(clip) - 2)
+    share = place - before
+    rotations = quat.slerp(clip.rotations[before], clip.rotations[before + 1], share[:, None])
+    return rotations, _at(clip.root_path, np.clip(u, 0.0, 1.0))
+
+
+def positions(aligned: Aligned, parents: tuple[int, ...], offsets: Floats) -> Floats:
+    """Joint positions (N, T, J, 3) of aligned clips with bone offsets (N, J, 3), m."""
+    translations = np.repeat(offsets[:, None], aligned.rotations.shape[1], axis=1)
+    translations[:, :, 0] = aligned.root_path
+    return skeleton.forward(parents, aligned.rotations, translations)[0]

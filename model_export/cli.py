@@ -1,0 +1,106 @@
+"""The training job's commands: `sample` and `train`."""
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import orjson
+import typer
+
+from model_export import export, ingest, recipe, train
+from model_export.export import Exported
+from service.cli import Controls, Json, encoder, numbers, wrote
+from service.motion import files
+from service.motion.answer import ClipAnswer, Trust
+from service.motion.errors import InvalidField
+
+
+def commands(app: typer.Typer) -> None:
+    """Add the training job's commands to the one command line."""
+    app.command("sample")(sample)
+    app.command("train")(train_command)
+
+
+def sample(
+    family: Annotated[str, typer.Argument(help="reaching")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder, or with --truth a file")],
+    truth: Annotated[bool, typer.Option(help="write the noise-free motion of --control")] = False,
+    control: Controls = None,
+    fps: Annotated[float, typer.Option(help="frames a second, with --truth")] = 120.0,
+    json: Json = False,
+) -> None:
+    """Write a procedural family of motions, or the truth behind it at any control point."""
+    from model_export.sample import truth as truths
+    from model_export.sample import write
+
+    if family != "reaching":
+        raise InvalidField("family", f"{family!r}, expected reaching")
+    if not truth:
+        path = write.family(output)
+        typer.echo(
+            _dump({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
+        )
+        return
+    encode = encoder(output)
+    controls = numbers(control or [])
+    clip = truths.clip(controls, fps)
+    answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
+    files.write(encode(answer), output)
+    typer.echo(wrote(output, answer, json))
+
+
+def train_command(
+    recipe_file: Annotated[Path, typer.Argument(help="a TOML file", metavar="RECIPE")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="the .onnx file to write")],
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Train a recipe's model and write it as one .onnx file."""
+    if output.suffix != ".onnx":
+        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
+    started = time.perf_counter()
+
+    def report(step: str) -> None:
+        typer.echo(f"{time.perf_counter() - started:6.1f} s  {step}", err=True)
+
+    report(f"reading {recipe_file}")
+    own = recipe.read(recipe_file)
+    examples, notes = ingest.ingest(own, data or recipe_file.parent)
+    trained = train.train(own, examples, report)
+    report("writing the graph and comparing it with the reference")
+    exported = export.export(own, examples, trained, notes)
+    files.write(exported.content, output)
+    report("done")
+    typer.echo(_dump(_facts(exported, output)) if json else _summary(exported, output))
+
+
+def _dump(value: Any) -> str:
+    return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
+
+
+def _facts(exported: Exported, output: Path) -> dict[str, Any]:
+    card = exported.card
+    return {
+        "file": str(output),
+        "bytes": len(exported.content),
+        "clips": card.samples,
+        "ranks": list(card.ranks),
+        **card.diagnostics,
+    }
+
+
+def _summary(exported: Exported, output: Path) -> str:
+    facts = _facts(exported, output)
+    notes = [f"note: {note}" for note in facts["notes"]]
+    return "\n".join(
+        [
+            *notes,
+            f"{output}: {facts['bytes'] / 1000:.1f} kB from {facts['clips']} clips, "
+            f"ranks {facts['ranks']} of {facts['tensor']}",
+            f"truncation costs {100 * facts['truncation_rms_m']:.2f} cm, a clip left out lies "
+            f"{100 * facts['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+            f"onnxruntime differs from the reference by at most {100 * facts['parity_m']:.5f} cm",
+        ]
+    )

@@ -1,0 +1,204 @@
+"""A trained model to one file, and the gate that it passes before it may be written.
+
+The gate asks the very session that the service will use, and compares joints in metres.
+"""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from model_export.ingest import Example
+from model_export.model import Model, Outputs
+from model_export.recipe import Recipe
+from model_export.train import Trained
+from service import __version__
+from service.motion import card
+from service.motion.card import Control, ModelCard
+from service.motion.conventions import Floats
+from service.motion.errors import ExportRefused
+from service.motion.skeleton import Skeleton
+from service.synthesis import session
+from service.synthesis.session import OUTPUTS, Session
+
+POINTS, BATCH = 10_000, 1_000
+# No joint of the graph's answer may lie farther from the reference's, m.
+ALLOWED = 1e-4
+# With more distinct values than this a control is a continuum, and they are not listed.
+FEW_VALUES = 10
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A model file's content, its card, and the largest joint error that the gate saw, m."""
+
+    content: bytes
+    card: ModelCard
+    parity: float
+
+
+def export(
+    recipe: Recipe, examples: Sequence[Example], trained: Trained, notes: list[str]
+) -> Exported:
+    """File of a trained model; the same data give the same bytes.
+
+    Raises ExportRefused where onnxruntime answers anything else than the float64 reference does.
+    """
+    about = {"producer_name": "posefield", "producer_version": __version__}
+    # The gate's finding is part of the card, so the weights are judged before it is written.
+    draft = _card(recipe, examples, trained, notes, parity=0.0)
+    parity = gate(trained.model, trained.model.onnx(card.dump(draft), about), draft)
+    own_card = _card(recipe, examples, trained, notes, parity)
+    return Exported(trained.model.onnx(card.dump(own_card), about), own_card, parity)
+
+
+def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
+    """Largest joint distance, m, between file and reference over random controls and times.
+
+    Raises ExportRefused where it exceeds what is allowed, and says by how much and where.
+    """
+    opened = session.open_bytes(content, f"{own_card.name}.onnx")
+    rng = np.random.Generator(np.random.PCG64(10_000))
+    low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
+    worst = 0.0
+    for _ in range(POINTS // BATCH):
+        points = rng.uniform(low, high, (BATCH, len(low)))
+        durations = model.evaluate(points, np.zeros((BATCH, 1))).duration
+        times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
+        gaps = _gaps(model, opened, own_card.skeleton, points, times)
+        at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+        worst = max(worst, float(gaps[at]))
+        if worst > ALLOWED:
+            asked = dict(zip((c.name for c in own_card.controls), points[at[0]], strict=True))
+            raise ExportRefused(
+                f"the graph puts {own_card.skeleton.names[at[2]]} {100 * worst:.4f} cm from where "
+                f"the reference does, expected at most {100 * ALLOWED:g} cm; at {asked}, "
+                f"{times[at[0], 0]:.3f} s. Fewer controls, or a larger nugget, condition it better"
+            )
+    return worst
+
+
+def _gaps(
+    model: Model, opened: Session, skeleton: Skeleton, points: Floats, times: Floats
+) -> Floats:
+    """Distances (B, S, J) between the joints of graph and reference, m."""
+    # The graph sees the question in float32; so must the reference, or the question differs.
+    points, times = (a.astype(np.float32).astype(np.float64) for a in (points, times))
+    expected = model.evaluate(points, times).positions(skeleton.parents)
+    found = Outputs(*opened.run(points, times, *OUTPUTS)).positions(skeleton.parents)
+    return np.asarray(np.linalg.norm(found - expected, axis=-1))
+
+
+def _card(
+    recipe: Recipe,
+    examples: Sequence[Example],
+    trained: Trained,
+    notes: list[str],
+    parity: float,
+) -> ModelCard:
+    durations = trained.aligned.durations
+    return ModelCard(
+        name=recipe.name,
+        description=recipe.description,
+        controls=_controls(recipe, np.stack([example.controls for example in examples])),
+        skeleton=trained.skeleton,
+        cyclic=recipe.motion.cyclic,
+        root=recipe.motion.root,
+        rate=float(np.median([example.clip.rate for example in examples])),
+        frames=recipe.motion.frames,
+        samples=len(examples),
+        ranks=trained.model.decoder.reduced.core.shape,
+        durations=(float(durations.min()), float(durations.max())),
+        diagnostics=_diagnostics(examples, trained, notes, parity),
+        provenance=_provenance(recipe, examples),
+    )
+
+
+def _controls(recipe: Recipe, values: Floats) -> tuple[Control, ...]:
+    controls = []
+    for column, own in zip(recipe.controls, values.T, strict=True):
+        distinct = np.unique(own)
+        controls.append(
+            Control(
+                column.name,
+                column.unit,
+                column.description,
+                float(distinct[0]),
+                float(distinct[-1]),
+                float(np.sort(own)[len(own) // 2]),
+                tuple(map(float, distinct)) if len(distinct) <= FEW_VALUES else (),
+            )
+        )
+    return tuple(controls)
+
+
+def _diagnostics(
+    examples: Sequence[Example], trained: Trained, notes: list[str], parity: float
+) -> dict[str, Any]:
+    """What training measured, in metres and plain shares, rounded to what is worth reading."""
+    full, kept = trained.full.core, trained.model.decoder.reduced.core
+    cut = float(np.sum(np.square(full)) - np.sum(np.square(kept)))
+    hyper = trained.pose.hyper
+    return {
+        "truncation_rms_m": _round(trained.tensor.rms(np.array(max(cut, 0.0)))),
+        "leave_one_out_rms_m": _round(
+            trained.tensor.rms(np.sum(np.square(trained.pose.residuals)))
+        ),
+        "explained": {name: _round(share) for name, share in trained.explained.items()},
+        "covariance": hyper.covariance,
+        "drift": hyper.drift,
+        "scales": [_round(scale) for scale in hyper.scales],
+        "nugget": _round(hyper.nugget),
+        "tensor": list(trained.tensor.values.shape),
+        "parity_m": float(f"{parity:.1e}"),
+        "notes": notes + _found(examples, trained),
+    }
+
+
+def _round(value: Any) -> float:
+    return float(f"{float(value):.4g}")
+
+
+def _found(examples: Sequence[Example], trained: Trained) -> list[str]:
+    """One sentence for every clip that a joint was cleaned in or watched in."""
+    said: dict[tuple[int, str], list[str]] = {}
+    for finding in trained.findings:
+        joint = trained.skeleton.names[finding.joint]
+        entry = f"{joint} by {np.degrees(finding.angle):.0f} degrees"
+        said.setdefault((finding.clip, finding.kind), []).append(entry)
+    return [
+        f"line {examples[clip].row.line}, {examples[clip].row.place.name}: "
+        f"{_MEANING[kind]}: {', '.join(entries)}"
+        for (clip, kind), entries in sorted(said.items())
+    ]
+
+
+_MEANING = {
+    "jump": "jumps between two frames taken out",
+    "flip": "half turns taken out",
+    "wrap": "followed past half a turn from the family's mean",
+    "far": "close to half a turn from the family's mean",
+}
+
+
+def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
+    return {
+        "licence": recipe.licence,
+        "recipe_sha256": hashlib.sha256(recipe.model_dump_json().encode()).hexdigest(),
+        "data_sha256": _digest({str(e.row.place.name): e for e in examples}),
+        "clips": len(examples),
+        "versions": {name: version(name) for name in ("posefield", "numpy", "scipy", "onnx")},
+    }
+
+
+def _digest(files: Mapping[str, Example]) -> str:
+    """One hash over the content of every motion file, in the order of their names."""
+    total = hashlib.sha256()
+    for name in sorted(files):
+        total.update(
+            name.encode() + b"\0" + hashlib.sha256(files[name].row.place.read_bytes()).digest()
+        )
+    return total.hexdigest()

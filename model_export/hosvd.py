@@ -1,0 +1,82 @@
+"""Higher-order singular value decomposition with signs that do not hang on the machine.
+
+Symbols follow De Lathauwer, De Moor, Vandewalle, "A multilinear singular value decomposition"
+(SIAM J. Matrix Anal. 2000): a tensor A is its core S times one orthonormal matrix a mode.
+"""
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+
+from service.motion.conventions import Floats
+from service.motion.errors import TrainingError
+
+
+@dataclass(frozen=True)
+class Multilinear:
+    """Core tensor (r1, r2, …) and one orthonormal basis (size of the mode, r) for each mode."""
+
+    core: Floats
+    bases: tuple[Floats, ...]
+
+    def truncated(self, ranks: tuple[int, ...]) -> "Multilinear":
+        """The leading part of every basis: the levels of one decomposition are nested.
+
+        Squared error is at most the sum over modes of the squared singular values cut off, and at
+        least the largest of these sums (property 10). Raises TrainingError for a rank that the
+        decomposition does not have.
+        """
+        if any(not 1 <= rank <= size for rank, size in zip(ranks, self.core.shape, strict=True)):
+            raise TrainingError(f"ranks {ranks}, expected 1 to {self.core.shape}")
+        prefix = tuple(slice(rank) for rank in ranks)
+        bases = (basis[:, :rank] for basis, rank in zip(self.bases, ranks, strict=True))
+        return Multilinear(self.core[prefix], tuple(bases))
+
+    def restored(self) -> Floats:
+        """The tensor that core and bases stand for."""
+        return reduce(lambda x, mb: mode_dot(x, mb[1], mb[0]), enumerate(self.bases), self.core)
+
+
+def unfold(tensor: Floats, mode: int) -> Floats:
+    """Mode-n unfolding: the mode's fibres as columns (size of the mode, all the rest)."""
+    return np.moveaxis(tensor, mode, 0).reshape(tensor.shape[mode], -1)
+
+
+def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
+    """Mode-n product: matrix (rows, size of the mode) applied to every fibre of the mode."""
+    return np.moveaxis(np.tensordot(matrix, tensor, axes=(1, mode)), 0, mode)
+
+
+def decompose(tensor: Floats) -> Multilinear:
+    """HOSVD at full rank: the core is all-orthogonal, its slices ordered by their norm.
+
+    Each basis holds the eigenvectors of its unfolding's Gram matrix, largest first; the largest
+    entry of every column is positive, so the result does not hang on LAPACK's choice of sign.
+    """
+    bases = tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim))
+    core = reduce(lambda x, mb: mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
+    return Multilinear(core, bases)
+
+
+def _basis(unfolded: Floats) -> Floats:
+    _, vectors = np.linalg.eigh(unfolded @ unfolded.T)
+    return _fix_signs(vectors[:, ::-1])
+
+
+def _fix_signs(columns: Floats) -> Floats:
+    # Rounded, so that two entries of equal size in theory do not change places by an ulp.
+    largest = np.argmax(np.round(np.abs(columns), 9), axis=0)
+    return columns * np.sign(columns[largest, np.arange(columns.shape[1])])
+
+
+def squared_errors(core: Floats) -> Floats:
+    """Exact squared error of every truncation: entry (i, j, …) is that of ranks (i+1, j+1, …).
+
+    Orthonormal bases make it what the prefix of the core leaves out: |A|² minus a cumulative sum.
+    """
+    energy: Floats = np.square(core)
+    for axis in range(core.ndim):
+        energy = np.cumsum(energy, axis=axis)
+    total = energy[(-1,) * core.ndim]
+    return np.maximum(total - energy, 0.0)

@@ -1,0 +1,204 @@
+"""Rows of the table to clips in one frame: cut, metres, Y up, heading and origin taken out."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from model_export import table
+from model_export.recipe import Recipe
+from model_export.table import Row
+from service.motion import bvh, quat
+from service.motion.clip import Clip
+from service.motion.conventions import UP, Floats
+from service.motion.errors import RecipeError
+from service.motion.skeleton import Skeleton
+
+# Bones that a mocap solver stretches by less than this are taken as rigid without a word, m.
+RIGID = 1e-4
+
+
+@dataclass(frozen=True)
+class Example:
+    """One clip with what it is an example of.
+
+    controls (d,), landmarks: fractions of the clip, in order. offsets (J, 3): the performer's bone
+    offsets, m; the root's is zero.
+    """
+
+    row: Row
+    clip: Clip
+    controls: Floats
+    landmarks: tuple[float, ...]
+
+    @property
+    def offsets(self) -> Floats:
+        """Bone offsets (J, 3) of the performer, the root's zero, m."""
+        offsets = self.clip.translations.mean(axis=0)
+        offsets[0] = 0.0
+        return offsets
+
+    @property
+    def tips(self) -> Floats:
+        """End site offsets (E, 3) of the performer, m."""
+        return self.clip.skeleton.tip_offsets
+
+
+def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
+    """Examples of a recipe, and notes on what had to be assumed or smoothed over.
+
+    Raises RecipeError for a row that cannot be followed, BvhError for a file that cannot be read.
+    """
+    rows = table.read(recipe, folder)
+    files: dict[str, bvh.BvhFile] = {}
+    notes: list[str] = []
+    examples = []
+    for row in rows:
+        key = str(row.place)
+        if key not in files:
+            files[key] = bvh.read(row.place)
+            notes += _offset_notes(recipe, files[key], row)
+        examples.append(_example(recipe, files[key], row, notes))
+    _refuse_other_trees(examples)
+    return examples, notes
+
+
+def _offset_notes(recipe: Recipe, file: bvh.BvhFile, row: Row) -> list[str]:
+    if recipe.source.root_offset is not None or not np.any(file.joints[0].offset):
+        return []
+    return [
+        f"{row.place}: the root's OFFSET is {file.joints[0].offset} and has position channels, "
+        "which were taken to replace it; say so as source.root_offset"
+    ]
+
+
+def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> Example:
+    source = recipe.source
+    whole = bvh.to_clip(
+        file,
+        metres_per_unit=source.metres_per_unit,
+        up=source.up,
+        root_offset=source.root_offset or "replace",
+    )
+    last = len(whole) - 1 if row.last_frame is None else row.last_frame
+    if last >= len(whole):
+        raise row.fault(f"frame {last}, but {row.place} has frames 0 to {len(whole) - 1}")
+    clip = _without(_cut(whole, row.first_frame, last), recipe, row)
+    stretch = np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0)
+    if stretch > RIGID:
+        notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
+    clip = _loop(_heading_out(clip)) if recipe.motion.cyclic else _origin_out(clip)
+    if recipe.motion.root == "in_place":
+        clip = _travel_out(clip)
+    return Example(row, clip, row.controls, _landmarks(row, last))
+
+
+def _cut(clip: Clip, first: int, last: int) -> Clip:
+    kept = slice(first, last + 1)
+    return replace(clip, rotations=clip.rotations[kept], translations=clip.translations[kept])
+
+
+def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
+    """Clip without the dropped joints and all that hangs below them."""
+    joints = clip.skeleton
+    missing = set(recipe.motion.drop_joints) | set(recipe.motion.joint_weights)
+    missing -= set(joints.names)
+    if missing:
+        raise row.fault(f"{row.place} has no joints {sorted(missing)} that the recipe names")
+    dropped = {joints.names.index(name) for name in recipe.motion.drop_joints}
+    for joint, parent in enumerate(joints.parents):
+        if parent in dropped:
+            dropped.add(joint)
+    if 0 in dropped:
+        raise row.fault("the root cannot be dropped")
+    kept = [joint for joint in range(len(joints)) if joint not in dropped]
+    tips = [i for i, joint in enumerate(joints.tip_joints) if joint not in dropped]
+    smaller = Skeleton(
+        tuple(joints.names[joint] for joint in kept),
+        tuple(kept.index(joints.parents[j]) if j else -1 for j in kept),
+        joints.offsets[kept],
+        tuple(kept.index(joints.tip_joints[i]) for i in tips),
+        joints.tip_offsets[tips],
+    )
+    return Clip(smaller, clip.rotations[:, kept], clip.translations[:, kept], clip.rate)
+
+
+def _landmarks(row: Row, last: int) -> tuple[float, ...]:
+    frames = (row.first_frame, *row.landmarks, last)
+    if any(later <= earlier for earlier, later in pairwise(frames)):
+        raise row.fault(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")
+    return tuple((frame - row.first_frame) / (last - row.first_frame) for frame in row.landmarks)
+
+
+def _refuse_other_trees(examples: list[Example]) -> None:
+    first = examples[0]
+    for example in examples[1:]:
+        if not example.clip.skeleton.same_tree(first.clip.skeleton):
+            raise RecipeError(
+                example.row.table,
+                f"{example.row.place} has other joints than {first.row.place} of line "
+                f"{first.row.line}: {_difference(example.clip.skeleton, first.clip.skeleton)}",
+                example.row.line,
+            )
+
+
+def _difference(a: Skeleton, b: Skeleton) -> str:
+    if set(a.names) != set(b.names):
+        return f"only one of them has {sorted(set(a.names) ^ set(b.names))}"
+    return "the same names in another order or hierarchy"
+
+
+def place(clip: Clip, origin: Floats, heading: Floats) -> Clip:
+    """Clip turned by -heading (…) about the vertical after origin (…, 3) is taken from its root."""
+    turn = np.broadcast_to(quat.about(UP, -np.asarray(heading)), (len(clip), 4))
+    rotations, translations = clip.rotations.copy(), clip.translations.copy()
+    rotations[:, 0] = quat.mul(turn, clip.rotations[:, 0])
+    translations[:, 0] = quat.rotate(turn, clip.translations[:, 0] - origin)
+    return replace(clip, rotations=rotations, translations=translations)
+
+
+def heading(clip: Clip) -> Floats:
+    """Angle (F,) of the root about the vertical, without jumps, rad."""
+    return np.unwrap(quat.twist(clip.rotations[:, 0], UP))
+
+
+def _floor(position: Floats) -> Floats:
+    return position * (1.0 - UP)
+
+
+def _origin_out(clip: Clip) -> Clip:
+    return place(clip, _floor(clip.root_path[0]), heading(clip)[0])
+
+
+def _heading_out(clip: Clip) -> Clip:
+    """The same for a gait, whose pelvis swings: the straight line through its heading counts."""
+    time = np.arange(len(clip)) / (len(clip) - 1)
+    _, at_start = np.polyfit(time, heading(clip), 1)
+    return place(clip, _floor(clip.root_path[0]), at_start)
+
+
+def _travel_out(clip: Clip) -> Clip:
+    translations = clip.translations.copy()
+    travel = _floor(clip.root_path[-1] - clip.root_path[0])
+    translations[:, 0] -= np.linspace(0.0, 1.0, len(clip))[:, None] * travel
+    return replace(clip, translations=translations)
+
+
+def _loop(clip: Clip) -> Clip:
+    """Clip whose last pose is its first again, but for where the root has got to and its heading.
+
+    Half of the gap is given to either end and fades linearly to nothing in the middle.
+    """
+    share = np.linspace(0.5, -0.5, len(clip))
+    line = np.polynomial.Polynomial.fit(np.arange(len(clip)), heading(clip), 1)
+    walking = quat.about(UP, line(np.arange(len(clip))))
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(quat.conj(walking), rotations[:, 0])
+    gap = quat.log(quat.mul(quat.conj(rotations[0]), rotations[-1]))
+    rotations = quat.mul(rotations, quat.exp(share[:, None, None] * gap))
+    rotations[:, 0] = quat.mul(walking, rotations[:, 0])
+    translations = clip.translations.copy()
+    rise = (clip.root_path[-1] - clip.root_path[0]) @ UP
+    translations[:, 0] += share[:, None] * rise * UP
+    return replace(clip, rotations=rotations, translations=translations)

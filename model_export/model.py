@@ -1,0 +1,73 @@
+"""The whole model in float64: what the graph must answer, stage by stage."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export.decoder import Decoder, Proportions
+from model_export.field_bank import FieldBank, Spread
+from model_export.net import Net, Shapes
+from model_export.timing import Timing
+from service.motion import skeleton
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """rotations (B, S, J, 4), root_position (B, S, 3), bone_offsets (B, J, 3), duration (B,),
+    sigma (B,)."""
+
+    rotations: Floats
+    root_position: Floats
+    bone_offsets: Floats
+    duration: Floats
+    sigma: Floats
+
+    def positions(self, parents: tuple[int, ...]) -> Floats:
+        """Joint positions (B, S, J, 3), m."""
+        offsets = self.bone_offsets[:, None]
+        translations = np.repeat(offsets, self.rotations.shape[1], axis=1).astype(np.float64)
+        translations[:, :, 0] = self.root_position
+        return skeleton.forward(parents, self.rotations, translations)[0]
+
+
+@dataclass(frozen=True)
+class Model:
+    """The stages of a trained model."""
+
+    bank: FieldBank
+    spread: Spread
+    timing: Timing
+    decoder: Decoder
+    proportions: Proportions
+
+    def evaluate(self, controls: Floats, time: Floats) -> Outputs:
+        """Answer to controls (B, d) in their own units and times (B, S), s."""
+        fields = self.bank.numpy(controls)
+        duration, place = self.timing.numpy(fields["duration"], fields["warp"], time)
+        rotations, root = self.decoder.numpy(fields["pose"], place)
+        offsets = self.proportions.numpy(fields["offsets"])
+        sigma = self.spread.numpy(self.bank.points(controls))
+        return Outputs(rotations, root, offsets, duration, sigma)
+
+    def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
+        """The same as one graph, with metadata and what the file says of its producer."""
+        net = Net()
+        basis, fields = self.bank.onnx(net, "controls")
+        duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
+        rotations, root = self.decoder.onnx(net, fields["pose"], place)
+        net.named("rotations", rotations)
+        net.named("root_position", root)
+        net.named("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
+        net.named("duration", duration)
+        net.named("sigma", self.spread.onnx(net, basis))
+        joints = len(self.decoder.means)
+        inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
+        outputs: Shapes = {
+            "rotations": ["batch", "steps", joints, 4],
+            "root_position": ["batch", "steps", 3],
+            "bone_offsets": ["batch", joints, 3],
+            "duration": ["batch"],
+            "sigma": ["batch"],
+        }
+        return net.model(inputs, outputs, metadata, about)

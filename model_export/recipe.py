@@ -1,0 +1,193 @@
+"""The recipe: what to train from, checked once when it is read.
+
+A TOML file says everything but the numbers of each clip, which stand in a CSV table. Whatever a
+wrong recipe could mean in silence is refused: unknown keys, missing units, names that are used
+twice.
+"""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from service.motion.errors import RecipeError
+
+SCHEMA = 1
+# Parameters that a clip query has besides the controls.
+RESERVED = frozenset({"fps", "start", "end", "time", "times", "extrapolate", "level", "format"})
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+Text = Annotated[str, Field(min_length=1)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Source(_Part):
+    """What the motion files leave unsaid; a BVH file knows neither its unit nor its up axis."""
+
+    metres_per_unit: Positive = Field(description="length of one unit of the files, m")
+    up: Literal["y", "z"] = Field(description="the files' up axis; their frame is right-handed")
+    root_offset: Literal["replace", "add"] | None = Field(
+        default=None,
+        description="whether root position channels replace the root's OFFSET or add to it; "
+        "asked for where the OFFSET is not zero",
+    )
+
+
+class Condition(_Part):
+    """Which rows of the table belong: by listed values, or by a range of a number."""
+
+    among: list[str] | None = Field(default=None, description="the cell is one of these")
+    without: list[str] | None = Field(default=None, description="the cell is none of these")
+    minimum: float | None = Field(default=None, description="the number is at least this")
+    maximum: float | None = Field(default=None, description="the number is at most this")
+
+
+class Clips(_Part):
+    """Where the table is and which of its columns say what."""
+
+    table: Text = Field(description="CSV file, relative to the data folder")
+    file: Text = Field(description="column: motion file, relative to the table")
+    performer: Text | None = Field(default=None, description="column: who moved")
+    first_frame: Text | None = Field(default=None, description="column: first frame, from 0")
+    last_frame: Text | None = Field(default=None, description="column: last frame, counted in")
+    landmarks: list[Text] = Field(
+        default=[], description="columns: frames, in order, that happen at one time in all clips"
+    )
+    where: dict[str, Condition] = Field(default={}, description="conditions by column")
+
+
+class ControlColumn(_Part):
+    """One control parameter and the column that holds its value for each clip."""
+
+    name: Name
+    column: Text
+    unit: Text
+    description: Text
+
+    @field_validator("name")
+    @classmethod
+    def _not_reserved(cls, name: str) -> str:
+        if name in RESERVED:
+            raise ValueError(f"{name!r} is the name of a query parameter")
+        return name
+
+
+class Motion(_Part):
+    """How clips become a tensor."""
+
+    frames: Annotated[int, Field(ge=8, le=1000)] = Field(description="aligned frames T")
+    cyclic: bool = Field(description="whether the last pose leads into the first")
+    root: Literal["travelling", "in_place"] = Field(
+        description="in_place takes the straight line of the horizontal travel out"
+    )
+    drop_joints: list[Text] = Field(
+        default=[], description="joints left out, with everything that hangs below them"
+    )
+    joint_weights: dict[str, Positive] = Field(
+        default={}, description="importance of a joint's position in the metric; 1 if not said"
+    )
+
+
+class Alignment(_Part):
+    """Time warping."""
+
+    knots: Annotated[int, Field(ge=3, le=24)] = Field(
+        default=6, description="free increments of a warp: few, so that it adds no jerk"
+    )
+    rounds: Annotated[int, Field(ge=0, le=8)] = Field(
+        default=2, description="re-alignments to the mean motion after the one to the medoid"
+    )
+
+
+class Kriging(_Part):
+    """The field of the control coefficients."""
+
+    covariance: Literal["matern52", "matern32", "gaussian", "exponential", "spherical"] = "matern52"
+    drift: Annotated[int, Field(ge=0, le=1)] = Field(default=1, description="polynomial degree")
+    nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
+        default=None, description="share of the sill; fitted by leave-one-out if not said"
+    )
+
+
+class Size(_Part):
+    """How much of the tensor is kept: ranks, or the error that leaving out may cost."""
+
+    ranks: (
+        Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=3, max_length=3)] | None
+    ) = Field(default=None, description="of degrees of freedom, frames and samples")
+    rms_budget_cm: Positive | None = Field(
+        default=None, description="root-mean-square joint distance, cm"
+    )
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> "Size":
+        if (self.ranks is None) == (self.rms_budget_cm is None):
+            raise ValueError("give either ranks or rms_budget_cm")
+        return self
+
+
+class Recipe(_Part):
+    """A whole recipe."""
+
+    schema_version: Literal[1] = Field(alias="schema", description="version of this format")
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
+    description: Text
+    licence: Text = Field(description="licence of the motion data, with what it asks to be said")
+    source: Source
+    clips: Clips
+    controls: Annotated[list[ControlColumn], Field(min_length=1)]
+    motion: Motion
+    alignment: Alignment = Alignment()
+    kriging: Kriging = Kriging()
+    size: Size
+
+    @field_validator("controls")
+    @classmethod
+    def _names_differ(cls, controls: list[ControlColumn]) -> list[ControlColumn]:
+        names = [control.name for control in controls]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise ValueError(f"controls named twice: {sorted(twice)}")
+        return controls
+
+
+def read(path: Path) -> Recipe:
+    """Recipe of a TOML file; RecipeError says which key is wrong and what it should be."""
+    try:
+        content = path.read_text(encoding="utf-8")
+        return Recipe.model_validate(tomllib.loads(content))
+    except OSError as fault:
+        raise RecipeError(path, f"cannot be read: {fault.strerror}") from fault
+    except UnicodeDecodeError as fault:
+        raise RecipeError(path, f"not UTF-8 text: {fault}") from fault
+    except tomllib.TOMLDecodeError as fault:
+        raise RecipeError(path, f"not TOML: {fault}", _line_of(str(fault))) from fault
+    except ValidationError as fault:
+        raise RecipeError(path, _explain(fault)) from fault
+
+
+def _line_of(message: str) -> int | None:
+    found = re.search(r"line (\d+)", message)
+    return int(found.group(1)) if found else None
+
+
+def _explain(fault: ValidationError) -> str:
+    lines = []
+    for error in fault.errors(include_url=False):
+        key = ".".join(str(part) for part in error["loc"]) or "recipe"
+        found = "" if error["type"] in ("missing", "value_error") else f", found {error['input']!r}"
+        lines.append(f"{key}: {error['msg']}{found}")
+    return "; ".join(lines)
+
+
+def json_schema() -> str:
+    """JSON Schema of the recipe, as published beside the recipes for editors."""
+    schema: dict[str, Any] = Recipe.model_json_schema(by_alias=True)
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return json.dumps(schema, indent=2, sort_keys=True) + "\n"

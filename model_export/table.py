@@ -1,0 +1,174 @@
+"""The table of clips: one row a clip, checked cell by cell."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from model_export import data
+from model_export.data import Place
+from model_export.recipe import Clips, Condition, Recipe
+from service.motion.conventions import Floats
+from service.motion.errors import RecipeError
+
+
+@dataclass(frozen=True)
+class Row:
+    """One clip: where it is, which frames of it, and what it was an example of.
+
+    line: in the table, for messages. last_frame, counted in, and first_frame index the file's
+    frames from 0; None is the file's own end. controls (d,), landmarks: frames of the file.
+    """
+
+    place: Place
+    table: str
+    line: int
+    performer: str
+    first_frame: int
+    last_frame: int | None
+    controls: Floats
+    landmarks: tuple[int, ...]
+
+    def fault(self, message: str) -> RecipeError:
+        """Error that names this row."""
+        return RecipeError(self.table, message, self.line)
+
+
+def read(recipe: Recipe, folder: Path) -> list[Row]:
+    """Rows of the recipe's table that meet its conditions.
+
+    Raises RecipeError naming the line and the column of the first cell that cannot be used, a
+    missing column, a table without a row that belongs, and two rows that are one clip.
+    """
+    place = data.find(folder, recipe.clips.table)
+    cells = _Table(str(place), _records(place))
+    cells.require(_columns(recipe))
+    rows = [
+        _row(recipe, folder, cells, line, record)
+        for line, record in cells.records
+        if all(cells.meets(line, record, c, w) for c, w in recipe.clips.where.items())
+    ]
+    if not rows:
+        raise RecipeError(cells.name, f"none of {len(cells.records)} rows meets the conditions")
+    _refuse_repeats(rows)
+    return rows
+
+
+def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
+    try:
+        text = place.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as fault:
+        raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
+    reader = csv.DictReader(io.StringIO(text), strict=True)
+    try:
+        records = [(reader.line_num, record) for record in reader]
+    except csv.Error as fault:
+        raise RecipeError(str(place), f"not CSV: {fault}", reader.line_num) from fault
+    for line, record in records:
+        if None in record or None in record.values():
+            columns = len(reader.fieldnames or [])
+            raise RecipeError(str(place), f"not the {columns} cells of the heading", line)
+    return records
+
+
+@dataclass(frozen=True)
+class _Table:
+    name: str
+    records: list[tuple[int, dict[str, str]]]
+
+    def require(self, columns: Mapping[str, str]) -> None:
+        if not self.records:
+            raise RecipeError(self.name, "no rows below the heading")
+        there = self.records[0][1]
+        for column, why in columns.items():
+            if column not in there:
+                raise RecipeError(
+                    self.name, f"no column {column!r} ({why}); there are {', '.join(there)}", 1
+                )
+
+    def number(self, line: int, record: dict[str, str], column: str) -> float:
+        try:
+            value = float(record[column])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            found = record[column]
+            raise RecipeError(self.name, f"column {column!r}: {found!r}, expected a number", line)
+        return value
+
+    def frame(self, line: int, record: dict[str, str], column: str) -> int:
+        value = self.number(line, record, column)
+        if value != int(value) or value < 0:
+            raise RecipeError(
+                self.name, f"column {column!r}: {record[column]!r}, expected a frame from 0", line
+            )
+        return int(value)
+
+    def meets(self, line: int, record: dict[str, str], column: str, condition: Condition) -> bool:
+        cell = record[column]
+        if condition.among is not None and cell not in condition.among:
+            return False
+        if condition.without is not None and cell in condition.without:
+            return False
+        if condition.minimum is None and condition.maximum is None:
+            return True
+        low = -math.inf if condition.minimum is None else condition.minimum
+        high = math.inf if condition.maximum is None else condition.maximum
+        return low <= self.number(line, record, column) <= high
+
+
+def _columns(recipe: Recipe) -> dict[str, str]:
+    clips = recipe.clips
+    named = {
+        clips.file: "clips.file",
+        **dict.fromkeys(clips.where, "clips.where"),
+        **dict.fromkeys(clips.landmarks, "clips.landmarks"),
+        **{control.column: f"control {control.name}" for control in recipe.controls},
+    }
+    for key in ("performer", "first_frame", "last_frame"):
+        column = getattr(clips, key)
+        if column is not None:
+            named[column] = f"clips.{key}"
+    return named
+
+
+def _row(recipe: Recipe, folder: Path, cells: _Table, line: int, record: dict[str, str]) -> Row:
+    clips = recipe.clips
+    first = cells.frame(line, record, clips.first_frame) if clips.first_frame else 0
+    last = cells.frame(line, record, clips.last_frame) if clips.last_frame else None
+    if last is not None and last <= first:
+        raise RecipeError(cells.name, f"frames {first} to {last}, expected at least two", line)
+    return Row(
+        place=_motion_file(folder, clips, cells, line, record),
+        table=cells.name,
+        line=line,
+        performer=record[clips.performer] if clips.performer else "",
+        first_frame=first,
+        last_frame=last,
+        controls=np.array([cells.number(line, record, c.column) for c in recipe.controls]),
+        landmarks=tuple(cells.frame(line, record, column) for column in clips.landmarks),
+    )
+
+
+def _motion_file(
+    folder: Path, clips: Clips, cells: _Table, line: int, record: dict[str, str]
+) -> Place:
+    beside = clips.table.rpartition("/")[0]
+    name = f"{beside}/{record[clips.file]}" if beside else record[clips.file]
+    try:
+        return data.find(folder, name)
+    except RecipeError as fault:
+        raise RecipeError(cells.name, f"column {clips.file!r}: {fault.message}", line) from fault
+
+
+def _refuse_repeats(rows: list[Row]) -> None:
+    seen: dict[tuple[str, int, int | None], Row] = {}
+    for row in rows:
+        key = (str(row.place), row.first_frame, row.last_frame)
+        if key in seen:
+            raise row.fault(f"the same frames of the same file as line {seen[key].line}")
+        seen[key] = row

@@ -1,0 +1,76 @@
+"""Aligned clips as a tensor of degrees of freedom × frames × samples, in the metric of bodies."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import chart, flips, metric
+from model_export.align import Aligned
+from model_export.chart import Chart
+from model_export.flips import Finding
+from service.motion.conventions import Floats
+
+# A degree of freedom that stays within this all through the family is left out: metres or radians.
+CONSTANT = 1e-9
+
+
+@dataclass(frozen=True)
+class MotionTensor:
+    """values (D', T, N): centred pose vectors of the D' degrees of freedom that vary, whitened.
+
+    A unit of squared distance between two entries is a square metre, summed over the joints by
+    their weights and over the frames. mean (D,): what it is centred on. whiten and unwhiten (D',
+    D) and (D, D') lead there and back. weight: sum of the joints' weights.
+    """
+
+    values: Floats
+    mean: Floats
+    whiten: Floats
+    unwhiten: Floats
+    chart: Chart
+    weight: float
+
+    def rms(self, squared: Floats) -> Floats:
+        """Root-mean-square joint distance, m, of squared distances summed over the tensor."""
+        _, frames, samples = self.values.shape
+        return np.sqrt(squared / (self.weight * frames * samples))
+
+
+def build(
+    aligned: Aligned, parents: tuple[int, ...], offsets: Floats, joint_weights: Floats
+) -> tuple[MotionTensor, list[Finding]]:
+    """Tensor of aligned clips, and the flips and far joints that were noticed on the way.
+
+    offsets (N, J, 3): bone offsets of each clip's performer, m. joint_weights (J,).
+    """
+    small = flips.small_joints(parents, offsets.mean(axis=0))
+    rotations, flipped = flips.without_flips(aligned.rotations, small)
+    own_chart, far = chart.fit(rotations)
+    numbers = own_chart.numbers(rotations, aligned.root_path)
+    mean = numbers.mean(axis=(0, 1))
+    varies = np.ptp(numbers, axis=(0, 1)) > CONSTANT
+    gram = _gram(numbers, own_chart, parents, offsets, joint_weights)
+    root, inverse = metric.whitening(gram[np.ix_(varies, varies)])
+    whiten, unwhiten = np.zeros((2, len(root), len(mean)))
+    whiten[:, varies], unwhiten[:, varies] = root, inverse
+    values = np.ascontiguousarray(((numbers - mean) @ whiten.T).transpose(2, 1, 0))
+    weight = float(joint_weights.sum())
+    return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, weight), flipped + far
+
+
+def _gram(
+    numbers: Floats,
+    own_chart: Chart,
+    parents: tuple[int, ...],
+    offsets: Floats,
+    joint_weights: Floats,
+) -> Floats:
+    """Gram matrix (D, D) over poses spread evenly through the tensor."""
+    samples, frames, _ = numbers.shape
+    chosen = np.unique(np.linspace(0, samples * frames - 1, metric.POSES).astype(np.int64))
+    some = numbers.reshape(samples * frames, -1)[chosen]
+    rotations, root = own_chart.poses(some)
+    translations = offsets[chosen // frames].copy()
+    translations[:, 0] = root
+    vectors = some[:, 3:].reshape(len(some), -1, 3)
+    return metric.gram(parents, rotations, vectors, translations, joint_weights)

@@ -1,0 +1,47 @@
+"""From seconds to canonical time: every clip has its own duration and its own pace."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export.net import Net
+from model_export.warp import WarpBasis
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Canonical frames 0 to frames - 1, reached through warps of a basis."""
+
+    basis: WarpBasis
+    frames: int
+
+    def numpy(self, log_duration: Floats, logs: Floats, time: Floats) -> tuple[Floats, Floats]:
+        """Durations (B,), s, and canonical frames (B, S) at times (B, S), s.
+
+        log_duration (B, 1), logs (B, knots). Times outside the clip count as its ends.
+        """
+        durations = np.exp(log_duration[:, 0])
+        u = np.clip(time / durations[:, None], 0.0, 1.0)
+        return durations, (self.frames - 1) * self.basis.evaluate(logs, u)
+
+    def onnx(self, net: Net, log_duration: str, logs: str, time: str) -> tuple[str, str]:
+        """The same in a graph: durations (B,) and canonical frames (B, S, 1)."""
+        duration = net("Exp", log_duration)
+        share = net("Unsqueeze", net("Div", time, duration), net.indices(2))
+        u = net("Clip", share, net.number(0.0), net.number(1.0))
+        breaks = np.concatenate([[0.0], self.basis.breaks])
+        hinges = net("Relu", net("Sub", u, net.weights("warp_breaks", breaks)))
+        cubes = net("Mul", net("Mul", hinges, hinges), hinges)
+        powers = net("Concat", u, net("Mul", u, u), cubes, axis=2)
+        still = net.weights("warp_still", np.log(self.basis.still))
+        increments = net("Softmax", net("Add", logs, still), axis=1)
+        # Scaled to frames here, which costs nothing more.
+        form = (self.frames - 1) * self.basis.power_form.T
+        coefficients = net("MatMul", increments, net.weights("warp_form", form))
+        place = net("MatMul", powers, net("Unsqueeze", coefficients, net.indices(2)))
+        end = net.number(self.frames - 1.0)
+        return (
+            net("Squeeze", duration, net.indices(1)),
+            net("Clip", place, net.number(0.0), end),
+        )

@@ -1,0 +1,109 @@
+"""Scales and nugget of a field by leave-one-out, in closed form."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from model_export import kriging, variogram
+from model_export.kriging import Hyper
+from service.motion.conventions import Floats
+
+# In half-ranges of a control. A scale at the lower bound means "linear in this control"; beyond
+# the bounds float32 would no longer tell the samples apart.
+SCALES = (0.15, 3.0)
+# As a share of the sill. Real trials differ so much that a nugget of several sills can be right.
+NUGGETS = (1e-4, 10.0)
+DESCENTS = 2
+STEP = 0.7
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A chosen field: residuals (n, m) of its leave-one-out, their share of the mean's, its sill.
+
+    unexplained: squared residuals over those of leaving the controls out and taking the mean of
+    the others; at one or above the controls explain nothing. sill: of the sum over values.
+    """
+
+    hyper: Hyper
+    inverse: Floats
+    residuals: Floats
+    unexplained: float
+    sill: float
+
+
+def first_guess(samples: Floats, values: Floats, covariance: str, drift: int) -> Hyper:
+    """Isotropic field from the fit of the experimental variogram, within the bounds."""
+    left = variogram.residuals(samples, values, drift)
+    fit = variogram.fit(variogram.experimental(samples, left), covariance)
+    share = fit.nugget / fit.sill if fit.sill > 0 else NUGGETS[1]
+    scales = np.full(samples.shape[1], np.clip(1.0 / fit.range, *SCALES))
+    return Hyper(covariance, drift, scales, float(np.clip(share, *NUGGETS)))
+
+
+def fixed(hyper: Hyper, samples: Floats, values: Floats) -> Tuned:
+    """Field of given parameters with its leave-one-out residuals."""
+    inverse = kriging.invert(hyper, samples)
+    residuals, variances = kriging.leave_one_out(inverse, values)
+    from_mean = (values - values.mean(axis=0)) * len(values) / (len(values) - 1)
+    total = float(np.sum(np.square(from_mean)))
+    return Tuned(
+        hyper,
+        inverse,
+        residuals,
+        float(np.sum(np.square(residuals))) / total if total > 0 else 1.0,
+        float(np.mean(np.sum(np.square(residuals), axis=1) / variances)),
+    )
+
+
+def tune(guess: Hyper, samples: Floats, values: Floats, nugget: float | None) -> Tuned:
+    """Field with the scales, and the nugget where none is given, of least squared residuals.
+
+    samples (n, d) in half-ranges, values (n, m) in a metric of their own. Nelder and Mead's
+    simplex descends from the best of the guess and a coarse grid: there are ridges between a
+    smooth field and one in which every sample stands alone.
+    """
+    low = np.log([SCALES[0]] * samples.shape[1] + [NUGGETS[0]])
+    high = np.log([SCALES[1]] * samples.shape[1] + [NUGGETS[1]])
+
+    def read(x: Floats) -> Hyper:
+        scales, own = np.exp(x[:-1]), float(np.exp(x[-1]))
+        return replace(guess, scales=scales, nugget=own if nugget is None else nugget)
+
+    # The residuals depend on the values only through their inner products.
+    products = values @ values.T
+
+    def loss(x: Floats) -> float:
+        inverse = kriging.invert(read(x), samples)[: len(samples), : len(samples)]
+        squares = np.sum((inverse @ products) * inverse, axis=1)
+        return float(np.sum(squares / np.diagonal(inverse) ** 2))
+
+    starts = [np.clip(x, low, high) for x in _starts(guess)]
+    best = min(_descend(loss, x, low, high) for x in sorted(starts, key=loss)[:DESCENTS])
+    return fixed(read(np.array(best[1])), samples, values)
+
+
+def _starts(guess: Hyper) -> list[Floats]:
+    """Log scales and log nugget (d + 1,) of the variogram's guess and of an isotropic grid."""
+    even = np.ones_like(guess.scales)
+    grid = [np.append(s * even, n) for s in (0.2, 0.5, 1.2) for n in (0.02, 0.3, 2.0)]
+    return [np.log(x) for x in (np.append(guess.scales, guess.nugget), *grid)]
+
+
+def _descend(
+    loss: Callable[[Floats], float], start: Floats, low: Floats, high: Floats
+) -> tuple[float, list[float]]:
+    """Least loss found from a start within bounds, and where."""
+    # Steps of a factor of about two: SciPy's own simplex would be a point where a logarithm is 0.
+    inward = np.where(start + STEP > high, -STEP, STEP)
+    simplex = np.vstack([start, start + np.diag(inward)])
+    found = minimize(
+        loss,
+        start,
+        method="Nelder-Mead",
+        bounds=list(zip(low, high, strict=True)),
+        options={"initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0, "maxfev": 400},
+    )
+    return float(found.fun), [float(value) for value in found.x]

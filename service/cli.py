@@ -1,0 +1,224 @@
+"""The `posefield` command: what ships with the service; the training job adds its own commands.
+
+Exit codes: 0 done; 1 `check` found defects; 2 a question or an argument that cannot be answered;
+3 a file that cannot be used; 4 samples from which no model can be made.
+"""
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Annotated, Any
+
+import orjson
+import typer
+
+from service import __version__
+from service.encode import ENCODERS
+from service.motion import card as cards
+from service.motion import files
+from service.motion.answer import ClipAnswer
+from service.motion.errors import (
+    FileError,
+    InvalidField,
+    MotionError,
+    TrainingError,
+    UnknownFormat,
+)
+from service.synthesis import library, session
+from service.synthesis.synthesizer import Policy, Synthesizer
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+ModelPath = Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")]
+Controls = Annotated[
+    list[str] | None,
+    typer.Option("--control", "-c", help="NAME=VALUE, once for each control", metavar="NAME=VALUE"),
+]
+Extrapolate = Annotated[
+    str, typer.Option(help="warn or refuse: controls outside what was sampled", metavar="POLICY")
+]
+Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
+
+
+def main() -> None:
+    """Run the command line; faults that have a name end as one line and an exit code."""
+    for plugin in entry_points(group="posefield.commands"):
+        plugin.load()(app)
+    try:
+        app()
+    except MotionError as fault:
+        typer.echo(f"posefield: {fault}", err=True)
+        sys.exit(_code(fault))
+
+
+def _code(fault: MotionError) -> int:
+    if isinstance(fault, FileError):
+        return 3
+    return 4 if isinstance(fault, TrainingError) else 2
+
+
+@app.callback(invoke_without_command=True)
+def _version(
+    version: Annotated[bool, typer.Option("--version", help="say the version")] = False,
+) -> None:
+    if version:
+        typer.echo(f"posefield {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def inspect(model: ModelPath, json: Json = False) -> None:
+    """Say what a model file is: its controls, its skeleton, its errors, where it comes from."""
+    opened = session.load(model)
+    plain = {"identity": f"{model.stem}@{opened.digest}", **cards.plain_values(opened.card)}
+    typer.echo(_json(plain) if json else _summary(plain))
+
+
+@app.command()
+def pose(
+    model: ModelPath,
+    control: Controls = None,
+    time: Annotated[list[float] | None, typer.Option(help="seconds from the start")] = None,
+    extrapolate: Extrapolate = "warn",
+) -> None:
+    """Answer with the pose at one or more times, as JSON."""
+    answer = open_model(model).pose(numbers(control or []), time or [0.0], policy(extrapolate))
+    _warn(answer.trust.warnings)
+    values = {
+        "times": answer.times.tolist(),
+        "rotations": answer.rotations.tolist(),
+        "root_position": answer.root_position.tolist(),
+        "bone_offsets": answer.bone_offsets.tolist(),
+        **answer.trust.facts(),
+    }
+    typer.echo(_json(values))
+
+
+@app.command()
+def clip(
+    model: ModelPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="file; its ending is the format")],
+    control: Controls = None,
+    fps: Annotated[float, typer.Option(help="frames a second")] = 30.0,
+    start: Annotated[float, typer.Option(help="seconds")] = 0.0,
+    end: Annotated[float | None, typer.Option(help="seconds; the whole clip if not said")] = None,
+    extrapolate: Extrapolate = "warn",
+    json: Json = False,
+) -> None:
+    """Write a clip as usda, usdc, usdz, json or bvh."""
+    encode = encoder(output)
+    synthesizer = open_model(model)
+    answer = synthesizer.clip(numbers(control or []), fps, policy(extrapolate), start, end)
+    files.write(encode(answer), output)
+    _warn(answer.trust.warnings)
+    typer.echo(wrote(output, answer, json))
+
+
+@app.command()
+def serve(
+    paths: Annotated[list[Path], typer.Argument(help="model files, or folders of them")],
+    host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
+    port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
+) -> None:
+    """Answer over HTTP for the models given, until interrupted."""
+    from service.web import server, settings
+
+    server.serve(paths, settings.read(host=host, port=port))
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="a usda, usdc, usd or usdz file")],
+    json: Json = False,
+) -> None:
+    """Find what makes a USD character fail in some reader though validators pass it."""
+    from service.check import check as find
+
+    findings = find(file)
+    if json:
+        typer.echo(_json([vars(finding) for finding in findings]))
+    else:
+        for finding in findings:
+            typer.echo(f"{finding.severity}: {finding.prim}: {finding.message} [{finding.code}]")
+        typer.echo(f"{file}: {len(findings)} findings")
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(1)
+
+
+def open_model(path: Path) -> Synthesizer:
+    """The one model of a file."""
+    return next(iter(library.load([path]).models.values()))
+
+
+def numbers(pairs: Sequence[str]) -> dict[str, float]:
+    """Controls of NAME=VALUE words; InvalidField for one that is not, or is given twice."""
+    controls: dict[str, float] = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or name in controls:
+            raise InvalidField("control", f"{pair!r}, expected NAME=VALUE, each name once")
+        try:
+            controls[name] = float(value)
+        except ValueError as fault:
+            raise InvalidField(f"controls/{name}", f"{value!r}, expected a number") from fault
+    return controls
+
+
+def policy(word: str) -> Policy:
+    """What to do outside what was sampled."""
+    if word == "warn" or word == "refuse":
+        return word
+    raise InvalidField("extrapolate", f"{word!r}, expected warn or refuse")
+
+
+def encoder(path: Path) -> Any:
+    """Function that turns a ClipAnswer into the bytes of the format that a path ends in."""
+    ending = path.suffix.removeprefix(".")
+    if ending not in ENCODERS:
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(ENCODERS)}")
+    return ENCODERS[ending].encode
+
+
+def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
+    """What to tell of a clip that was written."""
+    frames = len(answer.clip)
+    if json:
+        return _json(
+            {"file": str(path), "frames": frames, "rate": answer.clip.rate, **answer.trust.facts()}
+        )
+    return (
+        f"{path}: {frames} frames at {answer.clip.rate:g} a second, {answer.trust.duration:.2f} s, "
+        f"give or take {100 * answer.trust.sigma:.1f} cm"
+    )
+
+
+def _warn(warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def _json(value: Any) -> str:
+    return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
+
+
+def _summary(plain: dict[str, Any]) -> str:
+    """A model card on one screen."""
+    diagnostics = plain["diagnostics"]
+    lines = [
+        f"{plain['identity']}: {plain['description']}",
+        f"{plain['samples']} clips of {len(plain['skeleton']['names'])} joints, "
+        f"{plain['durations'][0]:.2f} to {plain['durations'][1]:.2f} s, {plain['root']}"
+        f"{', cyclic' if plain['cyclic'] else ''}",
+        f"ranks {plain['ranks']} of {diagnostics['tensor']}: truncation costs "
+        f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
+        f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+        "controls:",
+        *(
+            f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"
+            for c in plain["controls"]
+        ),
+        f"licence: {plain['provenance']['licence']}",
+        *(f"note: {note}" for note in diagnostics["notes"]),
+    ]
+    return "\n".join(lines)
