@@ -1,8 +1,12 @@
 """The metric of pose space: how far joints move when a degree of freedom does.
 
-A pose vector mixes metres and radians, and a hip turns more body than a wrist. The Gram matrix of
-the forward kinematics' Jacobian, averaged over the family's own poses, is what makes distances
+A pose vector mixes metres and radians, and a hip turns more body than a wrist. The Gram matrix JᵀJ
+of the forward kinematics' Jacobian J, averaged over the family's own poses, is what makes distances
 between pose vectors distances between bodies, so that least squares means what the eye sees.
+
+JᵀJ is the mass matrix of a body that carries a unit mass at every joint, so it is computed as one:
+by composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.2), with
+motions and forces as six numbers about the origin. No Jacobian is ever formed.
 """
 
 import numpy as np
@@ -13,7 +17,7 @@ from service.motion.conventions import Floats
 # Every joint carries a sphere of skin of this radius, so that a turn about a bone counts too, m.
 SHELL = 0.03
 # Poses over which the metric is averaged: it is flat in their number far below this.
-POSES = 200
+POSES = 400
 # Directions that move almost nothing weigh no less than this share of the heaviest.
 FLOOR = 1e-6
 
@@ -28,17 +32,18 @@ def gram(
     """Mean over poses of JᵀJ (D, D), D = 3 + 3 J, m² for a unit of each degree of freedom.
 
     rotations (P, J, 4) local, vectors (P, J, 3) the same as rotation vectors about the means,
-    translations (P, J, 3) local, m. joint_weights (J,): importance of each joint's position.
+    translations (P, J, 3) local, m. joint_weights (J,): the mass of each joint.
     """
     positions, orientations = skeleton.forward(parents, rotations, translations)
-    axes = _axes(orientations, vectors)
     below = skeleton.descendants(parents)
-    moved = _displacements(axes, positions, below) * np.sqrt(joint_weights)[:, None]
-    poses, joints = positions.shape[:2]
-    flat = moved.reshape(poses, 3 + 3 * joints, -1)
-    total = np.einsum("pdx,pex->de", flat, flat, optimize=True)
-    total[3:, 3:] += 2.0 / 3.0 * SHELL**2 * _turns(axes, (below * joint_weights) @ below.T)
-    return total / poses
+    motions = _motions(positions, _axes(orientations, vectors))
+    forces = _forces(motions, positions, joint_weights, below)
+    poses = len(positions)
+    products = np.tensordot(motions, forces, axes=([0, 2], [0, 2])) / poses
+    # A force acts on the joint that it comes from and on those above it; the rest is symmetry.
+    acts = np.kron(np.pad(below, ((1, 0), (1, 0)), constant_values=1.0), np.ones((3, 3)))
+    upper = products * np.triu(acts)
+    return upper + np.triu(upper, k=1).T
 
 
 def _axes(orientations: Floats, vectors: Floats) -> Floats:
@@ -48,7 +53,7 @@ def _axes(orientations: Floats, vectors: Floats) -> Floats:
 
 
 def _right_jacobian(v: Floats) -> Floats:
-    """Matrix (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order (Chirikjian 2011)."""
+    """Matrix (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     safe = np.maximum(angle, 1e-4)
     cross = np.cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
@@ -57,21 +62,33 @@ def _right_jacobian(v: Floats) -> Floats:
     return np.eye(3) - first * cross + second * cross @ cross
 
 
-def _displacements(axes: Floats, positions: Floats, below: Floats) -> Floats:
-    """What a unit of each degree of freedom does to each joint (P, 3 + 3 J, J, 3), m."""
+def _motions(positions: Floats, axes: Floats) -> Floats:
+    """Angular velocity and velocity at the origin (P, 3 + 3 J, 6) of each degree of freedom."""
     poses, joints = positions.shape[:2]
-    moved = np.zeros((poses, 3 + 3 * joints, joints, 3))
-    moved[:, :3] = np.eye(3)[:, None]
-    levers = (positions[:, None] - positions[:, :, None]) * below[..., None]
-    turned = np.cross(axes[:, :, :, None], levers[:, :, None])
-    moved[:, 3:] = turned.reshape(poses, 3 * joints, joints, 3)
-    return moved
+    motions = np.zeros((poses, 3 + 3 * joints, 6))
+    motions[:, :3, 3:] = np.eye(3)
+    motions[:, 3:, :3] = axes.reshape(poses, -1, 3)
+    motions[:, 3:, 3:] = np.cross(positions[:, :, None], axes).reshape(poses, -1, 3)
+    return motions
 
 
-def _turns(axes: Floats, shared: Floats) -> Floats:
-    """Sum over poses of the dot products of axes, by how many joints both of them carry."""
-    flat = axes.reshape(len(axes), -1, 3)
-    return np.einsum("pdx,pex->de", flat, flat) * np.kron(shared, np.ones((3, 3)))
+def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> Floats:
+    """Moment about the origin and force (P, 3 + 3 J, 6) that each motion needs.
+
+    What moves is all that hangs below the joint, as one rigid body.
+    """
+    moments = mass[:, None] * positions
+    second = moments[..., :, None] * positions[..., None, :]
+    size = np.trace(second, axis1=-2, axis2=-1) + 2.0 / 3.0 * SHELL**2 * mass
+    inertia = size[..., None, None] * np.eye(3) - second
+    carried = np.vstack([below[:1], below])
+    mass_below = np.repeat(carried @ mass, 3)[:, None]
+    first = np.repeat(np.einsum("jk,pkc->pjc", carried, moments), 3, axis=1)
+    turning = np.repeat(np.einsum("jk,pkcd->pjcd", carried, inertia, optimize=True), 3, axis=1)
+    spin, drift = motions[..., :3], motions[..., 3:]
+    force = np.cross(spin, first) + mass_below * drift
+    moment = np.einsum("pdcx,pdx->pdc", turning, spin) + np.cross(first, drift)
+    return np.concatenate([moment, force], axis=-1)
 
 
 def whitening(gram: Floats) -> tuple[Floats, Floats]:

@@ -1,0 +1,77 @@
+"""Naive kriging, the paper's baseline: a variogram and a kriging system for every frame.
+
+This is what Mukai & Kuriyama (TOG 2005) do and what the multilinear model is measured against. It is
+a reference: nothing of it ships. The dissimilarity of two poses is the distance between their
+joints; pose vectors are interpolated as they are.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import kriging, variogram
+from model_export.covariance import COVARIANCES
+from model_export.kriging import Hyper, Kriging
+from model_export.net import Net
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Naive:
+    """One isotropic field a frame over the same samples; values are pose vectors (N, T, D)."""
+
+    fields: tuple[Kriging, ...]
+    values: Floats
+
+    def numpy(self, points: Floats) -> Floats:
+        """Pose vectors (B, T, D) at points (B, d) in half-ranges, as weighted averages."""
+        weights = np.stack([field.weights(points) for field in self.fields], axis=1)
+        return np.einsum("btn,ntd->btd", weights, self.values, optimize=True)
+
+    def onnx(self, net: Net, points: str) -> str:
+        """Pose vectors (T, D) at one point (1, d): weights from the inverse of each frame's system,
+        and the average of the full samples by them, as the paper describes it."""
+        basis = self._basis(net, points)
+        inverse = np.stack([field.inverse[:, : len(field.samples)] for field in self.fields])
+        weights = net("MatMul", basis, net.weights("inverses", inverse))
+        samples = net.weights("values", self.values.transpose(1, 0, 2))
+        return net("Squeeze", net("MatMul", weights, samples), net.indices(1))
+
+    def onnx_dual(self, net: Net, points: str) -> str:
+        """The same with weights and samples multiplied beforehand: half the numbers to read."""
+        duals = np.stack(
+            [
+                field.inverse[:, : len(field.samples)] @ values
+                for field, values in zip(self.fields, self.values.swapaxes(0, 1), strict=True)
+            ]
+        )
+        product = net("MatMul", self._basis(net, points), net.weights("duals", duals))
+        return net("Squeeze", product, net.indices(1))
+
+    def _basis(self, net: Net, points: str) -> str:
+        """Covariances and drift (T, 1, n + k) of one point in every frame's own field."""
+        samples = self.fields[0].samples
+        gaps = net("Sub", points, net.weights("samples", samples))
+        squared = net("ReduceSum", net("Mul", gaps, gaps), net.indices(1), keepdims=0)
+        worth = np.array([field.hyper.scales[:1] ** 2 for field in self.fields])
+        near = net("Mul", net.weights("squared_scales", worth), squared)
+        covariance = COVARIANCES[self.fields[0].hyper.covariance].onnx(net, near)
+        one = net.weights("one", np.ones((1, 1)))
+        drift = net("Concat", one, points, axis=1)
+        frames = net.indices(len(self.fields), samples.shape[1] + 1)
+        both = net("Concat", covariance, net("Expand", drift, frames), axis=1)
+        return net("Unsqueeze", both, net.indices(1))
+
+
+def fit(points: Floats, positions: Floats, values: Floats, covariance: str) -> Naive:
+    """Naive field of pose vectors (N, T, D) with joint positions (N, T, J, 3) at points (N, d)."""
+    fields = []
+    for frame in range(values.shape[1]):
+        poses = positions[:, frame].reshape(len(points), -1)
+        left = variogram.residuals(points, poses, 1)
+        found = variogram.fit(variogram.experimental(points, left), covariance)
+        nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
+        scales = np.full(points.shape[1], 1.0 / found.range)
+        hyper = Hyper(covariance, 1, scales, float(nugget))
+        fields.append(kriging.solve(hyper, points, values[:, frame]))
+    return Naive(tuple(fields), values)
