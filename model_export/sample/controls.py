@@ -1,0 +1,96 @@
+"""The four controls of the family, their ranges, and what a body of given controls can do."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+
+from model_export.sample import body
+from service.motion.errors import InvalidField
+
+STATURES = {"short": 1.62, "middle": 1.75, "tall": 1.88}
+"""The three performers and their statures, m."""
+
+SEAT_RANGE = 0.03
+"""How far a seat may lie below or above the common height, m."""
+
+STAND_RANGE = 0.03
+"""How far a standing hip may lie below the upright one, m."""
+
+RANGES: dict[str, tuple[float, float, str, str]] = {
+    "stature": (1.62, 1.88, "m", "Height of the performer"),
+    "hip_height": (
+        round(body.sitting_hip(1.62) - SEAT_RANGE, 4),
+        round(body.standing_hip(1.88), 4),
+        "m",
+        "Height of the hips at the start: sitting or standing",
+    ),
+    "turn": (-60.0, 90.0, "deg", "Angle from straight ahead to the target, positive to the right"),
+    "target_height": (0.3, 1.9, "m", "Height of the target above the floor"),
+}
+"""Name: (minimum, maximum, unit, description), in the order of the controls.
+
+These are the corners of the box; the body narrows hip_height and target_height: `limits`.
+"""
+
+
+@dataclass(frozen=True)
+class Controls:
+    """One point of the control space, in the units of RANGES: `turn` is in degrees."""
+
+    stature: float
+    hip_height: float
+    turn: float
+    target_height: float
+
+    @property
+    def azimuth(self) -> float:
+        """Rotation about +Y from straight ahead to the target, rad: negative to the right."""
+        return -math.radians(self.turn)
+
+    @property
+    def uprightness(self) -> float:
+        """Zero at the sitting hip height, one at the standing one, linear between and beyond."""
+        low, high = body.sitting_hip(self.stature), body.standing_hip(self.stature)
+        return (self.hip_height - low) / (high - low)
+
+
+def limits(name: str, stature: float, hip_height: float) -> tuple[float, float]:
+    """Range of a control that a body of that stature and hip height can follow."""
+    low, high, _, _ = RANGES[name]
+    if name == "hip_height":
+        return body.sitting_hip(stature) - SEAT_RANGE, body.standing_hip(stature)
+    if name == "target_height":
+        # The shoulder is about 0.28 statures above the hips, and the arm 0.36 statures long.
+        return low, min(high, hip_height + 0.56 * stature)
+    return low, high
+
+
+def parse(controls: Mapping[str, float] | Sequence[float]) -> Controls:
+    """Controls from a mapping by name or from four values in the order of RANGES.
+
+    Raises InvalidField for a control that is missing, unknown or out of the body's range.
+    """
+    values = controls if isinstance(controls, Mapping) else _named(controls)
+    for name in values:
+        if name not in RANGES:
+            raise InvalidField(name, f"unknown control, expected one of {', '.join(RANGES)}")
+    for name in RANGES:
+        if name not in values:
+            raise InvalidField(name, "missing control")
+    return _checked(Controls(*(float(values[name]) for name in RANGES)))
+
+
+def _named(values: Sequence[float]) -> dict[str, float]:
+    if len(values) != len(RANGES):
+        raise InvalidField("controls", f"{len(values)} values, expected {len(RANGES)}")
+    return dict(zip(RANGES, values, strict=True))
+
+
+def _checked(controls: Controls) -> Controls:
+    for (name, (_, _, unit, _)), value in zip(RANGES.items(), astuple(controls), strict=True):
+        low, high = limits(name, controls.stature, controls.hip_height)
+        # A bound that was printed and read again is still inside.
+        if not low - 1e-6 <= value <= high + 1e-6:
+            allowed = f"{low:.6g} to {high:.6g} {unit}"
+            raise InvalidField(name, f"{value:.6g} {unit} cannot be reached, expected {allowed}")
+    return controls

@@ -1,0 +1,113 @@
+"""The 92 samples: where the controls were measured, and the trials with their noise."""
+
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.random import PCG64, Generator
+
+from model_export.sample import body, controls, truth
+from model_export.sample.controls import STATURES, Controls
+from model_export.sample.timing import Warp
+from service.motion import quat
+from service.motion.clip import Clip
+from service.motion.conventions import Floats
+
+COUNT = 92
+RATE = 120.0
+SEED = 2006
+_GROUPS = 2 * len(STATURES)
+
+NOISE = np.radians(0.4)
+"""Root mean square of the noise about each axis over a clip, rad; legs have a share of it."""
+
+_LEG_SHARE = 0.5
+"""Share of pelvis and legs in the noise: a body that stands or sits is steadier below."""
+
+_DURATION_SPREAD = 0.04
+_WARP_SPREAD = 0.05
+_HARMONICS = np.array([0.5, 1.0, 1.5, 2.0])
+"""Cycles a clip of the noise."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One trial: who reached, what was asked of them, and the motion as it was captured."""
+
+    performer: str
+    controls: Controls
+    clip: Clip
+
+
+def _spread(group: int, index: int, size: int) -> Floats:
+    """Point (3,) of a group's Fibonacci lattice over turn and target height, and a free third.
+
+    The groups' lattices are shifted against each other, so that together they fill the gaps.
+    """
+    offset = (group + 0.5) / _GROUPS
+    turn = (index + offset) / size
+    height = np.mod(offset + index * 0.5 * (np.sqrt(5.0) - 1.0), 1.0)
+    return np.array([turn, height, np.mod(0.5 + index * np.sqrt(2.0), 1.0)])
+
+
+def _asked(stature: float, standing: bool, spread: Floats) -> Controls:
+    """Controls of a trial, rounded as the table prints them."""
+    low, high = controls.limits("hip_height", stature, 0.0)
+    band = (high - controls.STAND_RANGE, high) if standing else (low, low + 2 * controls.SEAT_RANGE)
+    hip = round(float(np.interp(spread[2], (0, 1), band)), 4)
+    turn, height = (
+        round(float(np.interp(part, (0, 1), controls.limits(name, stature, hip))), 4)
+        for name, part in zip(("turn", "target_height"), spread, strict=False)
+    )
+    return Controls(stature, hip, turn, height)
+
+
+def design() -> Iterator[tuple[str, Controls]]:
+    """Performer and controls of each sample: short, middle, tall, each standing then sitting."""
+    groups = product(STATURES, (True, False))
+    for group, (name, standing) in enumerate(groups):
+        size = len(range(group, COUNT, _GROUPS))
+        for index in range(size):
+            yield name, _asked(STATURES[name], standing, _spread(group, index, size))
+
+
+def _wander(rng: Generator, frames: int, shape: tuple[int, int]) -> Floats:
+    """Smooth noise (frames, *shape), rad: a few slow sinusoids of random phase and size."""
+    size = NOISE * rng.standard_normal((len(_HARMONICS), *shape)) * np.sqrt(2 / len(_HARMONICS))
+    phase = rng.uniform(0.0, 2.0 * np.pi, size.shape)
+    elapsed = np.arange(frames) / (frames - 1)
+    cycles = 2.0 * np.pi * np.multiply.outer(elapsed, _HARMONICS)
+    waves = np.sin(cycles[:, :, None, None] + phase)
+    noise: Floats = np.einsum("fh...,h...->f...", waves, size)
+    return noise
+
+
+def _unrest() -> Floats:
+    """How much each axis (J, 3) of each joint takes of the noise: a hinge only its own."""
+    share = np.ones((len(body.NAMES), 3))
+    share[[body.INDEX[name] for name in body.HINGES], 1:] = 0.0
+    share[: body.INDEX["LowerBack"]] *= _LEG_SHARE
+    return share
+
+
+def _shaken(clip: Clip, rng: Generator) -> Clip:
+    noise = _wander(rng, len(clip), (len(body.NAMES), 3)) * _unrest()
+    return replace(clip, rotations=quat.mul(clip.rotations, quat.exp(noise)))
+
+
+def _trial(where: Controls, rng: Generator) -> Clip:
+    """One try: as the truth, but a little sooner or later, and not quite steady."""
+    seconds = truth.duration(astuple(where))
+    pace = truth.warp(where)
+    late = np.exp(_DURATION_SPREAD * rng.standard_normal())
+    da, db = _WARP_SPREAD * rng.standard_normal(2)
+    played = truth.play(where, seconds * late, Warp(pace.a + da, pace.b + db), RATE)
+    return _shaken(played, rng)
+
+
+def samples() -> Iterator[Sample]:
+    """All samples in order; the same at every call."""
+    rng = Generator(PCG64(SEED))
+    for performer, where in design():
+        yield Sample(performer, where, _trial(where, rng))

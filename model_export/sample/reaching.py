@@ -1,0 +1,102 @@
+"""The motion of a reach as a pure function of the controls and of phase.
+
+The trunk goes first: it decides where the right shoulder ends, and that decides how far away the
+target is. The arm's last pose then follows by inverse kinematics, and each joint goes there with
+its own onset. The legs follow the pelvis by inverse kinematics at every phase.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export.sample import arms, body, legs, trunk
+from model_export.sample.controls import Controls
+from model_export.sample.trunk import Effort
+from service.motion import quat, skeleton
+from service.motion.conventions import Floats
+from service.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses at given phases: rotations (P, J, 4), root path (P, 3), and whose they are."""
+
+    figure: Skeleton
+    rotations: Floats
+    root_path: Floats
+
+    def forward(self) -> tuple[Floats, Floats]:
+        """Joint positions (P, J, 3), m, and orientations (P, J, 4)."""
+        translations = np.repeat(self.figure.offsets[None], len(self.rotations), axis=0)
+        translations[:, 0] = self.root_path
+        return skeleton.forward(self.figure.parents, self.rotations, translations)
+
+    def turned(self, turns: dict[str, Floats]) -> "Motion":
+        """The same with the rotations (P, 4) of the named joints replaced."""
+        rotations = self.rotations.copy()
+        for name, turn in turns.items():
+            rotations[:, body.INDEX[name]] = turn
+        return Motion(self.figure, rotations, self.root_path)
+
+
+def _carriage(controls: Controls, goal: Effort, u: Floats) -> Motion:
+    """What carries the reaching arm, from the pelvis to the right shoulder blade."""
+    still = np.tile(quat.IDENTITY, (len(u), len(body.NAMES), 1))
+    path = trunk.root_path(controls, goal, u)
+    turns = trunk.rotations(controls, goal, u)
+    turns["RightShoulder"] = arms.blade(controls, goal, u)
+    return Motion(body.skeleton(controls.stature), still, path).turned(turns)
+
+
+def _shoulder(carriage: Motion) -> tuple[Floats, Floats]:
+    """Position (3,) of the right shoulder and orientation (4,) of its blade at the last phase."""
+    positions, turns = carriage.forward()
+    return positions[-1, body.INDEX["RightArm"]], turns[-1, body.INDEX["RightShoulder"]]
+
+
+def _in_front(controls: Controls, figure: Skeleton, shoulder: Floats) -> Floats:
+    """Target (3,) in the given direction from the origin at a comfortable distance.
+
+    Nearer as it lies above, below or beside the shoulder, so that the elbow never locks: the arm
+    is stretched to sqrt(0.68² + w² / 2) of its length, where w of its length are not ahead.
+    """
+    ahead = np.array([np.sin(controls.azimuth), 0.0, np.cos(controls.azimuth)])
+    length = arms.reach(figure)
+    above = controls.target_height - shoulder[1]
+    beside = shoulder[2] * ahead[0] - shoulder[0] * ahead[2]
+    distance = shoulder @ ahead + np.sqrt((0.68 * length) ** 2 - 0.5 * (above**2 + beside**2))
+    place: Floats = distance * ahead + np.array([0.0, controls.target_height, 0.0])
+    return place
+
+
+def target(controls: Controls) -> Floats:
+    """Where the target is (3,), m."""
+    end = _carriage(controls, trunk.effort(controls), np.ones(1))
+    return _in_front(controls, end.figure, _shoulder(end)[0])
+
+
+def motion(controls: Controls, u: Floats) -> Motion:
+    """Poses at phases u (P,) in [0, 1]; at 1 the middle of the right hand is at the target."""
+    goal = trunk.effort(controls)
+    shoulder, blade = _shoulder(_carriage(controls, goal, np.ones(1)))
+    aim = _in_front(controls, body.skeleton(controls.stature), shoulder)
+    to_target = quat.rotate(quat.conj(blade), aim - shoulder)
+    carriage = _carriage(controls, goal, u)
+    positions, turns = carriage.forward()
+    pelvis = positions[:, 0], turns[:, 0]
+    chest = quat.conj(turns[:, body.INDEX["Spine1"]])
+    to_look = quat.rotate(chest, aim - positions[:, body.INDEX["Neck"]])
+    return carriage.turned(
+        trunk.neck_rotations(to_look, u)
+        | legs.rotations(controls, carriage.figure, goal, pelvis, u)
+        | arms.right(controls, goal, carriage.figure, to_target, u)
+        | arms.left(controls, goal, u)
+        | arms.fingers(goal, u)
+    )
+
+
+def hand_travel(controls: Controls) -> float:
+    """Straight distance, m, from where the hand rests to the target."""
+    ends = motion(controls, np.array([0.0, 1.0]))
+    first, last = arms.palm(ends.forward()[0])
+    return float(np.linalg.norm(last - first))

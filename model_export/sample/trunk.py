@@ -1,0 +1,104 @@
+"""Pelvis, spine and neck of a reach: how far they go, and their rotations at each phase."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export.sample import body, timing
+from model_export.sample.controls import Controls
+from service.motion import quat
+from service.motion.conventions import Floats
+
+_SLOUCH = {"Hips": -0.12, "LowerBack": 0.08, "Spine": 0.06, "Spine1": 0.03}
+"""Pitch of a sitting trunk at rest, rad."""
+
+_YAW = {"LowerBack": 0.30, "Spine": 0.35, "Spine1": 0.35}
+_LEAN = {"LowerBack": 0.40, "Spine": 0.35, "Spine1": 0.25}
+_ROLL = {"LowerBack": 0.30, "Spine": 0.40, "Spine1": 0.30}
+"""Shares of the spine's joints in what the pelvis leaves over."""
+
+_GAZE = {"Neck": 0.25, "Neck1": 0.30, "Head": 0.45}
+"""Shares of the neck's joints in turning the head."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How far the trunk goes, rad and m: yaw left, lean forwards, roll right, drop and shift.
+
+    low: how far the target lies below the resting shoulder, as a fraction of stature.
+    """
+
+    low: float
+    yaw: float
+    lean: float
+    roll: float
+    drop: float
+    shift: float
+
+
+def _softplus(x: float, width: float) -> float:
+    """Smooth form of max(x, 0)."""
+    return width * float(np.logaddexp(0.0, x / width))
+
+
+def effort(controls: Controls) -> Effort:
+    """What the trunk must do to carry the shoulder near to the target."""
+    stature, upright = controls.stature, controls.uprightness
+    low = (controls.hip_height + 0.27 * stature - controls.target_height) / stature
+    lean = 0.06 + (3.9 - 1.9 * upright) * _softplus(low - 0.08, 0.08)
+    # A right-handed reach brings the right shoulder forwards, which is a turn to the left.
+    yaw = (0.68 + 0.08 * upright) * controls.azimuth + 0.17
+    # The pelvis turns least: what the lean misses of the target's direction is a bend sideways.
+    aside = lean * np.sin(controls.azimuth - 0.6 * yaw)
+    drop = stature * (0.004 + 0.48 * upright * _softplus(low - 0.18, 0.08))
+    forwards = stature * (0.01 + 0.035 * upright)
+    # The pelvis backs off under a leaning trunk: the balance stays over the feet.
+    backwards = stature * 0.09 * upright * lean
+    return Effort(
+        low=low,
+        yaw=yaw,
+        lean=lean,
+        roll=0.32 * low - 0.6 * float(aside),
+        drop=drop,
+        shift=forwards - backwards,
+    )
+
+
+def root_path(controls: Controls, goal: Effort, u: Floats) -> Floats:
+    """Root positions (P, 3), m: from over the origin towards the target, and down."""
+    heading = 0.5 * controls.azimuth
+    way = np.array([goal.shift * np.sin(heading), -goal.drop, goal.shift * np.cos(heading)])
+    start = np.array([0.0, controls.hip_height, 0.0])
+    path: Floats = start + timing.trunk(u)[:, None] * way
+    return path
+
+
+def rotations(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
+    """Rotations (P, 4) of pelvis and spine."""
+    pelvis = np.array(
+        [0.12 + 0.26 * controls.uprightness, 0.42 - 0.02 * controls.uprightness, 0.15]
+    )
+    total = np.array([goal.yaw, goal.lean, goal.roll])
+    shares = {
+        name: (1.0 - pelvis) * np.array([_YAW[name], _LEAN[name], _ROLL[name]])
+        for name in body.SPINE
+    }
+    progress = timing.trunk(u)[:, None]
+    sitting = np.array([0.0, 1.0 - controls.uprightness, 0.0])
+    return {
+        name: quat.from_euler(_SLOUCH[name] * sitting + progress * share * total, "YXZ")
+        for name, share in {"Hips": pelvis, **shares}.items()
+    }
+
+
+def neck_rotations(to_target: Floats, u: Floats) -> dict[str, Floats]:
+    """Rotations (P, 4) that bring the gaze to the target.
+
+    to_target (P, 3): from the neck's base to the target, in the chest's frame.
+    """
+    x, y, z = np.moveaxis(to_target, -1, 0)
+    yaw, pitch = np.arctan2(x, z), -np.arctan2(y, np.hypot(x, z))
+    progress = timing.gaze(u)
+    tilt = -0.12 * yaw
+    look = progress[:, None] * np.stack([yaw, pitch, tilt], axis=-1)
+    return {name: quat.from_euler(share * look, "YXZ") for name, share in _GAZE.items()}

@@ -1,0 +1,66 @@
+"""The noise-free answer at every control point, for measuring what a model gets wrong."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from model_export.sample import controls, reaching, timing
+from model_export.sample.controls import Controls
+from model_export.sample.timing import Warp
+from service.motion.clip import Clip, assemble
+from service.motion.conventions import Floats
+
+Point = Mapping[str, float] | Sequence[float]
+"""Controls by name, or four values in the order of controls.RANGES; turn in degrees."""
+
+
+def poses(point: Point, phases: Floats) -> tuple[Floats, Floats, Floats]:
+    """Rotations (P, J, 4), root path (P, 3) and bone offsets (J, 3) at unwarped phases (P,).
+
+    Phases run from 0 to 1, where the hand is at the target. Raises InvalidField for controls that
+    the body cannot follow; so does every function here.
+    """
+    motion = reaching.motion(controls.parse(point), phases)
+    return motion.rotations, motion.root_path, motion.figure.offsets
+
+
+def target(point: Point) -> Floats:
+    """Where the middle of the right hand, `arms.palm`, is at the end (3,), m."""
+    return reaching.target(controls.parse(point))
+
+
+def duration(point: Point) -> float:
+    """Seconds from rest to the target."""
+    return _duration(controls.parse(point))
+
+
+def phases(point: Point, elapsed: Floats) -> Floats:
+    """Phase at each elapsed fraction of the clip: strictly increasing from 0 to 1."""
+    return warp(controls.parse(point)).phase(elapsed)
+
+
+def clip(point: Point, rate: float) -> Clip:
+    """Clip at that many frames a second with its own duration and timing.
+
+    It ends on the target: the duration is rounded to whole frames.
+    """
+    where = controls.parse(point)
+    return play(where, _duration(where), warp(where), rate)
+
+
+def _duration(where: Controls) -> float:
+    return timing.fitts(reaching.hand_travel(where))
+
+
+def warp(where: Controls) -> Warp:
+    """Timing that the controls ask for: high targets start briskly, turned ones are put off."""
+    above = where.target_height - where.hip_height
+    return Warp(a=0.10 - 0.10 * where.uprightness, b=0.12 * above - 0.10 * where.azimuth**2)
+
+
+def play(where: Controls, seconds: float, pace: Warp, rate: float) -> Clip:
+    """Clip of that duration, to the nearest whole frame, in that timing."""
+    steps = max(1, round(seconds * rate))
+    motion = reaching.motion(where, pace.phase(np.arange(steps + 1) / steps))
+    figure = motion.figure
+    return assemble(figure, motion.rotations, motion.root_path, figure.offsets, rate)

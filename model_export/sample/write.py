@@ -1,0 +1,175 @@
+"""The family as files: motions in BVH, the table of their controls, and the recipe."""
+
+import csv
+import io
+import tempfile
+from collections.abc import Iterator
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+
+from model_export.sample import body
+from model_export.sample.controls import RANGES
+from model_export.sample.family import Sample, samples
+from service.motion import quat
+from service.motion.clip import Clip
+from service.motion.conventions import Floats
+from service.motion.errors import FileError
+from service.motion.skeleton import Skeleton
+
+_RECIPE = """\
+schema = 1
+name = "reaching"
+description = "Procedural reaching motions of three performers, standing and sitting"
+licence = "CC0-1.0"
+
+[source]
+metres_per_unit = 1.0
+up = "y"
+root_offset = "replace"
+
+[clips]
+table = "clips.csv"
+file = "file"
+performer = "performer"
+{controls}
+[motion]
+frames = 100
+cyclic = false
+root = "travelling"
+
+[size]
+rms_budget_cm = 0.5
+"""
+
+_CONTROL = """
+[[controls]]
+name = "{name}"
+column = "{name}"
+unit = "{unit}"
+description = "{description}"
+"""
+
+_BALL = "Zrotation Yrotation Xrotation"
+
+
+def _files() -> dict[str, bytes]:
+    """Every file of the family by its path under the family's directory."""
+    files: dict[str, bytes] = {}
+    rows: list[list[str]] = []
+    for number, sample in enumerate(samples(), start=1):
+        path = f"bvh/reach_{number:03}.bvh"
+        files[path] = bvh(sample.clip).encode()
+        rows.append(_row(path, sample))
+    return files | {"clips.csv": _table(rows).encode(), "recipe.toml": _recipe().encode()}
+
+
+def family(output: Path) -> Path:
+    """Write the family to a directory, whole or not at all, and return its recipe's path.
+
+    A directory that already holds just this family is left as it is; raises FileError for a file
+    in the way or a directory with anything else in it.
+    """
+    files = _files()
+    if output.exists() and not output.is_dir():
+        raise FileError(output, "found a file, expected a new or empty directory")
+    if output.is_dir() and any(output.iterdir()):
+        _expect_same(output, files)
+    else:
+        _place(output, files)
+    return output / "recipe.toml"
+
+
+def _place(output: Path, files: dict[str, bytes]) -> None:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}-") as scratch:
+        # A directory of our own making, for the scratch itself is closed to other users.
+        whole = Path(scratch) / "family"
+        for path, content in files.items():
+            (whole / path).parent.mkdir(parents=True, exist_ok=True)
+            (whole / path).write_bytes(content)
+        whole.rename(output)
+
+
+def _expect_same(output: Path, files: dict[str, bytes]) -> None:
+    found = {path.relative_to(output).as_posix() for path in output.rglob("*") if path.is_file()}
+    for path in sorted(found ^ files.keys()):
+        state = "is in the way" if path in found else "is missing"
+        raise FileError(output, f"not empty and not this family: {path} {state}")
+    for path, content in files.items():
+        if (output / path).read_bytes() != content:
+            raise FileError(output, f"not empty and not this family: {path} differs")
+
+
+def _recipe() -> str:
+    parts = [
+        _CONTROL.format(name=name, unit=unit, description=description)
+        for name, (_, _, unit, description) in RANGES.items()
+    ]
+    return _RECIPE.format(controls="".join(parts))
+
+
+def _row(path: str, sample: Sample) -> list[str]:
+    point = [f"{value:.4f}" for value in astuple(sample.controls)]
+    return [path, sample.performer, *point, str(len(sample.clip) - 1)]
+
+
+def _table(rows: list[list[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["file", "performer", *RANGES, "event_frame"])
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def bvh(clip: Clip) -> str:
+    """BVH text of a clip of the family, in metres: hinges have one channel, all others three.
+
+    The root's offset is zero, its channels hold its whole path.
+    """
+    head = "\n".join(["HIERARCHY", *_joint(clip.skeleton, 0), "MOTION"])
+    lines = (" ".join(f"{value:.6f}" for value in row) for row in _channels(clip).tolist())
+    rate = f"Frames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.12f}"
+    return "\n".join([head, rate, *lines]) + "\n"
+
+
+def _offset(indent: str, offset: Floats) -> str:
+    x, y, z = offset + 0.0
+    return f"{indent}OFFSET {x:.6f} {y:.6f} {z:.6f}"
+
+
+def _joint(figure: Skeleton, joint: int, depth: int = 0) -> Iterator[str]:
+    """Lines of a joint and all below it."""
+    outer, inner = "  " * depth, "  " * (depth + 1)
+    yield f"{outer}{'JOINT' if joint else 'ROOT'} {figure.names[joint]}"
+    yield f"{outer}{{"
+    yield _offset(inner, figure.offsets[joint] if joint else np.zeros(3))
+    yield f"{inner}CHANNELS {_channel_names(figure, joint)}"
+    for child, parent in enumerate(figure.parents):
+        if parent == joint:
+            yield from _joint(figure, child, depth + 1)
+    for holder, tip in zip(figure.tip_joints, figure.tip_offsets, strict=True):
+        if holder == joint:
+            yield from (f"{inner}End Site", f"{inner}{{", _offset(inner + "  ", tip), f"{inner}}}")
+    yield f"{outer}}}"
+
+
+def _channel_names(figure: Skeleton, joint: int) -> str:
+    if joint == 0:
+        return f"6 Xposition Yposition Zposition {_BALL}"
+    return "1 Xrotation" if figure.names[joint] in body.HINGES else f"3 {_BALL}"
+
+
+def _channels(clip: Clip) -> Floats:
+    """Values (F, 94) as they are printed: m and degrees, minus zero as zero."""
+    columns = [clip.root_path]
+    for joint, name in enumerate(clip.skeleton.names):
+        turn = clip.rotations[:, joint]
+        if name in body.HINGES:
+            angles = quat.twist(turn, np.array([1.0, 0.0, 0.0]))[:, None]
+        else:
+            angles = np.unwrap(quat.to_euler(turn, "ZYX"), axis=0)
+        columns.append(np.degrees(angles))
+    values: Floats = np.concatenate(columns, axis=1)
+    return values.round(6) + 0.0

@@ -1,0 +1,70 @@
+"""What many tests need: random numbers from one seed, and a small model really trained."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model_export import export, ingest, recipe, train
+from model_export.ingest import Example
+from model_export.recipe import Recipe
+from model_export.sample import write
+from model_export.train import Trained
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers from a fixed seed."""
+    return np.random.Generator(np.random.PCG64(0))
+
+
+@pytest.fixture(scope="session")
+def reaching_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The whole procedural family on disk; its recipe is recipe.toml."""
+    folder = tmp_path_factory.mktemp("reaching") / "family"
+    write.family(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_recipe(reaching_folder: Path) -> Recipe:
+    """A recipe of every clip of the family at few frames, which trains in a few seconds."""
+    whole = recipe.read(reaching_folder / "recipe.toml")
+    motion = whole.motion.model_copy(update={"frames": 40})
+    return whole.model_copy(update={"motion": motion})
+
+
+@pytest.fixture(scope="session")
+def examples(small_recipe: Recipe, reaching_folder: Path) -> list[Example]:
+    """The family's clips, every second one."""
+    return ingest.ingest(small_recipe, reaching_folder)[0][::2]
+
+
+@pytest.fixture(scope="session")
+def trained(small_recipe: Recipe, examples: list[Example]) -> Trained:
+    """A small model of the procedural family."""
+    return train.train(small_recipe, examples, lambda _: None)
+
+
+@pytest.fixture(scope="session")
+def model_path(
+    small_recipe: Recipe,
+    examples: list[Example],
+    trained: Trained,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
+    """The small model as a file, reaching.onnx."""
+    path = tmp_path_factory.mktemp("models") / "reaching.onnx"
+    path.write_bytes(export.export(small_recipe, examples, trained, []).content)
+    return path
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """Folder of the real motion capture: POSEFIELD_DATA, or shared/data beside the checkout."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("POSEFIELD_DATA", beside))
+    if not (folder / "hdm05_reach.zip").exists() and not (folder / "hdm05_reach").exists():
+        pytest.skip(f"no motion capture in {folder}: set POSEFIELD_DATA")
+    return folder
