@@ -3,17 +3,59 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 UV_VERSION := 0.13.8
+SAMPLE := build/sample/reaching
+MODEL := build/models/reaching.onnx
+ENV := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
 
 .PHONY: help
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/'
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 # The lock file decides every version; the stamp makes the install happen once.
-$(VENV)/.installed: pyproject.toml uv.lock
-	$(PYTHON) -m venv $(VENV)
+$(ENV): pyproject.toml uv.lock
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
 	UV_PROJECT_ENVIRONMENT=$(VENV) $(BIN)/uv sync --frozen --inexact --all-extras --quiet
 	@touch $@
 
 .PHONY: install
-install: $(VENV)/.installed ## install into .venv what the lock file names
+install: $(ENV) ## install into .venv what the lock file names
+
+$(SAMPLE)/recipe.toml: | $(ENV)
+	$(BIN)/posefield sample reaching --output $(SAMPLE)
+
+$(MODEL): $(SAMPLE)/recipe.toml | $(ENV)
+	$(BIN)/posefield train $(SAMPLE)/recipe.toml --output $(MODEL)
+
+.PHONY: demo
+demo: $(MODEL) ## sample, train, serve, ask over HTTP: clips in build/demo
+	$(BIN)/python clients/demo.py $(MODEL) build/demo
+
+.PHONY: run
+run: $(MODEL) ## the same, but the service stays up on port 8000
+	$(BIN)/posefield serve build/models
+
+.PHONY: test
+test: $(ENV) ## lint, types, layers and all tests (no Blender, no browser)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest
+
+.PHONY: interop
+interop: $(ENV) ## read our USD back through Blender and three.js, in environments of their own
+	$(BIN)/python tests/interop/run.py
+
+.PHONY: bench
+bench: $(ENV) ## print the benchmark table and write build/bench.json
+	$(BIN)/python benchmarks/bench.py
+
+.PHONY: lock
+lock: $(ENV) ## choose versions anew
+	$(BIN)/uv lock --upgrade
+
+.PHONY: clean
+clean: ## remove what was built, environments too
+	rm -rf build dist .venv .venv-blender .pytest_cache .mypy_cache .ruff_cache .hypothesis
