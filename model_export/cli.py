@@ -2,17 +2,18 @@
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import orjson
 import typer
 
-from model_export import export, ingest, recipe, train
-from model_export.export import Exported
 from service.cli import Controls, Json, encoder, numbers, wrote
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField
+
+if TYPE_CHECKING:
+    from model_export.export import Exported
 
 
 def commands(app: typer.Typer) -> None:
@@ -58,6 +59,9 @@ def train_command(
     json: Json = False,
 ) -> None:
     """Train a recipe's model and write it as one .onnx file."""
+    # SciPy and onnx take a second to import, which every other command would wait for.
+    from model_export import export, ingest, recipe, train
+
     if output.suffix != ".onnx":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
     started = time.perf_counter()
@@ -80,7 +84,7 @@ def _dump(value: Any) -> str:
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
 
 
-def _facts(exported: Exported, output: Path) -> dict[str, Any]:
+def _facts(exported: "Exported", output: Path) -> dict[str, Any]:
     card = exported.card
     return {
         "file": str(output),
@@ -91,7 +95,7 @@ def _facts(exported: Exported, output: Path) -> dict[str, Any]:
     }
 
 
-def _summary(exported: Exported, output: Path) -> str:
+def _summary(exported: "Exported", output: Path) -> str:
     facts = _facts(exported, output)
     notes = [f"note: {note}" for note in facts["notes"]]
     return "\n".join(

@@ -7,6 +7,7 @@ Exit codes: 0 done; 1 `check` found defects; 2 a question or an argument that ca
 import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +15,7 @@ import orjson
 import typer
 
 from service import __version__
-from service.encode import ENCODERS
+from service.encode import ENCODERS, poses
 from service.motion import card as cards
 from service.motion import files
 from service.motion.answer import ClipAnswer
@@ -36,7 +37,7 @@ Controls = Annotated[
     typer.Option("--control", "-c", help="NAME=VALUE, once for each control", metavar="NAME=VALUE"),
 ]
 Extrapolate = Annotated[
-    str, typer.Option(help="warn or refuse: controls outside what was sampled", metavar="POLICY")
+    Policy, typer.Option(help="what to do with controls outside what was sampled")
 ]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
@@ -44,9 +45,14 @@ Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard o
 def main() -> None:
     """Run the command line; faults that have a name end as one line and an exit code."""
     for plugin in entry_points(group="posefield.commands"):
-        plugin.load()(app)
+        # The image holds the service alone.
+        if find_spec(plugin.module.partition(".")[0]):
+            plugin.load()(app)
     try:
         app()
+    except ModuleNotFoundError as fault:
+        typer.echo(f"posefield: needs {fault.name}: install posefield[train]", err=True)
+        sys.exit(2)
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)
         sys.exit(_code(fault))
@@ -83,16 +89,9 @@ def pose(
     extrapolate: Extrapolate = "warn",
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
-    answer = open_model(model).pose(numbers(control or []), time or [0.0], policy(extrapolate))
+    answer = open_model(model).pose(numbers(control or []), time or [0.0], extrapolate)
     _warn(answer.trust.warnings)
-    values = {
-        "times": answer.times.tolist(),
-        "rotations": answer.rotations.tolist(),
-        "root_position": answer.root_position.tolist(),
-        "bone_offsets": answer.bone_offsets.tolist(),
-        **answer.trust.facts(),
-    }
-    typer.echo(_json(values))
+    typer.echo(poses.json(answer).decode())
 
 
 @app.command()
@@ -109,7 +108,7 @@ def clip(
     """Write a clip as usda, usdc, usdz, json or bvh."""
     encode = encoder(output)
     synthesizer = open_model(model)
-    answer = synthesizer.clip(numbers(control or []), fps, policy(extrapolate), start, end)
+    answer = synthesizer.clip(numbers(control or []), fps, extrapolate, start, end)
     files.write(encode(answer), output)
     _warn(answer.trust.warnings)
     typer.echo(wrote(output, answer, json))
@@ -163,13 +162,6 @@ def numbers(pairs: Sequence[str]) -> dict[str, float]:
         except ValueError as fault:
             raise InvalidField(f"controls/{name}", f"{value!r}, expected a number") from fault
     return controls
-
-
-def policy(word: str) -> Policy:
-    """What to do outside what was sampled."""
-    if word == "warn" or word == "refuse":
-        return word
-    raise InvalidField("extrapolate", f"{word!r}, expected warn or refuse")
 
 
 def encoder(path: Path) -> Any:

@@ -1,0 +1,30 @@
+# The service alone: nothing of the training job, nothing that builds.
+FROM python:3.11-slim-bookworm AS build
+ENV UV_COMPILE_BYTECODE=1 \
+    UV_LINK_MODE=copy \
+    UV_PROJECT_ENVIRONMENT=/opt/posefield \
+    UV_PYTHON_DOWNLOADS=never
+RUN pip install --no-cache-dir uv==0.13.8
+WORKDIR /src
+# Dependencies change seldom, the service often: they get a layer of their own.
+COPY pyproject.toml uv.lock README.md LICENSE ./
+RUN uv sync --frozen --no-dev --no-install-project
+# service/web/openapi.yaml is a link into api/.
+COPY api api
+COPY service service
+RUN uv sync --frozen --no-dev --no-editable
+
+FROM python:3.11-slim-bookworm
+# Bytecode is compiled above; the root may be read-only. onnxruntime reports to its vendor unless told not to.
+ENV PATH=/opt/posefield/bin:$PATH \
+    PYTHONDONTWRITEBYTECODE=1 \
+    PYTHONUNBUFFERED=1 \
+    ORT_DISABLE_TELEMETRY=1 \
+    POSEFIELD_HOST=0.0.0.0 \
+    POSEFIELD_PORT=8000
+COPY --from=build /opt/posefield /opt/posefield
+USER 10001:10001
+EXPOSE 8000
+HEALTHCHECK --interval=10s --timeout=3s --start-period=20s CMD ["python", "-c", "import os, urllib.request; urllib.request.urlopen('http://127.0.0.1:' + os.environ['POSEFIELD_PORT'] + '/readyz', timeout=2)"]
+ENTRYPOINT ["posefield", "serve"]
+CMD ["/models"]

@@ -1,0 +1,41 @@
+"""Joint names that every reader of USD accepts.
+
+A colon, hyphen, space or leading digit makes some readers drop the whole skeleton without a word,
+and readers that know joints by their leaf name alone merge joints that share one.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from itertools import count
+
+LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def legal(names: Iterable[str]) -> tuple[str, ...]:
+    """Unique legal names in the given order; a name that is already legal stays as it is.
+
+    Of several names that become the same, the later ones get the endings _2, _3, and so on.
+    """
+    given = list(names)
+    taken = {name for name in given if LEGAL.fullmatch(name)}
+    return tuple(name if name in taken else _unique(_clean(name), taken) for name in given)
+
+
+def paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
+    """Joint tokens of UsdSkel: each name behind those of its ancestors, divided by slashes."""
+    found: list[str] = []
+    for leaf, parent in zip(leaves, parents, strict=True):
+        found.append(leaf if parent < 0 else f"{found[parent]}/{leaf}")
+    return tuple(found)
+
+
+def _clean(name: str) -> str:
+    cleaned = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return cleaned if LEGAL.fullmatch(cleaned) else f"_{cleaned}"
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    candidates = (name if n == 1 else f"{name}_{n}" for n in count(1))
+    found = next(candidate for candidate in candidates if candidate not in taken)
+    taken.add(found)
+    return found

@@ -1,0 +1,160 @@
+"""A clip to the bytes of a BVH file that every reader understands alike."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion import quat
+from service.motion.bvh.grammar import WORD
+from service.motion.clip import Clip
+from service.motion.conventions import Floats
+from service.motion.skeleton import Skeleton
+
+AXES = "ZYX"
+ROTATIONS = "Zrotation Yrotation Xrotation"
+POSITIONS = "Xposition Yposition Zposition"
+STILL = 1e-9
+"""A translation that varies by no more, in metres, is the bone's offset and gets no channels."""
+
+FINEST = 1e-7
+"""Step of written lengths in metres, so that a chain of joints still returns within 1e-6."""
+
+
+def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
+    """The clip as a BVH file, in degrees and the given unit, with joints depth first.
+
+    The root's OFFSET is zero, since readers differ on whether its channels replace or follow it. A
+    joint whose translation varies has six channels and the mean translation as OFFSET; another has
+    three. A leaf without an end site gets one of no length, which other readers demand. The file's
+    rate is read back whole where it lies within 1e-4 of a whole or broadcast rate.
+    Raises ValueError for a name that the grammar cannot hold and for numbers that are not finite.
+    """
+    refuse_unwritable(clip, metres_per_unit)
+    sheet = Sheet(clip, metres_per_unit)
+    header = f"MOTION\nFrames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.10g}\n"
+    return ("HIERARCHY\n" + sheet.hierarchy() + header + sheet.rows()).encode()
+
+
+def refuse_unwritable(clip: Clip, metres_per_unit: float) -> None:
+    """Raise ValueError for a clip that would not be read back as it is."""
+    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
+        raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
+    for name in clip.skeleton.names:
+        if not name or name != " ".join(WORD.findall(name)):
+            raise ValueError(
+                f"joint name {name!r}, expected words parted by single blanks, without braces"
+            )
+    if not all(np.all(np.isfinite(values)) for values in (clip.rotations, clip.translations)):
+        raise ValueError("rotations or translations that are not finite, expected numbers")
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What of a clip goes where in its file."""
+
+    clip: Clip
+    metres_per_unit: float
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The clip's skeleton."""
+        return self.clip.skeleton
+
+    def moving(self, joint: int) -> bool:
+        """Whether the joint has position channels."""
+        return joint == 0 or bool(np.ptp(self.clip.translations[:, joint], axis=0).max() > STILL)
+
+    def hierarchy(self) -> str:
+        """The lines of the joints, from the root to its last closing brace."""
+        lines: list[str] = []
+        levels: list[int] = []
+        for joint, level in depth_first(self.skeleton):
+            while levels and levels[-1] >= level:
+                lines.append("\t" * levels.pop() + "}")
+            lines += ["\t" * level + line for line in self.joint(joint)]
+            levels.append(level)
+        lines += ["\t" * level + "}" for level in reversed(levels)]
+        return "\n".join(lines) + "\n"
+
+    def joint(self, joint: int) -> list[str]:
+        """The lines of one joint and its end sites, without its children and closing brace."""
+        offset = self.clip.translations[:, joint].mean(axis=0) if joint else np.zeros(3)
+        channels = f"6 {POSITIONS} {ROTATIONS}" if self.moving(joint) else f"3 {ROTATIONS}"
+        lines = [
+            f"{'JOINT' if joint else 'ROOT'} {self.skeleton.names[joint]}",
+            "{",
+            f"\tOFFSET {self.numbers(offset)}",
+            f"\tCHANNELS {channels}",
+        ]
+        for tip in self.tips(joint):
+            lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {self.numbers(tip)}", "\t}"]
+        return lines
+
+    def tips(self, joint: int) -> list[Floats]:
+        """Offsets of the joint's end sites, one of no length where nothing else hangs on it."""
+        sites = zip(self.skeleton.tip_joints, self.skeleton.tip_offsets, strict=True)
+        tips = [offset for owner, offset in sites if owner == joint]
+        return tips if tips or joint in self.skeleton.parents else [np.zeros(3)]
+
+    def numbers(self, metres: Floats) -> str:
+        """Three lengths as text."""
+        return template(3, self.decimals) % tuple(
+            rounded(metres / self.metres_per_unit, self.decimals)
+        )
+
+    @property
+    def decimals(self) -> int:
+        """Digits behind the point of every number: six, or more for a unit above a decimetre."""
+        return max(6, int(np.ceil(np.log10(self.metres_per_unit / FINEST))))
+
+    def rows(self) -> str:
+        """A line of numbers a frame."""
+        angles = np.rad2deg(continuous(quat.to_euler(self.clip.rotations, AXES)))
+        lengths = self.clip.translations / self.metres_per_unit
+        blocks = []
+        for joint, _ in depth_first(self.skeleton):
+            blocks += [lengths[:, joint]] if self.moving(joint) else []
+            blocks.append(angles[:, joint])
+        values = rounded(np.concatenate(blocks, axis=1), self.decimals)
+        row = template(values.shape[1], self.decimals) + "\n"
+        return (row * len(values)) % tuple(values.ravel().tolist())
+
+
+def template(count: int, decimals: int) -> str:
+    """A format of `count` numbers."""
+    return " ".join([f"%.{decimals}f"] * count)
+
+
+def rounded(values: Floats, decimals: int) -> Floats:
+    """Values as they will be written, without a negative zero."""
+    return np.round(values, decimals) + 0.0
+
+
+def depth_first(skeleton: Skeleton) -> list[tuple[int, int]]:
+    """Every joint and its level, each followed by all that hangs on it."""
+    children: list[list[int]] = [[] for _ in skeleton.names]
+    for joint in range(len(skeleton) - 1, 0, -1):
+        children[skeleton.parents[joint]].append(joint)
+    order, ahead = [], [(0, 0)]
+    while ahead:
+        joint, level = ahead.pop()
+        order.append((joint, level))
+        ahead += [(child, level + 1) for child in children[joint]]
+    return order
+
+
+def continuous(angles: Floats) -> Floats:
+    """The same turns about ZYX (frames, ..., 3) with each frame as near the one before as can be.
+
+    Besides whole turns there is a second triple for each rotation: the outer angles half a turn
+    on, the middle one mirrored.
+    """
+    mirrored = np.array([1.0, -1.0, 1.0]) * angles + np.pi
+    near = angles.copy()
+    for frame in range(1, len(angles)):
+        before = near[frame - 1]
+        both = np.stack([angles[frame], mirrored[frame]])
+        both += 2.0 * np.pi * np.round((before - both) / (2.0 * np.pi))
+        distance = np.sum((both - before) ** 2, axis=-1, keepdims=True)
+        near[frame] = np.where(distance[0] <= distance[1], both[0], both[1])
+    return near

@@ -1,0 +1,49 @@
+"""Answers as they travel: JSON documents, and the headers that say how far a clip is trusted."""
+
+import json
+from typing import Any
+
+import orjson
+from starlette.responses import Response
+
+from service.encode import Encoder
+from service.motion import card as cards
+from service.motion.answer import Trust
+from service.synthesis.library import Library
+from service.synthesis.synthesizer import Synthesizer
+
+
+def document(content: Any) -> Response:
+    """JSON answer of plain values."""
+    return Response(orjson.dumps(content), media_type="application/json")
+
+
+def models(library: Library) -> dict[str, Any]:
+    """Schema ModelList of the contract."""
+    return {"models": [_summary(model) for model in library.models.values()]}
+
+
+def _summary(model: Synthesizer) -> dict[str, str]:
+    description = model.session.card.description
+    return {"name": model.name, "identity": model.identity, "description": description}
+
+
+def card(model: Synthesizer) -> dict[str, Any]:
+    """Schema ModelCard of the contract."""
+    return {"identity": model.identity, **cards.plain_values(model.session.card)}
+
+
+def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
+    """A clip as a file to save; what its format cannot carry travels in headers."""
+    name = trust.model.partition("@")[0]
+    headers = {
+        "Content-Disposition": f'attachment; filename="{name}.{encoder.extension}"',
+        "Posefield-Model": trust.model,
+        "Posefield-Sigma": repr(trust.sigma),
+        "Posefield-Duration": repr(trust.duration),
+    }
+    response = Response(content, headers=headers, media_type=encoder.media_type)
+    for warning in trust.warnings:
+        # A JSON string is plain ASCII and can hold the commas that join header lines.
+        response.headers.append("Posefield-Warning", json.dumps(warning))
+    return response

@@ -1,0 +1,71 @@
+"""The contract: api/openapi.yaml as the service reads it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+MEDIA_TYPE = "application/yaml"
+METHODS = ("get", "put", "post", "delete", "options", "head", "patch", "trace")
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One operation of the contract.
+
+    query: names of its query parameters. open_query: whether the query may hold other names too,
+    because an exploded object (the controls of a model) stands among the parameters.
+    """
+
+    id: str
+    method: str
+    path: str
+    query: frozenset[str]
+    open_query: bool
+
+
+@dataclass(frozen=True)
+class Contract:
+    """The contract's bytes, to be served as they are, and its operations."""
+
+    source: bytes
+    operations: tuple[Operation, ...]
+
+
+def load() -> Contract:
+    """Contract that lies beside this module."""
+    source = Path(__file__).with_name("openapi.yaml").read_bytes()
+    return parse(source)
+
+
+def parse(source: bytes) -> Contract:
+    """Contract of a document's bytes."""
+    document = yaml.load(source, yaml.CSafeLoader)
+    return Contract(source, tuple(_operations(document)))
+
+
+def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
+    for path, item in document["paths"].items():
+        for method in (m for m in METHODS if m in item):
+            given = [*item.get("parameters", []), *item[method].get("parameters", [])]
+            query = [p for p in (_resolve(document, g) for g in given) if p["in"] == "query"]
+            exploded = [p["name"] for p in query if p["schema"].get("type") == "object"]
+            yield Operation(
+                id=item[method]["operationId"],
+                method=method.upper(),
+                path=path,
+                query=frozenset(p["name"] for p in query) - set(exploded),
+                open_query=bool(exploded),
+            )
+
+
+def _resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The node itself, or what its local $ref points to."""
+    found: Any = node
+    while "$ref" in found:
+        target, found = found["$ref"], document
+        for part in target.removeprefix("#/").split("/"):
+            found = found[part]
+    return found  # type: ignore[no-any-return]

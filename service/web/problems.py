@@ -1,0 +1,126 @@
+"""Errors as clients see them: class -> status and problem type, RFC 9457.
+
+The only module that knows both the errors of the domain and the statuses of HTTP.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import orjson
+from starlette.requests import Request
+from starlette.responses import Response
+
+from service.motion.errors import (
+    InvalidField,
+    OutsideSamples,
+    QueryError,
+    UnknownFormat,
+    UnknownModel,
+)
+
+MEDIA_TYPE = "application/problem+json"
+TYPE_PREFIX = "urn:posefield:problem:"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problem: its status, the last part of its type and its title."""
+
+    status: int
+    name: str
+    title: str
+
+
+BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
+BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
+NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
+METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
+BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
+NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
+INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
+
+OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)
+
+TABLE: dict[type[QueryError], Kind] = {
+    UnknownModel: Kind(404, "unknown-model", "No model of that name"),
+    UnknownFormat: Kind(404, "unknown-format", "No format of that name"),
+    InvalidField: Kind(422, "invalid-field", "A field is missing, unknown or out of range"),
+    OutsideSamples: Kind(422, "outside-samples", "The controls lie outside what was sampled"),
+}
+
+_IN_THE_PATH = ("model", "format")
+
+
+class RequestFault(Exception):
+    """A request that breaks the contract before any model is asked.
+
+    places: where the fault lies, as {"pointer": ...} or {"parameter": ...}.
+    """
+
+    def __init__(
+        self,
+        kind: Kind,
+        detail: str,
+        place: Mapping[str, str] | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.kind = kind
+        self.detail = detail
+        self.place = place
+        self.headers = headers
+
+
+async def of_fault(request: Request, fault: Exception) -> Response:
+    """Answer to a request that breaks the contract."""
+    assert isinstance(fault, RequestFault)
+    errors = [{**fault.place, "detail": fault.detail}] if fault.place else []
+    return _answer(request, fault.kind, fault.detail, errors, fault.headers)
+
+
+async def of_query_error(request: Request, error: Exception) -> Response:
+    """Answer to a question that has none."""
+    assert isinstance(error, QueryError)
+    place = _place(error.field, in_body=request.method == "POST")
+    errors = [{**place, "detail": error.message}]
+    return _answer(request, TABLE[type(error)], str(error), errors)
+
+
+def internal(request: Request) -> Response:
+    """Answer to a failure of the service: nothing of the failure but the request's id."""
+    return _answer(request, INTERNAL, "see the service's log under the id in `instance`", [])
+
+
+def _place(field: str, in_body: bool) -> dict[str, str]:
+    """Where a field of a question stands in the request that asked it."""
+    head, _, rest = field.partition("/")
+    if field in _IN_THE_PATH:
+        return {"parameter": field}
+    if in_body:
+        return {"pointer": pointer(head, rest) if rest else pointer(head)}
+    if head == "times":
+        return {"parameter": "time"}
+    return {"parameter": rest or head}
+
+
+def pointer(*parts: str) -> str:
+    """JSON pointer, RFC 6901."""
+    return "".join("/" + part.replace("~", "~0").replace("/", "~1") for part in parts)
+
+
+def _answer(
+    request: Request,
+    kind: Kind,
+    detail: str,
+    errors: list[dict[str, str]],
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    document = {
+        "type": TYPE_PREFIX + kind.name,
+        "title": kind.title,
+        "status": kind.status,
+        "detail": detail,
+        "instance": request.state.request_id,
+        "errors": errors,
+    }
+    return Response(orjson.dumps(document), kind.status, headers, MEDIA_TYPE)

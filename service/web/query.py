@@ -1,0 +1,171 @@
+"""Questions as they travel: query parameters and JSON bodies, decoded into one shape.
+
+What breaks the contract's form is refused here with 400; what a model cannot answer is left to
+the model, which knows the ranges, and refused with 422.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar, cast, get_args
+
+import msgspec
+
+from service.synthesis.synthesizer import Policy
+from service.web.problems import BAD_BODY, BAD_PARAMETER, RequestFault, pointer
+
+FPS = 30.0
+POLICY: Policy = "warn"
+# What JSON calls a number, so that a query reads like a body: no nan, inf, 1_000 or blanks.
+NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
+
+Pairs = Sequence[tuple[str, str]]
+"""Names and values of a query string in their order."""
+
+
+@dataclass(frozen=True)
+class PoseQuestion:
+    """Which poses: control values and times, s."""
+
+    controls: dict[str, float]
+    times: list[float]
+    extrapolate: Policy
+
+
+@dataclass(frozen=True)
+class ClipQuestion:
+    """Which clip: control values, frames a second, and the part between start and end, s."""
+
+    controls: dict[str, float]
+    fps: float
+    start: float
+    end: float | None
+    extrapolate: Policy
+
+
+class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Schema PoseQuestion of the contract."""
+
+    controls: dict[str, msgspec.Raw]
+    times: list[float]
+    extrapolate: Policy = POLICY
+
+
+class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Schema ClipQuestion of the contract."""
+
+    controls: dict[str, msgspec.Raw]
+    fps: float = FPS
+    start: float = 0.0
+    end: float | None = None
+    extrapolate: Policy = POLICY
+
+
+Body = TypeVar("Body", PoseBody, ClipBody)
+
+_POSE = msgspec.json.Decoder(PoseBody)
+_CLIP = msgspec.json.Decoder(ClipBody)
+_FLOAT = msgspec.json.Decoder(float)
+
+
+def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
+    """Question of query parameters: `time` once or more, `extrapolate`, and one per control."""
+    times = [_number(name, text) for name, text in pairs if name == "time"]
+    if not times:
+        raise _bad_parameter("time", "missing; give seconds from the start of the clip")
+    single = _unique([pair for pair in pairs if pair[0] != "time"])
+    policy = _policy(single.pop("extrapolate", POLICY))
+    return PoseQuestion(_numbers(single), times, policy)
+
+
+def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
+    """Question of query parameters: fps, start, end, extrapolate, and one per control."""
+    single = _unique(pairs)
+    policy = _policy(single.pop("extrapolate", POLICY))
+    numbers = _numbers(single)
+    return ClipQuestion(
+        fps=numbers.pop("fps", FPS),
+        start=numbers.pop("start", 0.0),
+        end=numbers.pop("end", None),
+        controls=numbers,
+        extrapolate=policy,
+    )
+
+
+def pose_of_body(content: bytes) -> PoseQuestion:
+    """Question of a JSON body."""
+    body = _decoded(_POSE, content)
+    return PoseQuestion(_controls(body.controls), body.times, body.extrapolate)
+
+
+def clip_of_body(content: bytes) -> ClipQuestion:
+    """Question of a JSON body."""
+    body = _decoded(_CLIP, content)
+    controls = _controls(body.controls)
+    return ClipQuestion(controls, body.fps, body.start, body.end, body.extrapolate)
+
+
+def _unique(pairs: Pairs) -> dict[str, str]:
+    single: dict[str, str] = {}
+    for name, text in pairs:
+        if name in single:
+            raise _bad_parameter(name, "given twice, expected once")
+        single[name] = text
+    return single
+
+
+def _policy(text: str) -> Policy:
+    if text not in get_args(Policy):
+        raise _bad_parameter("extrapolate", f"{text!r}, expected one of {get_args(Policy)}")
+    return cast(Policy, text)
+
+
+def _numbers(texts: dict[str, str]) -> dict[str, float]:
+    return {name: _number(name, text) for name, text in texts.items()}
+
+
+def _number(name: str, text: str) -> float:
+    value = float(text) if NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        raise _bad_parameter(name, f"{text!r}, expected a finite number")
+    return value
+
+
+def _bad_parameter(name: str, detail: str) -> RequestFault:
+    return RequestFault(BAD_PARAMETER, f"{name}: {detail}", {"parameter": name})
+
+
+def _decoded(decoder: msgspec.json.Decoder[Body], content: bytes) -> Body:
+    try:
+        return decoder.decode(content)
+    except msgspec.ValidationError as fault:
+        raise _bad_body(str(fault), _pointer(str(fault))) from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+        raise _bad_body(f"expected UTF-8 JSON; {fault}", "") from None
+    except RecursionError:
+        raise _bad_body("nested too deeply", "") from None
+
+
+def _controls(raw: dict[str, msgspec.Raw]) -> dict[str, float]:
+    """Values of the controls; decoded one by one because msgspec does not name a key at fault."""
+    values = {}
+    for name, text in raw.items():
+        try:
+            values[name] = _FLOAT.decode(text)
+        except msgspec.ValidationError as fault:
+            where = pointer("controls", name)
+            raise _bad_body(f"{fault} - at `{where}`, expected a finite number", where) from None
+    return values
+
+
+def _pointer(message: str) -> str:
+    """JSON pointer to what a message of msgspec complains of; "" is the whole body."""
+    field = re.search(r"field `(.*)`", message)
+    path = re.search(r"at `\$(.*)`", message)
+    steps = re.findall(r"[^.\[\]]+", path[1]) if path else []
+    return pointer(*steps, *([field[1]] if field else []))
+
+
+def _bad_body(detail: str, where: str) -> RequestFault:
+    return RequestFault(BAD_BODY, detail, {"pointer": where})

@@ -1,0 +1,53 @@
+"""The service under test: one small model named `reach`, and ways to ask it."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from asking import Ask, asker
+from starlette.applications import Starlette
+
+from service.synthesis import library
+from service.synthesis.library import Library
+from service.web.app import create_app
+from service.web.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def models(model_path, tmp_path_factory) -> Path:
+    """Folder with the model under the name that the examples use."""
+    folder = tmp_path_factory.mktemp("models")
+    shutil.copy(model_path, folder / "reach.onnx")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def loaded(models) -> Library:
+    return library.load([models])
+
+
+@pytest.fixture(scope="session")
+def app(loaded) -> Starlette:
+    return create_app(loaded, Settings())
+
+
+@pytest.fixture(scope="session")
+def ask(app) -> Ask:
+    """Ask the app in this process, as an HTTP client would."""
+    return asker(app)
+
+
+@pytest.fixture(scope="session")
+def controls(loaded) -> dict[str, float]:
+    """Controls in the middle of what was sampled."""
+    card = loaded.find("reach").session.card
+    return {control.name: control.default for control in card.controls}
+
+
+@pytest.fixture(scope="session")
+def spec() -> dict[str, Any]:
+    return yaml.safe_load((ROOT / "api/openapi.yaml").read_bytes())

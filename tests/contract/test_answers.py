@@ -1,0 +1,113 @@
+"""What surrounds an answer: trust, warnings, request ids, and a failure that tells nothing."""
+
+import json
+import logging
+from urllib.parse import urlencode
+
+import pytest
+from asking import asker
+from pxr import Usd
+
+from service.motion import card as cards
+from service.synthesis.library import Library
+from service.web import contract
+from service.web.app import build
+from service.web.operations import OPERATIONS
+from service.web.settings import Settings
+
+CLIP = "/v1/models/reach/clip"
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh")
+
+
+def url(path, controls, **more):
+    return f"{path}?{urlencode({**controls, **more}, doseq=True)}"
+
+
+def test_the_card_is_the_whole_card(ask, loaded):
+    model = loaded.find("reach")
+    card = json.loads(json.dumps(cards.plain_values(model.session.card)))
+    assert ask("GET", "/v1/models/reach").json() == {"identity": model.identity, **card}
+
+
+@pytest.mark.parametrize("extension", FORMATS)
+def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded):
+    model = loaded.find("reach")
+    trust = model.pose(controls, [0.0], "warn").trust
+    answer = ask("GET", url(f"{CLIP}.{extension}", controls))
+    assert answer.headers["posefield-model"] == model.identity
+    assert float(answer.headers["posefield-sigma"]) == trust.sigma
+    assert float(answer.headers["posefield-duration"]) == trust.duration
+    assert "posefield-warning" not in answer.headers
+    assert answer.headers["content-disposition"] == f'attachment; filename="reach.{extension}"'
+
+
+def test_each_control_outside_the_samples_gives_a_warning(ask, controls, loaded):
+    card = loaded.find("reach").session.card
+    outside = {**controls, **{c.name: c.maximum * 1.1 for c in card.controls[:2]}}
+    answer = ask("GET", url(f"{CLIP}.usda", outside))
+    lines = answer.headers.get_list("posefield-warning")
+    assert [json.loads(line).split()[0] for line in lines] == [c.name for c in card.controls[:2]]
+    # Proxies may join the lines: the joined line must come apart again.
+    assert len(json.loads(f"[{', '.join(lines)}]")) == 2
+    pose = ask("GET", url("/v1/models/reach/pose", outside, time=0)).json()
+    assert pose["trust"]["warnings"] == [json.loads(line) for line in lines]
+
+
+def test_the_duration_itself_is_a_time_of_the_clip(ask, controls):
+    pose = url("/v1/models/reach/pose", controls)
+    last = ask("GET", f"{pose}&time=0").json()["trust"]["duration"]
+    assert ask("GET", f"{pose}&time={last!r}").status_code == 200
+
+
+def test_a_long_clip_is_written_as_a_short_one_is(ask, controls):
+    long = ask("GET", url(f"{CLIP}.json", controls, fps=1000)).json()
+    short = ask("GET", url(f"{CLIP}.json", controls, fps=100, end=1)).json()
+    assert long["frames"] > 1000
+    assert long["rotations"][0:1001:10] == short["rotations"]
+
+
+@pytest.mark.parametrize("given", ["abc-1.2_X", "a" * 64])
+def test_a_request_keeps_its_id(given, ask):
+    answer = ask("GET", "/nowhere", headers={"x-request-id": given})
+    assert answer.headers["x-request-id"] == given
+    assert answer.json()["instance"] == given
+
+
+@pytest.mark.parametrize("given", ["", "a" * 65, "a b", "<script>", "a\tb"])
+def test_an_id_that_is_none_is_replaced(given, ask):
+    answer = ask("GET", "/livez", headers={"x-request-id": given})
+    assert len(answer.headers["x-request-id"]) == 32
+
+
+def test_a_failure_shows_its_id_and_nothing_else(caplog):
+    async def fails(service, request):
+        raise RuntimeError("secret /etc/path")
+
+    app = build(contract.load(), {**OPERATIONS, "getLiveness": fails}, Library({}), Settings())
+    with caplog.at_level(logging.ERROR):
+        answer = asker(app)("GET", "/livez", headers={"x-request-id": "id-1"})
+    problem = answer.json()
+    assert answer.status_code == problem["status"] == 500
+    assert problem["type"] == "urn:posefield:problem:internal-error"
+    assert problem["instance"] == answer.headers["x-request-id"] == "id-1"
+    assert "secret" not in answer.text and "RuntimeError" not in answer.text
+    assert "id-1" in caplog.text and "secret" in caplog.text
+
+
+def test_head_is_answered_without_a_body(ask, controls):
+    answer = ask("HEAD", url(f"{CLIP}.bvh", controls))
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "application/x-bvh"
+
+
+def test_the_same_question_gives_the_same_bytes(ask, controls):
+    for extension in FORMATS:
+        asked = url(f"{CLIP}.{extension}", controls)
+        assert ask("GET", asked).content == ask("GET", asked).content
+
+
+def test_usd_over_http_opens(ask, controls, tmp_path):
+    for extension in ("usda", "usdc", "usdz"):
+        file = tmp_path / f"clip.{extension}"
+        file.write_bytes(ask("GET", url(f"{CLIP}.{extension}", controls)).content)
+        assert Usd.Stage.Open(str(file)).GetDefaultPrim()

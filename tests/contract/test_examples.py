@@ -1,0 +1,76 @@
+"""The examples beside the contract: each operation's request is answered as its example says."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from service.web import contract
+
+EXAMPLES = Path(__file__).parents[2] / "api/examples"
+OPERATIONS = {operation.id: operation for operation in contract.load().operations}
+
+
+def test_every_operation_has_an_example_and_every_example_an_operation():
+    assert {folder.name for folder in EXAMPLES.iterdir()} == set(OPERATIONS)
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_the_example_is_answered_as_it_says(name, ask, spec):
+    request = read(name, "request")
+    given = {"json": request["body"]} if "body" in request else {}
+    answer = ask(request["method"], request["path"], **given)
+    expected = read(name, "response")
+    assert answer.status_code == expected["status"], answer.text
+    assert dict(answer.headers).items() >= expected["headers"].items()
+    if "body" in expected:
+        assert contains(answer.json(), expected["body"])
+        jsonschema.validate(answer.json(), schema_of(spec, name), jsonschema.Draft202012Validator)
+
+
+@pytest.mark.parametrize("name", [n for n, o in OPERATIONS.items() if o.method == "POST"])
+def test_the_example_body_matches_the_schema(name, spec):
+    content = operation_of(spec, name)["requestBody"]
+    schema = resolve(spec, content)["content"]["application/json"]["schema"]
+    schema = {**schema, "components": spec["components"]}
+    jsonschema.validate(read(name, "request")["body"], schema, jsonschema.Draft202012Validator)
+
+
+@pytest.mark.parametrize("name", ["Pose", *(f"Clip{e}" for e in ("Usda", "Usdc", "Json", "Bvh"))])
+def test_both_ways_to_ask_give_the_same_answer(name, ask):
+    get, post = read(f"get{name}", "request"), read(f"query{name}", "request")
+    by_query = ask("GET", get["path"])
+    by_body = ask("POST", post["path"], json=post["body"])
+    assert by_query.content == by_body.content
+
+
+def read(name, part):
+    return json.loads((EXAMPLES / name / f"{part}.json").read_bytes())
+
+
+def operation_of(spec, name):
+    operation = OPERATIONS[name]
+    return spec["paths"][operation.path][operation.method.lower()]
+
+
+def schema_of(spec, name):
+    answer = resolve(spec, operation_of(spec, name)["responses"]["200"])
+    schema = answer["content"]["application/json"]["schema"]
+    return {**schema, "components": spec["components"]}
+
+
+def resolve(spec, node):
+    while "$ref" in node:
+        kind, name = node["$ref"].removeprefix("#/components/").split("/")
+        node = spec["components"][kind][name]
+    return node
+
+
+def contains(whole, part):
+    """Whether `part` is an excerpt of `whole`: fewer keys, the same values."""
+    if isinstance(part, dict):
+        return all(key in whole and contains(whole[key], part[key]) for key in part)
+    if isinstance(part, list):
+        return len(whole) == len(part) and all(map(contains, whole, part))
+    return whole == part

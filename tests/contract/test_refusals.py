@@ -1,0 +1,221 @@
+"""Bad input: each is refused with the status, the place and the words that tell the client why."""
+
+import json
+from urllib.parse import urlencode
+
+import jsonschema
+import pytest
+
+CLIP = "/v1/models/reach/clip.json"
+POSE = "/v1/models/reach/pose"
+JSON = {"content-type": "application/json"}
+
+
+@pytest.fixture
+def refuse(ask, spec):
+    """Ask, and hold the refusal against the one shape of errors."""
+    schema = {"$ref": "#/components/schemas/Problem", "components": spec["components"]}
+
+    def asked(status, kind, method, url, **content):
+        answer = ask(method, url, **content)
+        assert answer.headers["content-type"] == "application/problem+json", answer.text
+        problem = answer.json()
+        jsonschema.validate(problem, schema, jsonschema.Draft202012Validator)
+        assert problem["status"] == answer.status_code == status, problem
+        assert problem["type"] == f"urn:posefield:problem:{kind}"
+        assert problem["instance"] == answer.headers["x-request-id"]
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        return problem
+
+    return asked
+
+
+WRONG_PARAMETERS = [
+    # changes to a right query, status, problem, parameter at fault, words of the detail
+    ({"fps": "0"}, 422, "invalid-field", "fps", "expected 1 to 1000"),
+    ({"fps": "10000"}, 422, "invalid-field", "fps", "expected 1 to 1000"),
+    ({"fps": "abc"}, 400, "bad-parameter", "fps", "expected a finite number"),
+    ({"fps": ""}, 400, "bad-parameter", "fps", "expected a finite number"),
+    ({"fps": "1_0"}, 400, "bad-parameter", "fps", "expected a finite number"),
+    ({"fps": "٣٠"}, 400, "bad-parameter", "fps", "expected a finite number"),
+    ({"start": "-1"}, 422, "invalid-field", "start", "expected 0 to"),
+    ({"end": "99"}, 422, "invalid-field", "end", "expected 0 to"),
+    ({"start": "1", "end": "0.5"}, 422, "invalid-field", "start", "expected 0 to 0.5"),
+    ({"turn": "NaN"}, 400, "bad-parameter", "turn", "expected a finite number"),
+    ({"turn": "Infinity"}, 400, "bad-parameter", "turn", "expected a finite number"),
+    ({"turn": "-inf"}, 400, "bad-parameter", "turn", "expected a finite number"),
+    ({"turn": "1e400"}, 400, "bad-parameter", "turn", "expected a finite number"),
+    ({"turn": "1e300"}, 422, "invalid-field", "turn", "expected"),
+    ({"turn": None}, 422, "invalid-field", "turn", "missing; give a number"),
+    ({"spin": "1"}, 422, "invalid-field", "spin", "this model has stature, hip_height"),
+    ({"extrapolate": "other"}, 400, "bad-parameter", "extrapolate", "expected one of"),
+    ({"turn": "1e3", "extrapolate": "refuse"}, 422, "outside-samples", "controls", "turn = 1000"),
+    ({"turn": ["1", "2"]}, 400, "bad-parameter", "turn", "expected once"),
+    ({"fps": ["30", "30"]}, 400, "bad-parameter", "fps", "expected once"),
+]
+
+
+@pytest.mark.parametrize(("changes", "status", "kind", "name", "words"), WRONG_PARAMETERS)
+def test_a_wrong_parameter_is_named(changes, status, kind, name, words, refuse, controls):
+    given = {k: v for k, v in {**controls, **changes}.items() if v is not None}
+    problem = refuse(status, kind, "GET", f"{CLIP}?{urlencode(given, doseq=True)}")
+    assert [error["parameter"] for error in problem["errors"]] == [name]
+    assert words in problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("times", "status", "kind", "words"),
+    [
+        ([], 400, "bad-parameter", "missing; give seconds"),
+        (["0", "99"], 422, "invalid-field", "expected 0 to"),
+        (["-0.1"], 422, "invalid-field", "expected 0 to"),
+        (["nan"], 400, "bad-parameter", "expected a finite number"),
+    ],
+)
+def test_a_wrong_time_is_named(times, status, kind, words, refuse, controls):
+    given = urlencode({**controls, "time": times}, doseq=True)
+    problem = refuse(status, kind, "GET", f"{POSE}?{given}")
+    assert problem["errors"][0]["parameter"] == "time"
+    assert words in problem["detail"]
+
+
+def test_an_unknown_parameter_is_named(refuse):
+    problem = refuse(400, "bad-parameter", "GET", "/livez?verbose=1")
+    assert problem["errors"][0]["parameter"] == "verbose"
+    refuse(400, "bad-parameter", "GET", "/v1/models/reach?%ff=1")
+    refuse(400, "bad-parameter", "POST", f"{POSE}?time=1", json={})
+
+
+WRONG_BODIES = [
+    # body, status, problem, pointer to the fault
+    (b"", 400, "bad-body", ""),
+    (b"{", 400, "bad-body", ""),
+    (b"\xff\xfe", 400, "bad-body", ""),
+    (b'{"controls": {"\xff": 1}}', 400, "bad-body", ""),
+    (b'{"controls": {"\\ud800": 1}}', 400, "bad-body", ""),
+    (b"[]", 400, "bad-body", ""),
+    (b"null", 400, "bad-body", ""),
+    (b"{}", 400, "bad-body", "/controls"),
+    (b'{"controls": {}, "frames": 3}', 400, "bad-body", "/frames"),
+    (b'{"controls": 3}', 400, "bad-body", "/controls"),
+    (b'{"controls": {"turn": NaN}}', 400, "bad-body", ""),
+    (b'{"controls": {"turn": 1e400}}', 400, "bad-body", "/controls/turn"),
+    (b'{"controls": {"turn": ' + b"9" * 400 + b"}}", 400, "bad-body", "/controls/turn"),
+    (b'{"controls": {"turn": "20"}}', 400, "bad-body", "/controls/turn"),
+    (b'{"controls": {"turn": true}}', 400, "bad-body", "/controls/turn"),
+    (b'{"controls": {"a/b~c": null}}', 400, "bad-body", "/controls/a~1b~0c"),
+    (b'{"controls": {"a/b~c": 1}}', 422, "invalid-field", "/controls/a~1b~0c"),
+    (b'{"controls": ' + b"[" * 9000, 400, "bad-body", "/controls"),
+    (b'{"controls": {"turn": ' + b"[" * 20000 + b"]" * 20000 + b"}}", 400, "bad-body", ""),
+    (b'{"controls": {}, "fps": "30"}', 400, "bad-body", "/fps"),
+    (b'{"controls": {}, "extrapolate": "other"}', 400, "bad-body", "/extrapolate"),
+    (b'{"controls": {}}', 422, "invalid-field", "/controls/stature"),
+]
+
+
+@pytest.mark.parametrize(("content", "status", "kind", "pointer"), WRONG_BODIES)
+def test_a_wrong_body_is_pointed_at(content, status, kind, pointer, refuse):
+    problem = refuse(status, kind, "POST", CLIP, content=content, headers=JSON)
+    assert [error["pointer"] for error in problem["errors"]] == [pointer]
+
+
+def test_a_wrong_time_in_a_body_is_pointed_at(refuse, controls):
+    body = {"controls": controls, "times": [0, 99]}
+    problem = refuse(422, "invalid-field", "POST", POSE, json=body)
+    assert problem["errors"][0]["pointer"] == "/times/1"
+    body = {"controls": controls, "times": [0, "1"]}
+    problem = refuse(400, "bad-body", "POST", POSE, json=body)
+    assert problem["errors"][0]["pointer"] == "/times/1"
+
+
+def test_no_times_are_refused(refuse, controls):
+    body = {"controls": controls, "times": []}
+    assert "expected 1 to 10000" in refuse(422, "invalid-field", "POST", POSE, json=body)["detail"]
+
+
+@pytest.mark.parametrize("media", ["text/plain", "application/xml", "application/json; charset=x"])
+def test_another_media_type_is_refused(media, refuse):
+    headers = {"content-type": media}
+    problem = refuse(415, "unsupported-media-type", "POST", POSE, content=b"{}", headers=headers)
+    assert "expected 'application/json'" in problem["detail"]
+
+
+def test_a_body_without_media_type_is_refused(refuse):
+    refuse(415, "unsupported-media-type", "POST", POSE, content=b"{}")
+
+
+def test_a_media_type_may_name_utf8(ask, controls):
+    content = json.dumps({"controls": controls, "times": [0]})
+    headers = {"content-type": "application/json; charset=UTF-8"}
+    assert ask("POST", POSE, content=content, headers=headers).status_code == 200
+
+
+def test_an_integral_number_is_a_number(ask, controls):
+    body = {
+        "controls": {n: int(v) + 1 for n, v in controls.items()},
+        "times": [0],
+        "extrapolate": "warn",
+    }
+    assert ask("POST", POSE, json=body).status_code == 200
+
+
+def test_a_body_that_declares_too_much_is_refused(refuse):
+    content = b" " * (64 * 1024 + 1)
+    refuse(413, "body-too-large", "POST", POSE, content=content, headers=JSON)
+
+
+def test_reading_a_chunked_body_stops_at_the_limit(refuse):
+    read = []
+
+    async def endless():
+        while True:
+            read.append(1)
+            yield b" " * 1024
+
+    refuse(413, "body-too-large", "POST", POSE, content=endless(), headers=JSON)
+    assert len(read) <= 66
+
+
+def test_a_body_at_the_limit_is_read(refuse):
+    refuse(400, "bad-body", "POST", POSE, content=b" " * (64 * 1024), headers=JSON)
+
+
+@pytest.mark.parametrize("name", ["nobody", "reach@0000000000000000", "reach@", "..", "%00", "%2e"])
+def test_an_unknown_model_is_refused(name, refuse):
+    problem = refuse(404, "unknown-model", "GET", f"/v1/models/{name}x")
+    assert "there are reach@" in problem["detail"]
+    assert problem["errors"][0]["parameter"] == "model"
+
+
+def test_a_model_is_found_by_its_hash(ask, loaded):
+    identity = loaded.find("reach").identity
+    assert ask("GET", f"/v1/models/{identity}").json()["identity"] == identity
+
+
+def test_an_unknown_format_names_the_formats_there_are(refuse):
+    problem = refuse(404, "unknown-format", "GET", "/v1/models/reach/clip.fbx")
+    assert "usda, usdc, usdz, json, bvh" in problem["detail"]
+    assert problem["errors"][0]["parameter"] == "format"
+
+
+@pytest.mark.parametrize("path", ["/", "/v1", "/v1/models/", "/v1/models/reach/clip", "/livez/"])
+def test_an_unknown_path_is_refused(path, refuse):
+    refuse(404, "no-such-path", "GET", path)
+
+
+@pytest.mark.parametrize("host", ["[", "a b", "%", "::::"])
+def test_a_strange_host_is_no_failure(host, refuse):
+    refuse(404, "no-such-path", "GET", "/nowhere", headers={"host": host})
+
+
+@pytest.mark.parametrize(("path", "allow"), [(POSE, "GET, HEAD, POST"), ("/livez", "GET, HEAD")])
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
+def test_another_method_is_told_which_are_allowed(path, allow, method, ask, refuse):
+    refuse(405, "method-not-allowed", method, path)
+    assert ask(method, path).headers["allow"] == allow
+
+
+def test_too_many_times_are_refused(refuse, controls):
+    body = {"controls": controls, "times": [0] * 10_001}
+    problem = refuse(422, "invalid-field", "POST", POSE, json=body)
+    assert problem["errors"][0]["pointer"] == "/times"

@@ -1,0 +1,97 @@
+"""Requests drawn from the contract, right ones and wrong ones: every answer keeps the contract."""
+
+import copy
+
+import schemathesis
+from schemathesis.config import ChecksConfig, GenerationConfig, ProjectConfig, ProjectsConfig
+from schemathesis.config import PositiveDataAcceptanceConfig as Acceptance
+from schemathesis.engine import Status, events, from_schema
+from schemathesis.generation import GenerationMode
+
+PHASES = ("examples", "coverage", "fuzzing")
+SEED = 1
+
+
+def test_every_answer_keeps_the_contract(spec, app):
+    # The contract cannot know a model's controls: a request that keeps it may still get 422.
+    accepted = Acceptance(expected_statuses=["2xx", "404", "422"])
+    aimed = copy.deepcopy(spec)
+    # A drawn name would meet 404 before anything else of the request is looked at.
+    aimed["components"]["parameters"]["model"]["schema"] = {"enum": ["reach", "nobody"]}
+    found, calls = run(aimed, app, accepted, list(GenerationMode), examples=40)
+    assert found == []
+    assert calls > 1500
+
+
+def test_every_right_question_to_this_model_is_answered(spec, app, loaded):
+    narrow = narrowed(spec, loaded.find("reach").session.card)
+    accepted = Acceptance(expected_statuses=["2xx"])
+    found, calls = run(narrow, app, accepted, [GenerationMode.POSITIVE], examples=40)
+    assert found == []
+    assert calls > 700
+
+
+def test_a_contract_that_the_service_breaks_is_found_out(spec, app):
+    broken = copy.deepcopy({**spec, "paths": {"/livez": spec["paths"]["/livez"]}})
+    broken["components"]["schemas"]["Liveness"]["properties"]["status"]["const"] = "dead"
+    found, _ = run(broken, app, Acceptance(enabled=False), list(GenerationMode), examples=1)
+    assert any("Response violates schema" in line for line in found)
+
+
+def run(spec, app, accepted, modes, examples):
+    """Failures that the phases find, one line each, and how many requests were sent."""
+    generation = GenerationConfig(modes=modes, max_examples=examples, deterministic=True)
+    checks = ChecksConfig(positive_data_acceptance=accepted)
+    project = ProjectConfig(generation=generation, checks=checks, continue_on_failure=True)
+    project.phases.update(phases=list(PHASES))
+    project.phases.coverage.generate_duplicate_query_parameters = True
+    config = schemathesis.Config(seed=SEED, projects=ProjectsConfig(default=project))
+    schema = schemathesis.openapi.from_dict(copy.deepcopy(spec), config=config)
+    schema.app = app
+    found, calls = [], 0
+    for event in from_schema(schema).execute():
+        if isinstance(event, events.NonFatalError | events.FatalError):
+            found.append(str(event))
+        if isinstance(event, events.ScenarioFinished):
+            calls += len(event.recorder.interactions)
+            found += failures(event)
+    return found, calls
+
+
+def failures(event):
+    return [
+        f"{event.phase.value} {event.label} {case}: {check.failure_info.failure}"
+        for case, checks in event.recorder.checks.items()
+        for check in checks
+        if check.status == Status.FAILURE
+    ]
+
+
+def narrowed(spec, card):
+    """The contract with what only this model's card says: its controls and the times it has."""
+    narrow = copy.deepcopy(spec)
+    parts = narrow["components"]
+    numbers = {
+        c.name: {"type": "number", "minimum": c.minimum, "maximum": c.maximum}
+        for c in card.controls
+    }
+    exact = {
+        "type": "object",
+        "properties": numbers,
+        "required": list(numbers),
+        "additionalProperties": False,
+    }
+    parts["schemas"]["Controls"] = exact
+    parts["parameters"]["controls"]["schema"] = exact
+    parts["parameters"]["model"]["schema"] = {"enum": ["reach"]}
+    bounds = {"start": (0, 0.2), "end": (0.3, 0.8), "fps": (1, 240)}
+    for name, (low, high) in bounds.items():
+        between = {"type": "number", "minimum": low, "maximum": high}
+        parts["parameters"][name]["schema"] = between
+        parts["schemas"]["ClipQuestion"]["properties"][name] = between
+    times = {"type": "number", "minimum": 0, "maximum": 0.8}
+    parts["parameters"]["time"]["schema"]["items"] = times
+    parts["schemas"]["PoseQuestion"]["properties"]["times"]["items"] = times
+    for parameter in parts["parameters"].values():
+        parameter.pop("example", None)
+    return narrow

@@ -1,0 +1,161 @@
+"""The real process on a real socket: it answers, ends when told to, and refuses bad models."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import httpx
+import pytest
+from pxr import Usd
+
+ROOT = Path(__file__).parents[2]
+POSEFIELD = Path(sys.executable).with_name("posefield")
+
+
+@contextlib.contextmanager
+def process(*paths, **environ):
+    """The service as a process of its own; killed if the test leaves it running."""
+    command = [POSEFIELD, "serve", *map(str, paths)]
+    given = {**os.environ, "POSEFIELD_PORT": "0", **environ}
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=ROOT, env=given, stdout=pipe, stderr=pipe) as child:
+        watch = threading.Timer(60, child.kill)
+        watch.start()
+        try:
+            yield child
+        finally:
+            watch.cancel()
+            child.kill()
+
+
+def address(child) -> str:
+    """Where the service says it listens: the one line that it prints."""
+    return child.stdout.readline().decode().split()[-1]
+
+
+@pytest.fixture(scope="module")
+def base(models):
+    with process(models) as child:
+        yield address(child)
+
+
+@pytest.fixture
+def client(base):
+    with httpx.Client(base_url=base, timeout=30) as client:
+        yield client
+
+
+def test_a_pose_over_the_wire(client, controls):
+    answer = client.get("/v1/models/reach/pose", params={**controls, "time": [0, 0.5]})
+    assert answer.status_code == 200
+    assert answer.json()["times"] == [0, 0.5]
+    assert "server" not in answer.headers
+
+
+def test_a_clip_over_the_wire_opens_in_usd(client, controls, tmp_path):
+    answer = client.post("/v1/models/reach/clip.usdc", json={"controls": controls, "fps": 25})
+    file = tmp_path / "clip.usdc"
+    file.write_bytes(answer.content)
+    stage = Usd.Stage.Open(str(file))
+    assert stage.GetTimeCodesPerSecond() == 25
+    assert stage.GetEndTimeCode() == int(float(answer.headers["posefield-duration"]) * 25)
+
+
+def test_requests_at_the_same_time_do_not_disturb_each_other(base, controls):
+    answers = {}
+
+    def ask(stature):
+        with httpx.Client(base_url=base, timeout=30) as client:
+            given = {**controls, "stature": stature, "fps": 1000}
+            answers[stature] = client.get("/v1/models/reach/clip.usda", params=given).content
+
+    statures = [1.6 + 0.02 * i for i in range(8)]
+    threads = [threading.Thread(target=ask, args=(stature,)) for stature in statures]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    together = dict(answers)
+    for stature in statures:
+        ask(stature)
+    assert answers == together
+
+
+def test_a_chunked_body_without_end_is_cut_off(client):
+    sent = []
+
+    def endless():
+        for _ in range(100_000):
+            sent.append(1)
+            yield b" " * 1024
+
+    headers = {"content-type": "application/json"}
+    answer = client.post("/v1/models/reach/pose", content=endless(), headers=headers)
+    assert answer.status_code == 413
+    assert answer.headers["connection"] == "close"
+    assert len(sent) < 100_000
+
+
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
+def test_told_to_end_it_ends_well(ending, models):
+    with process(models) as child:
+        assert httpx.get(address(child) + "/readyz").status_code == 200
+        child.send_signal(ending)
+        assert child.wait(20) == 0
+        assert child.stdout.read() == child.stderr.read() == b""
+
+
+def test_open_requests_are_answered_before_the_end(models, controls):
+    with process(models) as child:
+        url = address(child)
+        host, port = url.removeprefix("http://").split(":")
+        with socket.create_connection((host, int(port)), timeout=20) as wire:
+            wire.sendall(
+                b"POST /v1/models/reach/pose HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n"
+                b"Content-Type: application/json\r\n\r\n"
+            )
+            # The request is open once the service has read its head: it answers others by then.
+            assert httpx.get(url + "/livez").status_code == 200
+            child.send_signal(signal.SIGTERM)
+            wire.sendall(b"{}")
+            assert wire.recv(65536).startswith(b"HTTP/1.1 400 ")
+        assert child.wait(20) == 0
+
+
+@pytest.mark.parametrize("content", [b"not a model", b""])
+def test_a_corrupt_model_stops_the_start(content, models, tmp_path):
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(content)
+    with socket.create_server(("127.0.0.1", 0)) as held:
+        port = held.getsockname()[1]
+    with process(models, broken, POSEFIELD_PORT=str(port)) as child:
+        said, complaint = child.communicate(timeout=30)
+        assert (child.returncode, said) == (3, b"")
+        (line,) = complaint.decode().splitlines()
+        assert f"{broken}: onnxruntime cannot load it" in line
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", port), timeout=5)
+
+
+def test_a_damaged_copy_of_a_model_stops_the_start(models, tmp_path):
+    whole = (models / "reach.onnx").read_bytes()
+    cut = tmp_path / "cut.onnx"
+    cut.write_bytes(whole[: len(whole) // 2])
+    with process(cut) as child:
+        _, complaint = child.communicate(timeout=30)
+        assert child.returncode == 3
+        assert f"{cut}: " in complaint.decode()
+
+
+def test_a_taken_port_stops_the_start(models):
+    with socket.create_server(("127.0.0.1", 0)) as held:
+        port = held.getsockname()[1]
+        with process(models, POSEFIELD_PORT=str(port)) as child:
+            _, complaint = child.communicate(timeout=30)
+            assert child.returncode != 0
+            assert "address already in use" in complaint.decode()

@@ -1,0 +1,97 @@
+"""The clips that other programs must read as we do, and one that they must not."""
+
+from pathlib import Path
+
+import numpy as np
+
+from service.encode import ENCODERS, names
+from service.motion import clip as clips
+from service.motion import quat, skeleton
+from service.motion.answer import ClipAnswer, Trust
+from service.motion.clip import Clip
+from service.motion.skeleton import Skeleton
+
+FORMATS = ("usda", "usdc", "usdz")
+CONTROL = "control"
+"""Name of the clip whose quaternions are written in the wrong order."""
+
+# Names that readers stumble over; some are alike once what is illegal is replaced.
+JOINTS = [
+    ("mixamorig:Hips", -1, (0.02, 0.95, 0.01)),
+    ("Lower Back", 0, (0, 0.1, -0.01)),
+    ("Lower-Back", 1, (0, 0.12, 0.0)),
+    ("Lower_Back", 2, (0, 0.12, 0.01)),
+    ("Neck", 3, (0, 0.12, 0.01)),
+    ("1Head", 4, (0, 0.1, 0.02)),
+    ("LHipJoint", 0, (0, 0, 0)),
+    ("Left:Leg", 6, (0.1, -0.05, 0.0)),
+    ("Left Leg", 7, (0.02, -0.42, 0.01)),
+    ("LeftFoot", 8, (0.0, -0.4, -0.02)),
+    ("RHipJoint", 0, (0, 0, 0)),
+    ("RightUpLeg", 10, (-0.1, -0.05, 0.0)),
+    ("RightLeg", 11, (-0.02, -0.42, 0.01)),
+    ("RightFoot", 12, (0.0, -0.4, -0.02)),
+    ("左腕", 3, (0.18, 0.05, 0.0)),
+    ("LeftForeArm", 14, (0.28, 0.0, 0.0)),
+    ("LeftHand", 15, (0.25, 0.0, 0.01)),
+    ("右腕", 3, (-0.18, 0.05, 0.0)),
+    ("RightForeArm", 17, (-0.28, 0.0, 0.0)),
+    ("Right\\Hand", 18, (-0.25, 0.0, 0.01)),
+]
+TIPS = [(5, (0, 0.18, 0.02)), (9, (0, -0.08, 0.15)), (13, (0, -0.08, 0.15)), (16, (0, 0, 0))]
+
+
+def answers() -> list[tuple[str, ClipAnswer]]:
+    """The clips by name."""
+    return [
+        ("film", _answer(frames=45, rate=29.97)),
+        ("fast", _answer(frames=100, rate=60.0)),
+        ("pose", _answer(frames=1, rate=30.0)),
+    ]
+
+
+def write(folder: Path) -> dict[str, Path]:
+    """Every clip and the control in every USD format, and by file name what to expect of it."""
+    given = answers()
+    control = given[0][1]
+    expected = {}
+    for name, written, meant in (
+        *((name, answer, answer) for name, answer in given),
+        (CONTROL, _swapped(control), control),
+    ):
+        expectation = folder / f"{name}.npz"
+        np.savez(expectation, **_expected(meant.clip))
+        for extension in FORMATS:
+            path = folder / f"{name}.{extension}"
+            path.write_bytes(ENCODERS[extension].encode(written))
+            expected[path.name] = expectation
+    return expected
+
+
+def _expected(clip: Clip) -> dict[str, np.ndarray]:
+    """Joint names in the file and matrices (F, J, 4, 4) in the world, for column vectors, m."""
+    parents = clip.skeleton.parents
+    positions, turns = skeleton.forward(parents, clip.rotations, clip.translations)
+    matrices = np.zeros((*positions.shape[:-1], 4, 4))
+    matrices[..., :3, :3], matrices[..., :3, 3] = quat.to_matrix(turns), positions
+    matrices[..., 3, 3] = 1.0
+    return {"joints": np.array(names.legal(clip.skeleton.names)), "matrices": matrices}
+
+
+def _answer(frames: int, rate: float) -> ClipAnswer:
+    rng = np.random.default_rng(7)
+    leaves, parents, offsets = zip(*JOINTS, strict=True)
+    joints, arms = zip(*TIPS, strict=True)
+    person = Skeleton(leaves, parents, np.array(offsets, float), joints, np.array(arms, float))
+    t = np.arange(frames) / rate
+    phases = rng.uniform(0, 2 * np.pi, (len(person), 3))
+    turns = quat.exp(0.6 * np.sin(2 * np.pi * t[:, None, None] + phases))
+    path = np.stack([0.3 * np.sin(t), 0.9 + 0.05 * np.cos(5 * t), 1.2 * t], axis=-1)
+    made = clips.assemble(person, turns, path, 1.07 * person.offsets, rate)
+    return ClipAnswer(made, Trust("hand@0", {"speed": 1.0}, made.duration, 0.01, ()))
+
+
+def _swapped(answer: ClipAnswer) -> ClipAnswer:
+    clip = answer.clip
+    rotations = np.roll(clip.rotations, 1, axis=-1)
+    return ClipAnswer(Clip(clip.skeleton, rotations, clip.translations, clip.rate), answer.trust)

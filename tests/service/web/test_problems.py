@@ -1,0 +1,33 @@
+"""Every error of the domain that a client can cause has a status, and no two kinds one name."""
+
+import pytest
+
+from service.motion.errors import QueryError
+from service.web import problems
+
+
+def descendants(error):
+    return {error, *(d for child in error.__subclasses__() for d in descendants(child))}
+
+
+def test_every_query_error_is_in_the_table():
+    assert set(problems.TABLE) == descendants(QueryError) - {QueryError}
+
+
+def test_every_kind_is_a_client_error_but_one():
+    for kind in (*problems.OF_REQUEST, *problems.TABLE.values()):
+        assert 400 <= kind.status < 500
+    assert problems.INTERNAL.status == 500
+
+
+def test_no_two_kinds_share_a_name():
+    names = [kind.name for kind in (*problems.OF_REQUEST, *problems.TABLE.values())]
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize(
+    ("parts", "expected"),
+    [((), ""), (("times", "0"), "/times/0"), (("controls", "a/b~c"), "/controls/a~1b~0c")],
+)
+def test_pointers_escape_what_rfc_6901_says(parts, expected):
+    assert problems.pointer(*parts) == expected

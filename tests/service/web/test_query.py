@@ -1,0 +1,58 @@
+"""Both ways to ask lead to one question."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.web import query
+from service.web.problems import RequestFault
+from service.web.query import ClipQuestion, PoseQuestion
+
+
+def test_a_query_and_a_body_are_one_pose_question():
+    expected = PoseQuestion({"turn": 20.0, "stature": 1.7}, [0.0, 0.5], "refuse")
+    pairs = [("turn", "20"), ("time", "0"), ("stature", "1.7"), ("time", "0.5")]
+    assert query.pose_of_pairs([*pairs, ("extrapolate", "refuse")]) == expected
+    body = (
+        b'{"controls": {"turn": 20, "stature": 1.7}, "times": [0, 5e-1], "extrapolate": "refuse"}'
+    )
+    assert query.pose_of_body(body) == expected
+
+
+def test_a_query_and_a_body_are_one_clip_question():
+    expected = ClipQuestion({"turn": -2.0}, 60.0, 0.1, 0.9, "warn")
+    pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9")]
+    assert query.clip_of_pairs(pairs) == expected
+    body = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9}'
+    assert query.clip_of_body(body) == expected
+
+
+def test_what_is_left_out_has_one_default():
+    expected = ClipQuestion({}, 30.0, 0.0, None, "warn")
+    assert query.clip_of_pairs([]) == expected
+    assert query.clip_of_body(b'{"controls": {}}') == expected
+    assert query.clip_of_body(b'{"controls": {}, "end": null}') == expected
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_number_survives_the_query(number):
+    asked = query.clip_of_pairs([("turn", repr(number))])
+    assert asked.controls == {"turn": number}
+
+
+@given(st.text())
+def test_any_text_is_a_finite_number_or_refused(text):
+    try:
+        value = query.clip_of_pairs([("turn", text)]).controls["turn"]
+    except RequestFault as fault:
+        assert fault.kind.status == 400
+    else:
+        assert math.isfinite(value)
+
+
+@given(st.binary())
+def test_any_bytes_are_a_question_or_refused(content):
+    with pytest.raises(RequestFault):
+        query.pose_of_body(content)

@@ -1,0 +1,101 @@
+"""The image as its Dockerfile describes it; no container engine needed."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGING = {"pyproject.toml", "uv.lock", "README.md", "LICENSE"}
+
+
+@pytest.fixture(scope="module")
+def stages() -> list[list[tuple[str, str]]]:
+    """Instructions of each stage: (name, arguments), continuation lines joined."""
+    text = (ROOT / "Dockerfile").read_text()
+    lines = [line for line in text.splitlines() if not line.lstrip().startswith("#")]
+    joined = "\n".join(lines).replace("\\\n", " ")
+    stages: list[list[tuple[str, str]]] = []
+    for line in filter(None, joined.splitlines()):
+        name, _, arguments = line.partition(" ")
+        if name == "FROM":
+            stages.append([])
+        stages[-1].append((name, arguments.strip()))
+    return stages
+
+
+def values(stage, instruction):
+    return [arguments for name, arguments in stage if name == instruction]
+
+
+def environment(stage):
+    return dict(pair.split("=", 1) for line in values(stage, "ENV") for pair in shlex.split(line))
+
+
+def test_hadolint_finds_nothing():
+    hadolint = Path(sys.executable).parent / "hadolint"
+    command = [hadolint, "--no-color", ROOT / "Dockerfile"]
+    found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stdout) == (0, "")
+
+
+def test_two_stages_from_one_tagged_base(stages):
+    bases = [values(stage, "FROM")[0].split()[0] for stage in stages]
+    assert bases == ["python:3.11-slim-bookworm"] * 2
+
+
+def test_only_the_service_and_its_packaging_are_copied(stages):
+    build, final = stages
+    copied = {source for line in values(build, "COPY") for source in line.split()[:-1]}
+    assert copied == {*PACKAGING, "api", "service"}
+    assert values(final, "COPY") == ["--from=build /opt/posefield /opt/posefield"]
+    assert not values(build, "ADD") + values(final, "ADD")
+
+
+def test_the_build_takes_the_lock_and_no_extras(stages):
+    syncs = [line for line in values(stages[0], "RUN") if "uv sync" in line]
+    assert all("--frozen" in line and "--no-dev" in line for line in syncs)
+    assert "--no-editable" in syncs[-1]
+    assert not any("extra" in line for line in syncs)
+
+
+def test_uv_is_the_one_of_the_makefile(stages):
+    version = re.search(r"^UV_VERSION := (\S+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert version
+    assert any(f"uv=={version[1]}" in line for line in values(stages[0], "RUN"))
+
+
+def test_it_runs_as_nobody_in_particular(stages):
+    assert values(stages[1], "USER") == ["10001:10001"]
+
+
+def test_it_writes_nothing_and_reports_to_nobody(stages):
+    given = environment(stages[1])
+    assert given["PYTHONDONTWRITEBYTECODE"] == given["ORT_DISABLE_TELEMETRY"] == "1"
+    assert given["POSEFIELD_HOST"] == "0.0.0.0"
+
+
+def test_it_serves_the_models_folder(stages):
+    final = stages[1]
+    assert [json.loads(line) for line in values(final, "ENTRYPOINT")] == [["posefield", "serve"]]
+    assert [json.loads(line) for line in values(final, "CMD")] == [["/models"]]
+    assert values(final, "EXPOSE") == [environment(final)["POSEFIELD_PORT"]]
+
+
+def test_it_is_healthy_when_it_is_ready(stages):
+    (check,) = values(stages[1], "HEALTHCHECK")
+    command = json.loads(check[check.index("[") :])
+    assert command[:2] == ["python", "-c"]
+    assert "/readyz" in command[2]
+    compile(command[2], "HEALTHCHECK", "exec")
+
+
+def test_the_context_is_what_is_copied():
+    lines = (ROOT / ".dockerignore").read_text().splitlines()
+    rules = [line for line in lines if line and not line.startswith("#")]
+    assert rules[0] == "*"
+    assert {rule[1:] for rule in rules if rule.startswith("!")} == {*PACKAGING, "api", "service"}
