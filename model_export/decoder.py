@@ -84,33 +84,41 @@ class Decoder:
         return net("Add", net("Gather", first, row), rise)
 
     def _rotations(self, net: Net, flat: str) -> str:
-        """Quaternions (B S, J, 4) of the first mode's coefficients (B S, r1).
-
-        mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2, and the product in
-        brackets is linear in v and keeps its length: it is folded into the directions, and no
-        quaternion is ever multiplied. Components lie outside joints until the end, so that every
-        operation runs over long rows.
-        """
-        turned = net(
+        """Quaternions (B S, J, 4) of the first mode's coefficients (B S, r1)."""
+        rows = net(
             "Gemm",
+            net.weights("rotation_directions", turned(self.means, self.directions[:, 3:]).T),
             flat,
-            net.weights("rotation_directions", self._turned(self.directions[:, 3:])),
-            net.weights("rotation_mean", self._turned(self.mean[3:])),
+            net.weights("rotation_mean", turned(self.means, self.mean[3:])[:, None]),
+            transB=1,
         )
-        planes = net("Reshape", turned, net.indices(-1, 4, len(self.means)))
-        squares = net("ReduceSum", net("Mul", planes, planes), net.indices(1), keepdims=1)
-        half = net("Sqrt", net("Add", squares, net.number(TINY)))
-        means = net.weights("mean_rotations", self.means.T)
-        along = net("Mul", means, net("Cos", half))
-        across = net("Mul", planes, net("Div", net("Sin", half), half))
-        return net("Transpose", net("Add", along, across), perm=[0, 2, 1])
+        return quaternions(net, rows, self.means)
 
-    def _turned(self, vectors: Floats) -> Floats:
-        """mean · v / 2 of rotation vectors (..., 3 J) as four planes (..., 4 J)."""
-        pure = np.zeros((*vectors.shape[:-1], len(self.means), 4))
-        pure[..., 1:] = 0.5 * vectors.reshape(*vectors.shape[:-1], -1, 3)
-        turned = np.swapaxes(quat.mul(self.means, pure), -1, -2)
-        return turned.reshape(*vectors.shape[:-1], -1)
+
+def turned(means: Floats, vectors: Floats) -> Floats:
+    """mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
+
+    mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The product in brackets
+    is linear in v and keeps its length: it is folded into the directions of the model, and no
+    quaternion is ever multiplied.
+    """
+    pure = np.zeros((*vectors.shape[:-1], len(means), 4))
+    pure[..., 1:] = 0.5 * vectors.reshape(*vectors.shape[:-1], -1, 3)
+    return quat.mul(means, pure).reshape(*vectors.shape[:-1], -1)
+
+
+def quaternions(net: Net, rows: str, means: Floats) -> str:
+    """Graph's quaternions (P, J, 4) of turned rotation vectors (4 J, P).
+
+    Poses lie innermost until the end, so that every operation runs over long rows.
+    """
+    joints = net("Reshape", rows, net.indices(len(means), 4, -1))
+    squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
+    half = net("Sqrt", net("Add", squares, net.number(TINY)))
+    along = net("Mul", net.weights("mean_rotations", means[:, :, None]), net("Cos", half))
+    across = net("Mul", joints, net("Div", net("Sin", half), half))
+    finished = net("Reshape", net("Add", along, across), net.indices(4 * len(means), -1))
+    return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, len(means), 4))
 
 
 @dataclass(frozen=True)

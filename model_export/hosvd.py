@@ -44,8 +44,15 @@ def unfold(tensor: Floats, mode: int) -> Floats:
 
 
 def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
-    """Mode-n product: matrix (rows, size of the mode) applied to every fibre of the mode."""
-    return np.moveaxis(np.tensordot(matrix, tensor, axes=(1, mode)), 0, mode)
+    """Mode-n product: matrix (rows, size of the mode) applied to every fibre of the mode.
+
+    The tensor is never rearranged in memory, which would take longer than the product.
+    """
+    before, after = tensor.shape[:mode], tensor.shape[mode + 1 :]
+    if not after:
+        return tensor @ matrix.T
+    fibres = tensor.reshape(*before, tensor.shape[mode], -1)
+    return (matrix @ fibres).reshape(*before, len(matrix), *after)
 
 
 def decompose(tensor: Floats) -> Multilinear:

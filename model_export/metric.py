@@ -16,8 +16,9 @@ from service.motion.conventions import Floats
 
 # Every joint carries a sphere of skin of this radius, so that a turn about a bone counts too, m.
 SHELL = 0.03
-# Poses over which the metric is averaged: it is flat in their number far below this.
-POSES = 400
+# Poses over which the metric is averaged: from half as many on the truncation error is the same to
+# three digits, on the procedural family and on real motion.
+POSES = 100
 # Directions that move almost nothing weigh no less than this share of the heaviest.
 FLOOR = 1e-6
 
@@ -56,7 +57,7 @@ def _right_jacobian(v: Floats) -> Floats:
     """Matrix (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     safe = np.maximum(angle, 1e-4)
-    cross = np.cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    cross = quat.cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
     first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
     second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
     return np.eye(3) - first * cross + second * cross @ cross
@@ -68,7 +69,7 @@ def _motions(positions: Floats, axes: Floats) -> Floats:
     motions = np.zeros((poses, 3 + 3 * joints, 6))
     motions[:, :3, 3:] = np.eye(3)
     motions[:, 3:, :3] = axes.reshape(poses, -1, 3)
-    motions[:, 3:, 3:] = np.cross(positions[:, :, None], axes).reshape(poses, -1, 3)
+    motions[:, 3:, 3:] = quat.cross(positions[:, :, None], axes).reshape(poses, -1, 3)
     return motions
 
 
@@ -86,8 +87,8 @@ def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> 
     first = np.repeat(np.einsum("jk,pkc->pjc", carried, moments), 3, axis=1)
     turning = np.repeat(np.einsum("jk,pkcd->pjcd", carried, inertia, optimize=True), 3, axis=1)
     spin, drift = motions[..., :3], motions[..., 3:]
-    force = np.cross(spin, first) + mass_below * drift
-    moment = np.einsum("pdcx,pdx->pdc", turning, spin) + np.cross(first, drift)
+    force = quat.cross(spin, first) + mass_below * drift
+    moment = np.einsum("pdcx,pdx->pdc", turning, spin) + quat.cross(first, drift)
     return np.concatenate([moment, force], axis=-1)
 
 

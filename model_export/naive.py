@@ -1,10 +1,11 @@
 """Naive kriging, the paper's baseline: a variogram and a kriging system for every frame.
 
-This is what Mukai & Kuriyama (TOG 2005) do and what the multilinear model is measured against. It is
-a reference: nothing of it ships. The dissimilarity of two poses is the distance between their
+This is what Mukai & Kuriyama (TOG 2005) do and what the multilinear model is measured against: a
+reference, of which nothing ships. The dissimilarity of two poses is the distance between their
 joints; pose vectors are interpolated as they are.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,10 @@ from model_export import kriging, variogram
 from model_export.covariance import COVARIANCES
 from model_export.kriging import Hyper, Kriging
 from model_export.net import Net
+from model_export.variogram import Experimental, Fit
 from service.motion.conventions import Floats
+
+Fitter = Callable[[Experimental, str], Fit]
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Naive:
     def onnx(self, net: Net, points: str) -> str:
         """Pose vectors (T, D) at one point (1, d): weights from the inverse of each frame's system,
         and the average of the full samples by them, as the paper describes it."""
-        basis = self._basis(net, points)
+        basis = self.basis(net, points)
         inverse = np.stack([field.inverse[:, : len(field.samples)] for field in self.fields])
         weights = net("MatMul", basis, net.weights("inverses", inverse))
         samples = net.weights("values", self.values.transpose(1, 0, 2))
@@ -45,16 +49,16 @@ class Naive:
                 for field, values in zip(self.fields, self.values.swapaxes(0, 1), strict=True)
             ]
         )
-        product = net("MatMul", self._basis(net, points), net.weights("duals", duals))
+        product = net("MatMul", self.basis(net, points), net.weights("duals", duals))
         return net("Squeeze", product, net.indices(1))
 
-    def _basis(self, net: Net, points: str) -> str:
+    def basis(self, net: Net, points: str) -> str:
         """Covariances and drift (T, 1, n + k) of one point in every frame's own field."""
         samples = self.fields[0].samples
-        gaps = net("Sub", points, net.weights("samples", samples))
+        gaps = net("Sub", points, net.weights("naive_samples", samples))
         squared = net("ReduceSum", net("Mul", gaps, gaps), net.indices(1), keepdims=0)
         worth = np.array([field.hyper.scales[:1] ** 2 for field in self.fields])
-        near = net("Mul", net.weights("squared_scales", worth), squared)
+        near = net("Mul", net.weights("naive_scales", worth), squared)
         covariance = COVARIANCES[self.fields[0].hyper.covariance].onnx(net, near)
         one = net.weights("one", np.ones((1, 1)))
         drift = net("Concat", one, points, axis=1)
@@ -63,13 +67,18 @@ class Naive:
         return net("Unsqueeze", both, net.indices(1))
 
 
-def fit(points: Floats, positions: Floats, values: Floats, covariance: str) -> Naive:
-    """Naive field of pose vectors (N, T, D) with joint positions (N, T, J, 3) at points (N, d)."""
+def fit(
+    points: Floats, positions: Floats, values: Floats, covariance: str, fitter: Fitter
+) -> Naive:
+    """Naive field of pose vectors (N, T, D) with joint positions (N, T, J, 3) at points (N, d).
+
+    fitter: how each frame's variogram is fitted.
+    """
     fields = []
     for frame in range(values.shape[1]):
         poses = positions[:, frame].reshape(len(points), -1)
         left = variogram.residuals(points, poses, 1)
-        found = variogram.fit(variogram.experimental(points, left), covariance)
+        found = fitter(variogram.experimental(points, left), covariance)
         nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
         scales = np.full(points.shape[1], 1.0 / found.range)
         hyper = Hyper(covariance, 1, scales, float(nugget))

@@ -37,10 +37,11 @@ class Net:
         self._nodes.append(helper.make_node("Identity", [value], [name]))
 
     def weights(self, name: str, array: npt.NDArray[Any]) -> str:
-        """A named constant, float32 unless it holds integers."""
+        """A named constant, float32 unless it holds integers; a name stands for one content."""
         kind = np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32
         tensor = numpy_helper.from_array(np.ascontiguousarray(array, dtype=kind), name)
-        self._constants[name] = tensor
+        if self._constants.setdefault(name, tensor) != tensor:
+            raise ValueError(f"two different constants named {name!r}")
         return name
 
     def number(self, value: float) -> str:

@@ -47,15 +47,33 @@ def build(
     rotations, flipped = flips.without_flips(aligned.rotations, small)
     own_chart, far = chart.fit(rotations)
     numbers = own_chart.numbers(rotations, aligned.root_path)
+    return whitened(numbers, own_chart, parents, offsets, joint_weights), flipped + far
+
+
+def whitened(
+    numbers: Floats,
+    own_chart: Chart,
+    parents: tuple[int, ...],
+    offsets: Floats,
+    joint_weights: Floats,
+) -> MotionTensor:
+    """Tensor of pose vectors (N, T, D) in the metric of their own poses."""
     mean = numbers.mean(axis=(0, 1))
     varies = np.ptp(numbers, axis=(0, 1)) > CONSTANT
     gram = _gram(numbers, own_chart, parents, offsets, joint_weights)
     root, inverse = metric.whitening(gram[np.ix_(varies, varies)])
     whiten, unwhiten = np.zeros((2, len(root), len(mean)))
     whiten[:, varies], unwhiten[:, varies] = root, inverse
-    values = np.ascontiguousarray(((numbers - mean) @ whiten.T).transpose(2, 1, 0))
-    weight = float(joint_weights.sum())
-    return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, weight), flipped + far
+    values = _whitened(numbers, mean, whiten)
+    return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, float(joint_weights.sum()))
+
+
+def _whitened(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
+    """Tensor (D', T, N) of pose vectors (N, T, D), its long axes turned in small blocks."""
+    samples, frames, _ = numbers.shape
+    flat = whiten @ numbers.reshape(samples * frames, -1).T
+    flat -= (whiten @ mean)[:, None]
+    return np.ascontiguousarray(flat.reshape(-1, samples, frames).swapaxes(1, 2))
 
 
 def _gram(

@@ -8,6 +8,7 @@ taken on what least squares leaves over: a trend in the data would otherwise pas
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from model_export import kriging
 from model_export.covariance import COVARIANCES
@@ -92,3 +93,24 @@ def _lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Flo
     nuggets = mean_y - slopes * mean_x
     slopes = np.where(nuggets < 0.0, through_zero, slopes)
     return np.maximum(nuggets, 0.0), slopes
+
+
+def fit_by_search(experimental: Experimental, covariance: str) -> Fit:
+    """The same least squares by a general solver over nugget, sill and range at once.
+
+    It is how such fits are commonly made, and what the naive method is timed with.
+    """
+    top, far = float(experimental.values.max()), float(experimental.distances.max())
+    roots = np.sqrt(experimental.pairs) / np.maximum(experimental.values, 1e-30)
+
+    def misfit(x: Floats) -> Floats:
+        squared = np.square(experimental.distances / x[2])
+        return roots * (
+            x[0] + x[1] * (1.0 - COVARIANCES[covariance].numpy(squared)) - experimental.values
+        )
+
+    low, high = [0.0, 0.0, RANGES[0]], [2.0 * top, 10.0 * top, RANGES[-1]]
+    found = least_squares(
+        misfit, [0.1 * top, 0.9 * top, 0.5 * far], bounds=(low, high), x_scale=[top, top, far]
+    )
+    return Fit(*map(float, found.x))

@@ -26,17 +26,10 @@ class Session:
     runtime: Any
 
     def run(self, controls: Floats, time: Floats, *outputs: str) -> list[Floats]:
-        """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for.
-
-        Only what leads to the outputs is computed.
-        """
+        """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for."""
         feed = {"controls": controls.astype(np.float32), "time": time.astype(np.float32)}
-        answers: list[Floats] = self.runtime.run(list(outputs), feed, _ONLY_WHAT_IS_ASKED)
+        answers: list[Floats] = self.runtime.run(list(outputs), feed)
         return answers
-
-
-_ONLY_WHAT_IS_ASKED = onnxruntime.RunOptions()
-_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True
 
 
 def load(path: Path) -> Session:

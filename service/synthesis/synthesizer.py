@@ -45,10 +45,10 @@ class Synthesizer:
         if not 1 <= len(times) <= MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
         when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
-        duration = float(self.session.run(point, np.zeros((1, 1)), "duration")[0][0])
+        answer = self._answer(point, when, controls, warnings)
         for index, value in enumerate(when):
-            _within(f"times/{index}", value, 0.0, duration, "s")
-        return self._answer(point, when, controls, warnings)
+            _within(f"times/{index}", value, 0.0, answer.trust.duration, "s")
+        return answer
 
     def clip(
         self,

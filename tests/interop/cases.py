@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import trained
 
 from service.encode import ENCODERS, names
 from service.motion import clip as clips
@@ -47,6 +48,7 @@ def answers() -> list[tuple[str, ClipAnswer]]:
         ("film", _answer(frames=45, rate=29.97)),
         ("fast", _answer(frames=100, rate=60.0)),
         ("pose", _answer(frames=1, rate=30.0)),
+        *trained.answers(),
     ]
 
 

@@ -1,0 +1,62 @@
+"""Rows of the benchmark's table, and fair timing."""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure: value in unit; ratio to the baseline; goal for the ratio, or for the value where
+    there is no ratio, met upwards for ratios and downwards for values."""
+
+    name: str
+    value: float
+    unit: str
+    baseline: str
+    ratio: float | None
+    goal: float | None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the goal is met; None where there is none."""
+        if self.goal is None:
+            return None
+        return self.value <= self.goal if self.ratio is None else self.ratio >= self.goal
+
+
+def in_turn(runs: dict[str, Callable[[], object]], rounds: int, repeats: int) -> dict[str, float]:
+    """Median seconds of a call of each, timed one after the other in every round."""
+    taken: dict[str, list[float]] = {name: [] for name in runs}
+    for run in runs.values():
+        run()
+    for _ in range(rounds):
+        for name, run in runs.items():
+            start = time.perf_counter()
+            for _ in range(repeats):
+                run()
+            taken[name].append((time.perf_counter() - start) / repeats)
+    return {name: median(times) for name, times in taken.items()}
+
+
+def table(rows: list[Row]) -> str:
+    """The rows as a Markdown table."""
+    lines = ["| what | value | against | ratio | goal | met |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        ratio = "" if row.ratio is None else f"{row.ratio:.1f}"
+        goal = "" if row.goal is None else f"{row.goal:g}"
+        met = {True: "yes", False: "**no**", None: ""}[row.met]
+        lines.append(
+            f"| {row.name} | {row.value:.3g} {row.unit} | {row.baseline} | {ratio} | {goal} | {met} |"
+        )
+    return "\n".join(lines)
+
+
+def write(rows: list[Row], path: Path) -> None:
+    """The rows as JSON: a list of objects."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    listed = [{**asdict(row), "met": row.met} for row in rows]
+    path.write_text(json.dumps(listed, indent=2) + "\n")
