@@ -49,9 +49,8 @@ def table(rows: list[Row]) -> str:
         ratio = "" if row.ratio is None else f"{row.ratio:.1f}"
         goal = "" if row.goal is None else f"{row.goal:g}"
         met = {True: "yes", False: "**no**", None: ""}[row.met]
-        lines.append(
-            f"| {row.name} | {row.value:.3g} {row.unit} | {row.baseline} | {ratio} | {goal} | {met} |"
-        )
+        value = f"{row.value:.3g} {row.unit}"
+        lines.append(f"| {row.name} | {value} | {row.baseline} | {ratio} | {goal} | {met} |")
     return "\n".join(lines)
 
 

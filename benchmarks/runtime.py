@@ -72,12 +72,12 @@ RIVALS = (
         "the full samples by them, then interpolation to the times asked for",
         15.0,
     ),
-    ("dual", WORDS + "the same with inverse and samples multiplied beforehand", None),
+    ("dual", WORDS + "the same with inverse and samples multiplied beforehand", 15.0),
     (
         "gathered",
         WORDS + "for each time asked for its two frames' inverses and samples are gathered, as the "
         "time basis is in ours",
-        None,
+        15.0,
     ),
 )
 
