@@ -58,7 +58,7 @@ def _ours(made: Family) -> kriging.Kriging:
     points = made.trained.model.bank.pose.samples
     weights = np.ones(len(made.parents))
     chart = made.trained.tensor.chart
-    own = tensor.whitened(made.vectors, chart, made.parents, made.offsets, weights)
+    own = tensor.build(made.vectors, chart, made.parents, made.offsets, weights)
     full = hosvd.decompose(own.values)
     motions = full.bases[2] * np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
     return kriging.solve(tune.first_guess(points, motions, "matern52", 1), points, full.bases[2])

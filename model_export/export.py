@@ -144,9 +144,7 @@ def _diagnostics(
     hyper = trained.pose.hyper
     return {
         "truncation_rms_m": _round(trained.tensor.rms(np.array(max(cut, 0.0)))),
-        "leave_one_out_rms_m": _round(
-            trained.tensor.rms(np.sum(np.square(trained.pose.residuals)))
-        ),
+        "leave_one_out_rms_m": _round(np.sqrt(trained.missed.mean())),
         "explained": {name: _round(share) for name, share in trained.explained.items()},
         "covariance": hyper.covariance,
         "drift": hyper.drift,

@@ -8,6 +8,7 @@ from model_export.decoder import Decoder, Proportions
 from model_export.field_bank import FieldBank, Spread
 from model_export.net import Net, Shapes
 from model_export.timing import Timing
+from model_export.travel import Travel
 from service.motion import skeleton
 from service.motion.conventions import Floats
 
@@ -33,19 +34,22 @@ class Outputs:
 
 @dataclass(frozen=True)
 class Model:
-    """The stages of a trained model."""
+    """The stages of a trained model; only that of a cycle travels apart from its poses."""
 
     bank: FieldBank
     spread: Spread
     timing: Timing
     decoder: Decoder
     proportions: Proportions
+    travel: Travel | None
 
     def evaluate(self, controls: Floats, time: Floats) -> Outputs:
         """Answer to controls (B, d) in their own units and times (B, S), s."""
         fields = self.bank.numpy(controls)
         duration, place = self.timing.numpy(fields["duration"], fields["warp"], time)
         rotations, root = self.decoder.numpy(fields["pose"], place)
+        if self.travel:
+            rotations, root = self.travel.numpy(rotations, root, fields["travel"], place)
         offsets = self.proportions.numpy(fields["offsets"])
         sigma = self.spread.numpy(self.bank.points(controls))
         return Outputs(rotations, root, offsets, duration, sigma)
@@ -56,6 +60,8 @@ class Model:
         basis, fields = self.bank.onnx(net, "controls")
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         rotations, root = self.decoder.onnx(net, fields["pose"], place)
+        if self.travel:
+            rotations, root = self.travel.onnx(net, rotations, root, fields["travel"], place)
         net.named("rotations", rotations)
         net.named("root_position", root)
         net.named("bone_offsets", self.proportions.onnx(net, fields["offsets"]))

@@ -36,28 +36,30 @@ class MotionTensor:
         return np.sqrt(squared / (self.weight * frames * samples))
 
 
-def build(
-    aligned: Aligned, parents: tuple[int, ...], offsets: Floats, joint_weights: Floats
-) -> tuple[MotionTensor, list[Finding]]:
-    """Tensor of aligned clips, and the flips and far joints that were noticed on the way.
+def pose_vectors(
+    aligned: Aligned, parents: tuple[int, ...], offsets: Floats
+) -> tuple[Floats, Chart, list[Finding]]:
+    """Pose vectors (N, T, D) of aligned clips, their chart, and the flips and far joints met.
 
-    offsets (N, J, 3): bone offsets of each clip's performer, m. joint_weights (J,).
+    offsets (N, J, 3): bone offsets of each clip's performer, m.
     """
     small = flips.small_joints(parents, offsets.mean(axis=0))
     rotations, flipped = flips.without_flips(aligned.rotations, small)
     own_chart, far = chart.fit(rotations)
-    numbers = own_chart.numbers(rotations, aligned.root_path)
-    return whitened(numbers, own_chart, parents, offsets, joint_weights), flipped + far
+    return own_chart.numbers(rotations, aligned.root_path), own_chart, flipped + far
 
 
-def whitened(
+def build(
     numbers: Floats,
     own_chart: Chart,
     parents: tuple[int, ...],
     offsets: Floats,
     joint_weights: Floats,
 ) -> MotionTensor:
-    """Tensor of pose vectors (N, T, D) in the metric of their own poses."""
+    """Tensor of pose vectors (N, T, D) in the metric of their own poses.
+
+    offsets (N, J, 3): bone offsets of each clip's performer, m. joint_weights (J,).
+    """
     mean = numbers.mean(axis=(0, 1))
     varies = np.ptp(numbers, axis=(0, 1)) > CONSTANT
     gram = _gram(numbers, own_chart, parents, offsets, joint_weights)

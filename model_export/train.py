@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import align, hosvd, kriging, ranks, tensor, tune
+from model_export import align, hosvd, kriging, ranks, tensor, travel, tune
 from model_export.align import Aligned
 from model_export.decoder import Decoder, Proportions
 from model_export.field_bank import Constant, Field, FieldBank, Spread
@@ -16,6 +16,7 @@ from model_export.model import Model
 from model_export.recipe import Recipe
 from model_export.tensor import MotionTensor
 from model_export.timing import Timing
+from model_export.travel import Travel
 from model_export.tune import Tuned
 from model_export.warp import WarpBasis
 from service.motion.conventions import Floats
@@ -32,9 +33,9 @@ SAME_BONE = 5e-4
 class Trained:
     """A model with what it was made from and what was seen on the way.
 
-    points (N, d): controls in half-ranges. pose: the tuned pose field. explained: for each field
-    the share of the variation between clips that leave-one-out predicts from the controls; one
-    at or below zero is answered with its mean.
+    pose: the tuned pose field. missed (N,): mean squared joint distance, m², of each clip from what
+    all others predict for it. explained: for each field the share of the variation between clips
+    that leave-one-out predicts from the controls; one at or below zero is answered with its mean.
     """
 
     model: Model
@@ -43,6 +44,7 @@ class Trained:
     tensor: MotionTensor
     full: Multilinear
     pose: Tuned
+    missed: Floats
     explained: dict[str, float]
     findings: list[Finding]
 
@@ -63,39 +65,42 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     offsets = np.stack([example.offsets for example in examples])
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
-    own_tensor, noticed = tensor.build(aligned, parents, offsets, weights)
+    others: dict[str, Floats] = {}
+    if recipe.motion.cyclic:
+        aligned, others["travel"] = travel.take_out(aligned)
+    numbers, own_chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
+    own_tensor = tensor.build(numbers, own_chart, parents, offsets, weights)
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
     low, high = controls.min(axis=0), controls.max(axis=0)
     points = (2.0 * controls - low - high) / (high - low)
+    proportions, others["offsets"] = _proportions(offsets)
+    others |= {"duration": np.log(aligned.durations)[:, None], "warp": aligned.logs}
+    fitted = {name: _fit(recipe, points, values) for name, values in others.items()}
     pose = _tuned(recipe, points, full.bases[2] * _spectrum(full))
     reduced = full.truncated(_ranks(recipe, own_tensor, full, len(points) + len(names) + 1))
-    proportions, bones = _proportions(offsets)
-    others = {
-        "offsets": bones,
-        "duration": np.log(aligned.durations)[:, None],
-        "warp": aligned.logs,
-    }
-    fields = {name: _field(recipe, points, values) for name, values in others.items()}
     solved = kriging.solve(pose.hyper, points, reduced.bases[2])
-    bank = FieldBank(low, high, solved, {name: field for name, (field, _) in fields.items()})
-    sill = pose.sill / (own_tensor.weight * recipe.motion.frames)
+    missed = np.sum(np.square(pose.residuals), axis=1) / (own_tensor.weight * recipe.motion.frames)
+    if recipe.motion.cyclic:
+        missed += travel.spread(fitted["travel"].residuals)
     return Trained(
         model=Model(
-            bank,
-            Spread(solved, sill),
+            FieldBank(low, high, solved, {name: found.field for name, found in fitted.items()}),
+            Spread(solved, float(np.mean(missed / pose.variances))),
             Timing(basis, recipe.motion.frames),
-            Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means),
+            Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_chart.means),
             proportions,
+            Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
         ),
         skeleton=_mean_skeleton(examples, offsets),
         aligned=aligned,
         tensor=own_tensor,
         full=full,
         pose=pose,
+        missed=missed,
         explained={
             "pose": 1.0 - pose.unexplained,
-            **{name: share for name, (_, share) in fields.items()},
+            **{name: found.explained for name, found in fitted.items()},
         },
         findings=findings + noticed,
     )
@@ -123,16 +128,26 @@ def _tuned(recipe: Recipe, points: Floats, values: Floats) -> Tuned:
     return tune.tune(guess, points, values, settings.nugget)
 
 
-def _field(recipe: Recipe, points: Floats, values: Floats) -> tuple[Field, float]:
-    """Field of values (N, m) and the share of their variation that the controls explain."""
+@dataclass(frozen=True)
+class _Fitted:
+    """A field, the share of the variation that it explains, and residuals (N, m) left out."""
+
+    field: Field
+    explained: float
+    residuals: Floats
+
+
+def _fit(recipe: Recipe, points: Floats, values: Floats) -> _Fitted:
+    """Field of values (N, m): of the controls, or their mean where those do not explain them."""
     if np.ptp(values, axis=0).max() == 0.0:
-        return Constant(values[0]), 0.0
+        return _Fitted(Constant(values[0]), 0.0, np.zeros_like(values))
     tuned = _tuned(recipe, points, values)
-    share = 1.0 - tuned.unexplained
+    explained = 1.0 - tuned.unexplained
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
-    if share <= 0.0 and recipe.kriging.nugget is None:
-        return Constant(values.mean(axis=0)), share
-    return kriging.solve(tuned.hyper, points, values), share
+    if explained <= 0.0 and recipe.kriging.nugget is None:
+        from_mean = (values - values.mean(axis=0)) * len(values) / (len(values) - 1)
+        return _Fitted(Constant(values.mean(axis=0)), explained, from_mean)
+    return _Fitted(kriging.solve(tuned.hyper, points, values), explained, tuned.residuals)
 
 
 def _ranks(

@@ -24,13 +24,15 @@ class Tuned:
     """A chosen field: residuals (n, m) of its leave-one-out, their share of the mean's, its sill.
 
     unexplained: squared residuals over those of leaving the controls out and taking the mean of
-    the others; at one or above the controls explain nothing. sill: of the sum over values.
+    the others; at one or above the controls explain nothing. variances (n,): of the residuals, as
+    shares of the sill. sill: of the sum over values.
     """
 
     hyper: Hyper
     inverse: Floats
     residuals: Floats
     unexplained: float
+    variances: Floats
     sill: float
 
 
@@ -54,6 +56,7 @@ def fixed(hyper: Hyper, samples: Floats, values: Floats) -> Tuned:
         inverse,
         residuals,
         float(np.sum(np.square(residuals))) / total if total > 0 else 1.0,
+        variances,
         float(np.mean(np.sum(np.square(residuals), axis=1) / variances)),
     )
 

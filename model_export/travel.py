@@ -1,0 +1,90 @@
+"""What a cycle does not come back to: where the root has got to, and where it heads.
+
+The last pose of a cycle leads into the first. Taken out of the root, evenly over the cycle, travel
+leaves a tensor whose last frame is its first, and so it is after any truncation: a synthesised
+cycle closes exactly. Travel is kriged beside it and put back at the end.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model_export.align import Aligned
+from model_export.net import Net
+from service.motion import quat
+from service.motion.conventions import UP, Floats
+
+# A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.
+TURN = quat.mul(quat.about(UP, np.array(np.pi)), np.eye(4))
+# A slice to the end, however long the axis is.
+END = 2**31 - 1
+
+
+def take_out(aligned: Aligned) -> tuple[Aligned, Floats]:
+    """Clips (N) that return to where they began, and how far each got (N, 3).
+
+    Travel is the way to the left, the way forward, m, and the change of heading, rad.
+    """
+    turned = quat.mul(aligned.rotations[:, -1, 0], quat.conj(aligned.rotations[:, 0, 0]))
+    way = aligned.root_path[:, -1] - aligned.root_path[:, 0]
+    travel = np.stack([way[:, 0], way[:, 2], quat.twist(turned, UP)], axis=1)
+    share = np.linspace(0.0, 1.0, aligned.rotations.shape[1])
+    rotations, root_path = put_back(aligned.rotations, aligned.root_path, -travel, share)
+    # All else was closed before alignment: what is left is rounding.
+    rotations[:, -1], root_path[:, -1] = rotations[:, 0], root_path[:, 0]
+    return replace(aligned, rotations=rotations, root_path=root_path), travel
+
+
+def put_back(
+    rotations: Floats, root_path: Floats, travel: Floats, share: Floats
+) -> tuple[Floats, Floats]:
+    """Rotations (B, S, J, 4) and root path (B, S, 3) that go their way (B, 3).
+
+    share (..., S): how much of the way each frame has behind it.
+    """
+    gone = share[..., None] * travel[:, None]
+    moved = root_path + gone[..., :2] @ np.eye(3)[[0, 2]]
+    turned = rotations.copy()
+    turned[:, :, 0] = quat.mul(quat.about(UP, gone[..., 2]), rotations[:, :, 0])
+    return turned, moved
+
+
+def spread(residuals: Floats) -> Floats:
+    """Mean squared distance (N,), m², that errors of travel (N, 3) put all joints at.
+
+    An error grows evenly from nothing: its square is a third of its end's on average. That of the
+    heading turns the body about the root, which moves its joints by far less, and is left out.
+    """
+    return np.sum(np.square(residuals[:, :2]), axis=1) / 3.0
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Travel of a cycle of so many canonical frames."""
+
+    frames: int
+
+    def numpy(
+        self, rotations: Floats, root: Floats, travel: Floats, place: Floats
+    ) -> tuple[Floats, Floats]:
+        """Rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) put back.
+
+        place (B, S): canonical frames.
+        """
+        return put_back(rotations, root, travel, place / (self.frames - 1))
+
+    def onnx(self, net: Net, rotations: str, root: str, travel: str, place: str) -> tuple[str, str]:
+        """The same in a graph; canonical frames are (B, S, 1) there."""
+        share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
+        gone = net("Mul", share, net("Unsqueeze", travel, net.indices(1)))
+        axes = np.vstack([np.eye(3)[[0, 2]], np.zeros(3)])
+        moved = net("Add", root, net("MatMul", gone, net.weights("travel_axes", axes)))
+        # Half the angle, with axes for the root's four numbers: (B, S, 1, 1).
+        angle = net("MatMul", gone, net.weights("travel_turn", np.array([[0.0], [0.0], [0.5]])))
+        half = net("Unsqueeze", angle, net.indices(3))
+        joints = net.indices(2)
+        own = net("Slice", rotations, net.indices(0), net.indices(1), joints)
+        others = net("Slice", rotations, net.indices(1), net.indices(END), joints)
+        across = net("MatMul", own, net.weights("travel_quarter", TURN))
+        turned = net("Add", net("Mul", own, net("Cos", half)), net("Mul", across, net("Sin", half)))
+        return net("Concat", turned, others, axis=2), moved
