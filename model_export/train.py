@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import align, hosvd, kriging, ranks, tensor, travel, tune
+from model_export import align, fields, hosvd, kriging, ranks, tensor, travel
 from model_export.align import Aligned
-from model_export.decoder import Decoder, Proportions
-from model_export.field_bank import Constant, Field, FieldBank, Spread
+from model_export.chart import Chart
+from model_export.decoder import Decoder
+from model_export.field_bank import FieldBank, Spread
+from model_export.fields import Fitted
 from model_export.flips import Finding, without_jumps
 from model_export.hosvd import Multilinear
 from model_export.ingest import Example
@@ -24,9 +26,6 @@ from service.motion.skeleton import Skeleton
 
 Report = Callable[[str], None]
 """Is told what is being done, in a few words."""
-
-# Bone offsets that a model cannot tell apart, m.
-SAME_BONE = 5e-4
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,17 @@ class Trained:
     findings: list[Finding]
 
 
+@dataclass(frozen=True)
+class _Moved:
+    """Aligned clips as pose vectors (N, T, D); travels (N, 3) are a cycle's, and empty else."""
+
+    aligned: Aligned
+    numbers: Floats
+    chart: Chart
+    travels: dict[str, Floats]
+    findings: list[Finding]
+
+
 def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Trained:
     """Model of a recipe's examples.
 
@@ -57,64 +67,79 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     controls = np.stack([example.controls for example in examples])
     names = tuple(control.name for control in recipe.controls)
     kriging.check(controls, names, recipe.kriging.drift, recipe.kriging.nugget == 0)
-    examples, findings = _clean(examples)
-    weights = _joint_weights(recipe, examples)
-    basis = WarpBasis(recipe.alignment.knots)
     report(f"aligning {len(examples)} clips")
-    aligned = align.align(examples, recipe.motion.frames, basis, recipe.alignment.rounds, weights)
-    offsets = np.stack([example.offsets for example in examples])
+    weights = _joint_weights(recipe, examples[0].clip.skeleton)
+    moved = _move(recipe, examples, weights)
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
-    others: dict[str, Floats] = {}
-    if recipe.motion.cyclic:
-        aligned, others["travel"] = travel.take_out(aligned)
-    numbers, own_chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
-    own_tensor = tensor.build(numbers, own_chart, parents, offsets, weights)
+    offsets = np.stack([example.offsets for example in examples])
+    own_tensor = tensor.build(moved.numbers, moved.chart, parents, offsets, weights)
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
+    return _fit(recipe, examples, controls, moved, own_tensor, full)
+
+
+def _joint_weights(recipe: Recipe, skeleton: Skeleton) -> Floats:
+    return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in skeleton.names])
+
+
+def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
+    """Clips cleaned, aligned and written as pose vectors."""
+    cleaned = [without_jumps(example.clip, index) for index, example in enumerate(examples)]
+    jumps = [finding for _, found in cleaned for finding in found]
+    clean = [replace(e, clip=clip) for e, (clip, _) in zip(examples, cleaned, strict=True)]
+    basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
+    aligned = align.align(clean, recipe.motion.frames, basis, settings.rounds, weights)
+    travels = {}
+    if recipe.motion.cyclic:
+        aligned, travels["travel"] = travel.take_out(aligned)
+    offsets = np.stack([example.offsets for example in examples])
+    parents = examples[0].clip.skeleton.parents
+    numbers, chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
+    return _Moved(aligned, numbers, chart, travels, jumps + noticed)
+
+
+def _fit(
+    recipe: Recipe,
+    examples: Sequence[Example],
+    controls: Floats,
+    moved: _Moved,
+    own_tensor: MotionTensor,
+    full: Multilinear,
+) -> Trained:
+    """Every field at its own parameters, and the stages that they feed."""
     low, high = controls.min(axis=0), controls.max(axis=0)
     points = (2.0 * controls - low - high) / (high - low)
-    proportions, others["offsets"] = _proportions(offsets)
-    others |= {"duration": np.log(aligned.durations)[:, None], "warp": aligned.logs}
-    fitted = {name: _fit(recipe, points, values) for name, values in others.items()}
-    pose = _tuned(recipe, points, full.bases[2] * _spectrum(full))
-    reduced = full.truncated(_ranks(recipe, own_tensor, full, len(points) + len(names) + 1))
+    offsets = np.stack([example.offsets for example in examples])
+    proportions, bones = fields.proportions(offsets)
+    durations = np.log(moved.aligned.durations)[:, None]
+    beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
+    fitted = {k: fields.fit(recipe.kriging, points, values) for k, values in beside.items()}
+    pose = fields.tuned(recipe.kriging, points, full.bases[2] * _spectrum(full))
+    reduced = full.truncated(_ranks(recipe, own_tensor, full, sum(controls.shape) + 1))
     solved = kriging.solve(pose.hyper, points, reduced.bases[2])
-    missed = np.sum(np.square(pose.residuals), axis=1) / (own_tensor.weight * recipe.motion.frames)
-    if recipe.motion.cyclic:
-        missed += travel.spread(fitted["travel"].residuals)
-    return Trained(
-        model=Model(
-            FieldBank(low, high, solved, {name: found.field for name, found in fitted.items()}),
-            Spread(solved, float(np.mean(missed / pose.variances))),
-            Timing(basis, recipe.motion.frames),
-            Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_chart.means),
-            proportions,
-            Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
-        ),
-        skeleton=_mean_skeleton(examples, offsets),
-        aligned=aligned,
-        tensor=own_tensor,
-        full=full,
-        pose=pose,
-        missed=missed,
-        explained={
-            "pose": 1.0 - pose.unexplained,
-            **{name: found.explained for name, found in fitted.items()},
-        },
-        findings=findings + noticed,
+    missed = _missed(own_tensor, pose, fitted)
+    others = {name: found.field for name, found in fitted.items()}
+    model = Model(
+        FieldBank(low, high, solved, others),
+        Spread(solved, float(np.mean(missed / pose.variances))),
+        Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
+        Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, moved.chart.means),
+        proportions,
+        Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
     )
-
-
-def _clean(examples: Sequence[Example]) -> tuple[list[Example], list[Finding]]:
-    pairs = [without_jumps(example.clip, index) for index, example in enumerate(examples)]
-    clean = [replace(e, clip=clip) for e, (clip, _) in zip(examples, pairs, strict=True)]
-    return clean, [finding for _, found in pairs for finding in found]
-
-
-def _joint_weights(recipe: Recipe, examples: Sequence[Example]) -> Floats:
-    given = recipe.motion.joint_weights
-    return np.array([given.get(name, 1.0) for name in examples[0].clip.skeleton.names])
+    explained = {name: found.explained for name, found in fitted.items()}
+    return Trained(
+        model,
+        _mean_skeleton(examples, offsets),
+        moved.aligned,
+        own_tensor,
+        full,
+        pose,
+        missed,
+        {"pose": 1.0 - pose.unexplained, **explained},
+        moved.findings,
+    )
 
 
 def _spectrum(full: Multilinear) -> Floats:
@@ -122,37 +147,22 @@ def _spectrum(full: Multilinear) -> Floats:
     return np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
 
 
-def _tuned(recipe: Recipe, points: Floats, values: Floats) -> Tuned:
-    settings = recipe.kriging
-    guess = tune.first_guess(points, values, settings.covariance, settings.drift)
-    return tune.tune(guess, points, values, settings.nugget)
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    """A field, the share of the variation that it explains, and residuals (N, m) left out."""
-
-    field: Field
-    explained: float
-    residuals: Floats
-
-
-def _fit(recipe: Recipe, points: Floats, values: Floats) -> _Fitted:
-    """Field of values (N, m): of the controls, or their mean where those do not explain them."""
-    if np.ptp(values, axis=0).max() == 0.0:
-        return _Fitted(Constant(values[0]), 0.0, np.zeros_like(values))
-    tuned = _tuned(recipe, points, values)
-    explained = 1.0 - tuned.unexplained
-    # Where the recipe gives a nugget, it has decided that the controls explain the samples.
-    if explained <= 0.0 and recipe.kriging.nugget is None:
-        from_mean = (values - values.mean(axis=0)) * len(values) / (len(values) - 1)
-        return _Fitted(Constant(values.mean(axis=0)), explained, from_mean)
-    return _Fitted(kriging.solve(tuned.hyper, points, values), explained, tuned.residuals)
+def _missed(own_tensor: MotionTensor, pose: Tuned, fitted: dict[str, Fitted]) -> Floats:
+    """Mean squared joint distance (N,), m², of each clip from what the others predict."""
+    frames = own_tensor.values.shape[1]
+    missed = np.sum(np.square(pose.residuals), axis=1) / (own_tensor.weight * frames)
+    if "travel" in fitted:
+        missed += travel.spread(fitted["travel"].residuals)
+    return missed
 
 
 def _ranks(
     recipe: Recipe, own_tensor: MotionTensor, full: Multilinear, weights: int
 ) -> tuple[int, int, int]:
+    """The recipe's ranks, or the smallest within its budget.
+
+    weights: numbers stored for one more sample direction.
+    """
     size = recipe.size
     if size.ranks is not None:
         return ranks.given(full.core, size.ranks)
@@ -162,24 +172,6 @@ def _ranks(
     # One more direction is stored as four numbers a joint and three of the root.
     directions = 4 * len(own_tensor.chart.means) + 3
     return ranks.smallest(full.core, allowed, (directions, frames, weights))
-
-
-def _proportions(offsets: Floats) -> tuple[Proportions, Floats]:
-    """Mean and directions of bone offsets (N, J, 3), and each clip's coefficients (N, r)."""
-    mean = offsets.mean(axis=0)
-    centred = (offsets - mean).reshape(len(offsets), -1)
-    left, values, right = np.linalg.svd(centred, full_matrices=False)
-    rank = 1
-    while rank < len(values) and _worst(centred, left, values, right, rank) > SAME_BONE:
-        rank += 1
-    signs = np.sign(right[np.arange(rank), np.argmax(np.round(np.abs(right[:rank]), 9), axis=1)])
-    directions = (signs[:, None] * right[:rank]).reshape(rank, -1, 3)
-    return Proportions(mean, directions), left[:, :rank] * values[:rank] * signs
-
-
-def _worst(centred: Floats, left: Floats, values: Floats, right: Floats, rank: int) -> float:
-    kept = (left[:, :rank] * values[:rank]) @ right[:rank]
-    return float(np.abs(centred - kept).max())
 
 
 def _mean_skeleton(examples: Sequence[Example], offsets: Floats) -> Skeleton:

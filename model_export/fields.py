@@ -1,0 +1,63 @@
+"""What is kriged beside the pose: bone offsets, duration, warp, travel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import kriging, tune
+from model_export.decoder import Proportions
+from model_export.field_bank import Constant, Field
+from model_export.recipe import Kriging
+from model_export.tune import Tuned
+from service.motion.conventions import Floats
+
+# Bone offsets that a model need not tell apart, m.
+SAME_BONE = 5e-4
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A field, the share of the variation that it explains, and residuals (N, m) left out."""
+
+    field: Field
+    explained: float
+    residuals: Floats
+
+
+def tuned(settings: Kriging, points: Floats, values: Floats) -> Tuned:
+    """Parameters of the field of values (N, m) at points (N, d), by leave-one-out."""
+    guess = tune.first_guess(points, values, settings.covariance, settings.drift)
+    return tune.tune(guess, points, values, settings.nugget)
+
+
+def fit(settings: Kriging, points: Floats, values: Floats) -> Fitted:
+    """Field of values (N, m): of the controls, or their mean where those do not explain them."""
+    if np.ptp(values, axis=0).max() == 0.0:
+        return Fitted(Constant(values[0]), 0.0, np.zeros_like(values))
+    found = tuned(settings, points, values)
+    explained = 1.0 - found.unexplained
+    # Where the recipe gives a nugget, it has decided that the controls explain the samples.
+    if explained <= 0.0 and settings.nugget is None:
+        from_mean = (values - values.mean(axis=0)) * len(values) / (len(values) - 1)
+        return Fitted(Constant(values.mean(axis=0)), explained, from_mean)
+    return Fitted(kriging.solve(found.hyper, points, values), explained, found.residuals)
+
+
+def proportions(offsets: Floats) -> tuple[Proportions, Floats]:
+    """Mean and directions of bone offsets (N, J, 3), and each clip's coefficients (N, r)."""
+    mean = offsets.mean(axis=0)
+    centred = (offsets - mean).reshape(len(offsets), -1)
+    left, values, right = np.linalg.svd(centred, full_matrices=False)
+    rank = 1
+    while rank < len(values) and _worst(centred, left, values, right, rank) > SAME_BONE:
+        rank += 1
+    largest = np.argmax(np.round(np.abs(right[:rank]), 9), axis=1)
+    # A direction of no length has no sign either.
+    signs = np.where(right[np.arange(rank), largest] < 0, -1.0, 1.0)
+    directions = (signs[:, None] * right[:rank]).reshape(rank, -1, 3)
+    return Proportions(mean, directions), left[:, :rank] * values[:rank] * signs
+
+
+def _worst(centred: Floats, left: Floats, values: Floats, right: Floats, rank: int) -> float:
+    kept = (left[:, :rank] * values[:rank]) @ right[:rank]
+    return float(np.abs(centred - kept).max())

@@ -1,0 +1,328 @@
+"""One file that answers as the reference does, byte for byte the same every time."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+
+from model_export import export, ingest, recipe, train
+from model_export.model import Outputs
+from service.motion import quat
+from service.motion.errors import ExportRefused
+from service.synthesis import session
+from service.synthesis.session import OUTPUTS
+
+# The gate's figure, m: float32 against float64.
+GATE = 1e-4
+
+
+def posefield(*words, **environment):
+    """Run the command in a process of its own."""
+    command = str(Path(sys.executable).parent / "posefield")
+    done = subprocess.run(
+        [command, *map(str, words)],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="session")
+def full_family(reaching_folder, tmp_path_factory):
+    """The file that the whole family gives, as the command line trains it, and what it said."""
+    path = tmp_path_factory.mktemp("full") / "reaching.onnx"
+    words = ("train", reaching_folder / "recipe.toml", "-o", path, "--json")
+    return path, json.loads(posefield(*words))
+
+
+@pytest.fixture(scope="module")
+def quick_recipe(reaching_folder):
+    """Path of a recipe of one performer at few frames, which trains in a second."""
+    text = (reaching_folder / "recipe.toml").read_text()
+    head, stature, rest = re.split(r"(?s)(\[\[controls\]\]\nname = \"stature\".*?\n\n)", text)
+    assert "stature" in stature
+    text = (head + rest).replace("frames = 100", "frames = 16").replace("0.5", "2.0")
+    condition = '[clips.where]\nperformer = { among = ["middle"] }\n\n[alignment]\nrounds = 0\n\n'
+    # Beside the family's files, where its table is looked for.
+    path = reaching_folder.parent / "quick.toml"
+    path.write_text(text.replace("[size]", f"{condition}[size]"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def opened(model_path):
+    return session.load(model_path)
+
+
+@pytest.fixture(scope="module")
+def asked(trained, opened):
+    """Controls (B, d) and times (B, S) all over the model, as the graph sees them."""
+    rng = np.random.Generator(np.random.PCG64(5))
+    low, high = ([getattr(c, end) for c in opened.card.controls] for end in ("minimum", "maximum"))
+    points = rng.uniform(low, high, (50, len(low)))
+    durations = trained.model.evaluate(points, np.zeros((50, 1))).duration
+    times = rng.uniform(0.0, 1.0, (50, 20)) * durations[:, None]
+    return points.astype(np.float32).astype(float), times.astype(np.float32).astype(float)
+
+
+def made_in_this_process(path, folder):
+    own = recipe.read(path)
+    examples, notes = ingest.ingest(own, folder)
+    return export.export(own, examples, train.train(own, examples, lambda _: None), notes).content
+
+
+def test_the_same_data_give_the_same_bytes_in_every_process(
+    quick_recipe, reaching_folder, tmp_path
+):
+    made = []
+    for seed in ("1", "4242"):
+        path = tmp_path / seed / "quick.onnx"
+        words = ("train", quick_recipe, "--data", reaching_folder, "-o", path)
+        posefield(*words, PYTHONHASHSEED=seed)
+        made.append(path.read_bytes())
+    here = [made_in_this_process(quick_recipe, reaching_folder) for _ in range(2)]
+    assert {*made, *here} == {here[0]}
+
+
+def test_other_data_give_other_bytes(quick_recipe, reaching_folder):
+    own = recipe.read(quick_recipe)
+    examples, notes = ingest.ingest(own, reaching_folder)
+    path = examples[0].clip.translations.copy()
+    path[:, 0, 1] += 1e-3
+    moved = [replace(examples[0], clip=replace(examples[0].clip, translations=path)), *examples[1:]]
+    made = [
+        export.export(own, these, train.train(own, these, lambda _: None), notes).content
+        for these in (examples, moved)
+    ]
+    assert made[0] != made[1]
+
+
+def test_the_card_holds_nothing_of_when_and_where_it_was_made(full_family, reaching_folder):
+    text = full_family[0].read_bytes()
+    assert str(reaching_folder).encode() not in text
+    assert str(Path.home()).encode() not in text
+    assert not re.search(rb"20\d\d-\d\d-\d\d|tmp", text)
+
+
+def test_the_whole_family_fits_in_120_kb(full_family):
+    path, said = full_family
+    assert said["clips"] == 92
+    assert said["bytes"] == path.stat().st_size < 120_000
+    # Negative control: what is stored without truncation is no such size.
+    assert 4 * np.prod(said["tensor"]) > 1_000_000
+
+
+def test_the_whole_family_costs_what_its_recipe_allows(full_family):
+    _, said = full_family
+    assert 0.004 < said["truncation_rms_m"] <= 0.005
+    assert said["leave_one_out_rms_m"] < 0.03
+    assert 0.0 < said["parity_m"] < GATE
+    assert said["notes"] == []
+
+
+def test_the_whole_familys_file_opens_as_a_model(full_family):
+    card = session.load(full_family[0]).card
+    assert (card.name, card.samples, card.frames, card.rate) == ("reaching", 92, 100, 120.0)
+    assert [c.name for c in card.controls] == ["stature", "hip_height", "turn", "target_height"]
+    assert card.control("stature").values == (1.62, 1.75, 1.88)
+    assert card.control("turn").values == ()
+
+
+def test_graph_and_reference_agree_at_ten_thousand_points(trained, model_path, opened):
+    assert export.POINTS == 10_000 and export.ALLOWED == GATE
+    worst = export.gate(trained.model, model_path.read_bytes(), opened.card)
+    assert 0.0 < worst < GATE
+    assert opened.card.diagnostics["parity_m"] == float(f"{worst:.1e}")
+
+
+def test_every_output_agrees_with_the_reference(trained, opened, asked):
+    expected = trained.model.evaluate(*asked)
+    found = Outputs(*opened.run(*asked, *OUTPUTS))
+    parents = opened.card.skeleton.parents
+    gaps = np.linalg.norm(found.positions(parents) - expected.positions(parents), axis=-1)
+    assert gaps.max() < GATE
+    # One sign too: q and -q are one rotation, but between frames a client interpolates numbers.
+    assert np.abs(found.rotations - expected.rotations).max() < 1e-4
+    assert np.abs(found.bone_offsets - expected.bone_offsets).max() < 1e-6
+    assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
+    assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-2
+    # Negative control: a thousandth of the range of one control is seen at that tolerance.
+    low, high = trained.model.bank.low, trained.model.bank.high
+    nudged = opened.run(asked[0] + 1e-3 * (high - low) * np.eye(4)[2], asked[1], *OUTPUTS)
+    assert np.abs(Outputs(*nudged).positions(parents) - expected.positions(parents)).max() > GATE
+
+
+def bent(trained, joint, radians):
+    """The model with one joint's mean rotation damaged."""
+    decoder = trained.model.decoder
+    means = decoder.means.copy()
+    turn = np.array([0.0, 0.0, radians])
+    means[joint] = quat.mul(means[joint], quat.exp(turn))
+    return replace(trained.model, decoder=replace(decoder, means=means))
+
+
+def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(trained, model_path, opened):
+    names, parents = opened.card.skeleton.names, opened.card.skeleton.parents
+    arm = names.index("LeftForeArm")
+    hanging = {arm}
+    for joint, parent in enumerate(parents):
+        hanging |= {joint} if parent in hanging else set()
+    with pytest.raises(ExportRefused) as caught:
+        export.gate(bent(trained, arm, 0.01), model_path.read_bytes(), opened.card)
+    found = re.match(r"the graph puts (\w+) ([0-9.]+) cm from", str(caught.value))
+    assert names.index(found[1]) in hanging - {arm}
+    # A forearm with its hand is some 0.4 m long: a hundredth of a radian moves its end by 0.4 cm.
+    assert 0.2 < float(found[2]) < 0.6
+    assert "expected at most 0.01 cm" in str(caught.value)
+    for control in opened.card.controls:
+        assert f"'{control.name}':" in str(caught.value)
+
+
+@pytest.mark.parametrize(("metres", "refused"), [(2e-4, True), (0.5e-4, False)])
+def test_the_gate_lies_where_it_says(trained, model_path, opened, metres, refused):
+    decoder = trained.model.decoder
+    mean = decoder.mean.copy()
+    mean[1] += metres
+    moved = replace(trained.model, decoder=replace(decoder, mean=mean))
+    if refused:
+        with pytest.raises(ExportRefused, match=r"0\.02\d\d cm from where"):
+            export.gate(moved, model_path.read_bytes(), opened.card)
+    else:
+        worst = export.gate(moved, model_path.read_bytes(), opened.card)
+        assert metres * 0.5 < worst < GATE
+
+
+def test_the_gate_refuses_damaged_weights_of_the_field(trained, model_path, opened):
+    bank = trained.model.bank
+    dual = bank.pose.dual.copy()
+    dual[7] *= 1.01
+    damaged = replace(bank, pose=replace(bank.pose, dual=dual))
+    with pytest.raises(ExportRefused, match=r"cm from where the reference does"):
+        export.gate(replace(trained.model, bank=damaged), model_path.read_bytes(), opened.card)
+
+
+def test_the_gate_refuses_a_wrong_duration(trained, model_path, opened):
+    bank = trained.model.bank
+    duration = bank.others["duration"]
+    slower = replace(duration, dual=duration.dual * 1.05)
+    others = bank.others | {"duration": slower}
+    with pytest.raises(ExportRefused):
+        model = replace(trained.model, bank=replace(bank, others=others))
+        export.gate(model, model_path.read_bytes(), opened.card)
+
+
+@pytest.fixture(scope="module")
+def graph(model_path):
+    return onnx.load(model_path)
+
+
+def test_the_file_is_of_the_agreed_versions(graph):
+    assert [(o.domain, o.version) for o in graph.opset_import] == [("", 18)]
+    assert graph.ir_version == 8
+    assert graph.producer_name == "posefield"
+    onnx.checker.check_model(graph, full_check=True)
+
+
+def test_the_ports_are_those_agreed_and_no_others(graph):
+    def shapes(ports):
+        return {
+            p.name: [d.dim_param or d.dim_value for d in p.type.tensor_type.shape.dim]
+            for p in ports
+        }
+
+    assert shapes(graph.graph.input) == {"controls": ["batch", 4], "time": ["batch", "steps"]}
+    assert shapes(graph.graph.output) == {
+        "rotations": ["batch", "steps", 33, 4],
+        "root_position": ["batch", "steps", 3],
+        "bone_offsets": ["batch", 33, 3],
+        "duration": ["batch"],
+        "sigma": ["batch"],
+    }
+
+
+def test_all_ports_are_float32(opened):
+    ports = [*opened.runtime.get_inputs(), *opened.runtime.get_outputs()]
+    assert {port.type for port in ports} == {"tensor(float)"}
+
+
+def test_the_file_is_self_contained_and_of_plain_operators(graph):
+    weights = graph.graph.initializer
+    assert weights and all(t.data_location == onnx.TensorProto.DEFAULT for t in weights)
+    assert not any(t.external_data for t in weights)
+    assert {node.domain for node in graph.graph.node} == {""}
+    assert not graph.functions
+    kinds = {node.op_type for node in graph.graph.node}
+    assert not kinds & {"Loop", "If", "Scan", "Einsum", "RandomUniform", "MatMulInteger"}
+
+
+def test_onnxruntime_alone_reads_the_metadata(model_path):
+    runtime = onnxruntime.InferenceSession(model_path, providers=["CPUExecutionProvider"])
+    entries = runtime.get_modelmeta().custom_metadata_map
+    card = {key: json.loads(value) for key, value in entries.items()}
+    assert card["posefield.format"] == 1
+    assert card["posefield.units"] == {
+        "length": "m",
+        "time": "s",
+        "rotation": "quaternion wxyz",
+        "up": "+y",
+    }
+    controls = card["posefield.controls"]
+    assert [c["unit"] for c in controls] == ["m", "m", "deg", "m"]
+    assert all(c["minimum"] < c["default"] < c["maximum"] for c in controls)
+    joints = card["posefield.skeleton"]
+    assert len(joints["names"]) == len(joints["parents"]) == len(joints["offsets"]) == 33
+    assert card["posefield.provenance"]["licence"] == "CC0-1.0"
+    assert re.fullmatch(r"[0-9a-f]{64}", card["posefield.provenance"]["data_sha256"])
+
+
+def test_quaternions_are_unit_durations_positive_and_sigmas_not_negative(opened, asked):
+    out = Outputs(*opened.run(*asked, *OUTPUTS))
+    assert np.abs(np.linalg.norm(out.rotations, axis=-1) - 1.0).max() < 1e-5
+    assert out.duration.min() > 0.5
+    assert out.sigma.min() > 0.0
+    assert np.abs(out.bone_offsets[:, 0]).max() < 1e-12
+    # Still so far outside, where a straight line in the place of an exponential would fail.
+    far = opened.run(asked[0] + 3 * (asked[0] - asked[0].mean(axis=0)), asked[1], *OUTPUTS)
+    assert Outputs(*far).duration.min() > 0.0
+    assert np.median(Outputs(*far).sigma) > 3 * np.median(out.sigma)
+    assert np.abs(np.linalg.norm(far[0], axis=-1) - 1.0).max() < 1e-5
+
+
+def test_at_the_samples_sigma_is_never_undefined(opened, examples):
+    """There the kriging variance is smallest, and rounding might make it negative."""
+    points = np.stack([example.controls for example in examples])
+    sigma = opened.run(points, np.zeros((len(points), 1)), "sigma")[0]
+    assert np.isfinite(sigma).all() and sigma.min() >= 0.0
+
+
+def test_time_ends_with_the_clip(opened, asked):
+    points = asked[0]
+    durations = opened.run(points, np.zeros((50, 1)), "duration")[0][:, None]
+    late = np.hstack([0.0 * durations, durations, durations - 0.1])
+    early = np.hstack([0.0 * durations - 7.0, durations + 7.0, durations - 0.2])
+    inside, outside = (
+        opened.run(points, times, "rotations", "root_position") for times in (late, early)
+    )
+    for within, beyond in zip(inside, outside, strict=True):
+        assert np.array_equal(within[:, :2], beyond[:, :2])
+        assert np.abs(within[:, 2] - beyond[:, 2]).max() > 1e-3
+
+
+def test_one_pose_is_the_same_alone_and_in_a_batch(opened, asked):
+    points, times = asked
+    whole = opened.run(points, times, "rotations", "root_position")
+    for row, step in ((0, 0), (17, 3), (49, 19)):
+        one = opened.run(points[row : row + 1], times[row : row + 1, step : step + 1], *OUTPUTS)
+        for alone, batch in zip(one[:2], whole, strict=True):
+            assert np.abs(alone[0, 0] - batch[row, step]).max() < 1e-5

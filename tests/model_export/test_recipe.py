@@ -1,0 +1,219 @@
+"""A recipe says everything, or which key says what it should not."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from model_export import recipe
+from service.motion.errors import RecipeError
+
+RECIPES = Path(recipe.__file__).parent / "recipes"
+SHIPPED = ("hdm05_grab_high", "hdm05_deposit_floor", "cmu_walk")
+MINIMAL = """\
+schema = 1
+name = "tiny"
+description = "Small motions"
+licence = "CC0-1.0"
+[source]
+metres_per_unit = 0.01
+up = "y"
+[clips]
+table = "clips.csv"
+file = "file"
+[[controls]]
+name = "speed"
+column = "v"
+unit = "m/s"
+description = "Mean speed"
+[motion]
+frames = 20
+cyclic = false
+root = "travelling"
+[size]
+rms_budget_cm = 1.0
+"""
+SECOND = """[[controls]]
+name = "speed"
+column = "w"
+unit = "m"
+description = "Another"
+"""
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Function that reads a recipe of a text."""
+    path = tmp_path / "recipe.toml"
+
+    def of(text):
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return recipe.read(path)
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def schema():
+    return json.loads((RECIPES / "recipe.schema.json").read_text(encoding="utf-8"))
+
+
+def test_the_least_recipe_is_read_and_the_rest_has_its_defaults(read):
+    least = read(MINIMAL)
+    assert (least.name, least.source.metres_per_unit, least.motion.frames) == ("tiny", 0.01, 20)
+    assert least.controls[0].unit == "m/s"
+    assert (least.kriging.covariance, least.kriging.drift, least.kriging.nugget) == (
+        "matern52",
+        1,
+        None,
+    )
+    assert (least.alignment.knots, least.size.ranks, least.source.root_offset) == (6, None, None)
+
+
+# What is changed in the least recipe, and what the message must hold: the key, what was found
+# there, and what was expected.
+FAULTS = {
+    "unknown key": ("frames = 20", "frames = 20\nframez = 3", ["motion.framez", "not permitted"]),
+    "unknown table": ("[size]", "[sizes]\n[size]", ["sizes", "not permitted"]),
+    "missing unit of a control": ('unit = "m/s"\n', "", ["controls.0.unit", "required"]),
+    "empty unit": ('unit = "m/s"', 'unit = ""', ["controls.0.unit", "at least 1", "''"]),
+    "missing scale": (
+        "metres_per_unit = 0.01\n",
+        "",
+        ["source.metres_per_unit", "required"],
+    ),
+    "scale of zero": (
+        "metres_per_unit = 0.01",
+        "metres_per_unit = 0",
+        ["source.metres_per_unit", "greater than 0", "found 0"],
+    ),
+    "endless scale": (
+        "metres_per_unit = 0.01",
+        "metres_per_unit = inf",
+        ["source.metres_per_unit", "finite", "inf"],
+    ),
+    "missing up axis": ('up = "y"\n', "", ["source.up", "required"]),
+    "third up axis": ('up = "y"', 'up = "x"', ["source.up", "'y' or 'z'", "'x'"]),
+    "number as text": ("frames = 20", 'frames = "20"', ["motion.frames", "integer", "'20'"]),
+    "fraction of a frame": ("frames = 20", "frames = 20.5", ["motion.frames", "integer", "20.5"]),
+    "too few frames": ("frames = 20", "frames = 7", ["motion.frames", "equal to 8", "found 7"]),
+    "text as truth": (
+        "cyclic = false",
+        'cyclic = "no"',
+        ["motion.cyclic", "boolean", "'no'"],
+    ),
+    "truth as number": ("rms_budget_cm = 1.0", "rms_budget_cm = true", ["size.rms_budget_cm"]),
+    "unknown root": (
+        'root = "travelling"',
+        'root = "flying"',
+        ["motion.root", "'travelling' or 'in_place'", "'flying'"],
+    ),
+    "ranks and a budget": (
+        "rms_budget_cm = 1.0",
+        "rms_budget_cm = 1.0\nranks = [3, 3, 3]",
+        ["size", "either ranks or rms_budget_cm"],
+    ),
+    "neither ranks nor budget": (
+        "rms_budget_cm = 1.0",
+        "",
+        ["size", "either ranks or rms_budget_cm"],
+    ),
+    "two ranks": ("rms_budget_cm = 1.0", "ranks = [3, 3]", ["size.ranks", "at least 3", "[3, 3]"]),
+    "rank of zero": ("rms_budget_cm = 1.0", "ranks = [3, 0, 3]", ["size.ranks.1", "equal to 1"]),
+    "reserved control name": ('"speed"', '"fps"', ["controls.0.name", "'fps'", "query parameter"]),
+    "capital in a control name": ('"speed"', '"Speed"', ["controls.0.name", "pattern", "'Speed'"]),
+    "control named twice": ("[motion]", f"{SECOND}[motion]", ["controls", "twice", "'speed'"]),
+    "name with a blank": ('"tiny"', '"tiny one"', ["name", "pattern", "'tiny one'"]),
+    "another version": ("schema = 1", "schema = 2", ["schema", "should be 1", "found 2"]),
+    "negative nugget": ("[size]", "[kriging]\nnugget = -0.1\n[size]", ["kriging.nugget", "-0.1"]),
+    "degree two": ("[size]", "[kriging]\ndrift = 2\n[size]", ["kriging.drift", "equal to 1"]),
+    "weight of zero": (
+        "[size]",
+        "[motion.joint_weights]\nHead = 0.0\n[size]",
+        ["motion.joint_weights.Head", "greater than 0"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), FAULTS.values(), ids=FAULTS)
+def test_a_fault_is_named_with_its_key_and_what_was_expected(read, tmp_path, old, new, said):
+    assert MINIMAL.count(old) == 1
+    with pytest.raises(RecipeError) as caught:
+        read(MINIMAL.replace(old, new))
+    assert caught.value.path == str(tmp_path / "recipe.toml")
+    for part in said:
+        assert part in caught.value.message
+
+
+def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):
+    for name in recipe.RESERVED:
+        with pytest.raises(RecipeError, match=f"controls.0.name.*'{name}'"):
+            read(MINIMAL.replace('"speed"', f'"{name}"'))
+    assert read(MINIMAL.replace('"speed"', '"pace"')).controls[0].name == "pace"
+
+
+def test_all_faults_are_told_at_once(read):
+    with pytest.raises(RecipeError, match=r"source.up.*motion.frames"):
+        read(MINIMAL.replace('up = "y"', 'up = "x"').replace("frames = 20", "frames = 0"))
+
+
+def test_bad_toml_is_refused_with_its_line(read, tmp_path):
+    with pytest.raises(RecipeError, match="not TOML") as caught:
+        read(MINIMAL.replace("[source]", "[source"))
+    assert caught.value.line == 5
+    assert str(caught.value).startswith(f"{tmp_path / 'recipe.toml'}:5: ")
+
+
+def test_a_key_said_twice_is_refused_with_its_line(read):
+    with pytest.raises(RecipeError, match="not TOML") as caught:
+        read(MINIMAL.replace('name = "tiny"', 'name = "tiny"\nname = "other"'))
+    assert caught.value.line == 3
+
+
+def test_text_that_is_not_utf_8_is_refused(read):
+    with pytest.raises(RecipeError, match="not UTF-8 text"):
+        read(MINIMAL.replace("Small", "Kleine für").encode("latin-1"))
+    assert read(MINIMAL.replace("Small", "Kleine für")).description == "Kleine für motions"
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(RecipeError, match=r"none\.toml: cannot be read: No such file"):
+        recipe.read(tmp_path / "none.toml")
+
+
+def test_the_published_schema_is_the_one_of_the_code():
+    published = (RECIPES / "recipe.schema.json").read_text(encoding="utf-8")
+    assert published == recipe.json_schema()
+
+
+def test_the_schema_is_itself_valid(schema):
+    jsonschema.Draft202012Validator.check_schema(schema)
+
+
+def test_what_ships_is_the_three_recipes():
+    assert {path.stem for path in RECIPES.glob("*.toml")} == set(SHIPPED)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_recipes_are_read_and_keep_the_schema(name, schema):
+    path = RECIPES / f"{name}.toml"
+    assert recipe.read(path).name == name
+    plain = tomllib.loads(path.read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(plain)
+    assert path.read_text(encoding="utf-8").startswith("#:schema ./recipe.schema.json\n")
+
+
+@pytest.mark.parametrize("fault", ["unknown key", "missing unit of a control", "third up axis"])
+def test_the_schema_refuses_what_the_reader_refuses(fault, schema):
+    old, new, _ = FAULTS[fault]
+    jsonschema.Draft202012Validator(schema).validate(tomllib.loads(MINIMAL))
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(schema).validate(tomllib.loads(MINIMAL.replace(old, new)))
+
+
+def test_every_key_of_the_source_section_is_explained_in_the_schema(schema):
+    for key in schema["$defs"]["Source"]["properties"].values():
+        assert re.search(r"\w{3}", key["description"])

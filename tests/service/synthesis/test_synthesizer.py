@@ -1,0 +1,281 @@
+"""Every question is answered, or refused with the field that is wrong and what it should be."""
+
+import math
+import re
+from itertools import product
+
+import numpy as np
+import pytest
+
+from service.motion.errors import InvalidField, OutsideSamples
+from service.synthesis import library
+
+POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+# The graph answers in float32, and sums a batch in another order than one row.
+FLOAT32 = 1e-5
+
+
+@pytest.fixture(scope="module")
+def model(model_path):
+    return library.load([model_path]).models["reaching"]
+
+
+@pytest.fixture(scope="module")
+def duration(model):
+    return model.pose(POINT, [0.0], "warn").trust.duration
+
+
+@pytest.fixture
+def refused(model):
+    """Function that expects a clip to be refused; gives the field and the message."""
+
+    def of(controls=POINT, rate=30.0, **span):
+        with pytest.raises(InvalidField) as caught:
+            model.clip(controls, rate, "warn", **span)
+        return caught.value.field, caught.value.message
+
+    return of
+
+
+def poses_differ(a, b):
+    return max(
+        np.abs(a.rotations - b.rotations).max(), np.abs(a.root_position - b.root_position).max()
+    )
+
+
+def test_an_unknown_control_is_refused_with_those_there_are(refused):
+    assert refused({**POINT, "speed": 1.0}) == (
+        "controls/speed",
+        "no such control; this model has stature, hip_height, turn, target_height",
+    )
+
+
+def test_a_missing_control_is_refused_with_its_unit_and_range(refused, model):
+    turn = model.session.card.control("turn")
+    assert refused({name: value for name, value in POINT.items() if name != "turn"}) == (
+        "controls/turn",
+        f"missing; give a number in deg, sampled from {turn.minimum:g} to {turn.maximum:g}",
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (math.nan, "nan, expected a finite number"),
+        (math.inf, "inf, expected a finite number"),
+        (-math.inf, "-inf, expected a finite number"),
+        (True, "True, expected a number"),
+        (False, "False, expected a number"),
+        ("1.7", "'1.7', expected a number"),
+        (None, "None, expected a number"),
+        ([1.7], "[1.7], expected a number"),
+    ],
+)
+@pytest.mark.parametrize("name", ["stature", "turn"])
+def test_a_control_that_is_no_finite_number_is_refused(refused, name, value, said):
+    assert refused({**POINT, name: value}) == (f"controls/{name}", said)
+
+
+def test_a_whole_number_is_a_number(model):
+    whole = model.pose({**POINT, "turn": 10}, [0.0], "warn")
+    assert poses_differ(whole, model.pose(POINT, [0.0], "warn")) == 0.0
+    assert whole.trust.controls == POINT
+
+
+@pytest.mark.parametrize("value", [1e30, -1e30, 2e4])
+def test_a_control_out_of_all_reason_is_refused_with_the_range(refused, value):
+    field, message = refused({**POINT, "turn": value})
+    assert field == "controls/turn"
+    assert message.startswith(f"{value:g} deg, expected -")
+    assert re.search(r"expected -[0-9.]+ to [0-9.]+ deg$", message)
+
+
+@pytest.mark.parametrize(("time", "inside"), [(-0.01, False), (0.0, True), (9.0, False)])
+def test_a_time_outside_the_clip_is_refused(model, duration, time, inside):
+    if inside:
+        assert model.pose(POINT, [time], "warn").times.tolist() == [time]
+        return
+    with pytest.raises(InvalidField) as caught:
+        model.pose(POINT, [0.1, time], "warn")
+    assert caught.value.field == "times/1"
+    assert caught.value.message == f"{time:g} s, expected 0 to {duration:g} s"
+
+
+def test_the_last_moment_of_a_clip_is_inside(model, duration):
+    assert len(model.pose(POINT, [0.0, duration], "warn").rotations) == 2
+    with pytest.raises(InvalidField, match="times/0"):
+        model.pose(POINT, [np.nextafter(duration, 9.0)], "warn")
+
+
+@pytest.mark.parametrize("time", [math.nan, math.inf, "0", True, None])
+def test_a_time_that_is_no_finite_number_is_refused(model, time):
+    with pytest.raises(InvalidField, match=r"times/2: .*expected a (finite )?number"):
+        model.pose(POINT, [0.0, 0.0, time], "warn")
+
+
+@pytest.mark.parametrize("count", [0, 10_001])
+def test_so_many_times_are_refused(model, count):
+    with pytest.raises(InvalidField, match=f"times: {count} times, expected 1 to 10000"):
+        model.pose(POINT, [0.0] * count, "warn")
+
+
+def test_ten_thousand_poses_are_answered(model):
+    answer = model.pose(POINT, [0.5] * 10_000, "warn")
+    assert answer.rotations.shape == (10_000, 33, 4)
+
+
+@pytest.mark.parametrize("rate", [0, -30, 0.5, 10_000, 1000.1, 1e300])
+def test_a_rate_out_of_range_is_refused_with_the_range(refused, rate):
+    expected = f"{rate:g} frames a second, expected 1 to 1000 frames a second"
+    assert refused(rate=rate) == ("fps", expected)
+
+
+@pytest.mark.parametrize("rate", [math.nan, math.inf, "30", None, True])
+def test_a_rate_that_is_no_finite_number_is_refused(refused, rate):
+    field, message = refused(rate=rate)
+    assert field == "fps" and re.search(r"expected a (finite )?number", message)
+
+
+def test_too_many_frames_are_refused_before_they_are_made(refused, model):
+    """Far outside the samples a clip may last for minutes, or for years."""
+    known = model.session.card.controls
+    corners = [
+        {
+            c.name: c.default + sign * 50 * (c.maximum - c.minimum)
+            for c, sign in zip(known, signs, strict=True)
+        }
+        for signs in product((-1, 1), repeat=len(known))
+    ]
+    longest = max(corners, key=lambda corner: model.pose(corner, [0.0], "warn").trust.duration)
+    field, message = refused(longest, rate=1000.0)
+    assert field == "fps"
+    assert re.fullmatch(r"\d{5,} frames, expected at most 10000", message)
+
+
+@pytest.mark.parametrize(
+    ("span", "field", "said"),
+    [
+        ({"start": 0.8, "end": 0.5}, "start", "0.8 s, expected 0 to 0.5 s"),
+        ({"start": -0.1}, "start", "-0.1 s, expected 0 to "),
+        ({"start": 60.0}, "start", "60 s, expected 0 to "),
+        ({"end": 60.0}, "end", "60 s, expected 0 to "),
+        ({"end": -1.0}, "end", "-1 s, expected 0 to "),
+        ({"start": math.nan}, "start", "nan, expected a finite number"),
+        ({"end": math.inf}, "end", "inf, expected a finite number"),
+        ({"start": "0"}, "start", "'0', expected a number"),
+    ],
+)
+def test_a_span_outside_the_clip_is_refused(refused, span, field, said):
+    found, message = refused(**span)
+    assert found == field
+    assert message.startswith(said)
+
+
+def test_a_span_of_one_moment_is_one_frame(model):
+    assert len(model.clip(POINT, 30.0, "warn", start=0.5, end=0.5).clip) == 1
+
+
+OUTSIDE = {**POINT, "turn": 120.0, "target_height": 0.1}
+
+
+def test_inside_the_samples_nothing_is_warned_of(model):
+    for policy in ("warn", "refuse"):
+        assert model.clip(POINT, 30.0, policy).trust.warnings == ()
+
+
+def test_outside_the_samples_each_control_has_its_sentence(model):
+    warnings = model.pose(OUTSIDE, [0.0], "warn").trust.warnings
+    assert len(warnings) == 2
+    for warning, name in zip(warnings, ("turn", "target_height"), strict=True):
+        own = model.session.card.control(name)
+        assert warning == (
+            f"{name} = {OUTSIDE[name]:g} {own.unit} lies outside what was sampled, "
+            f"{own.minimum:g} to {own.maximum:g} {own.unit}"
+        )
+
+
+def test_outside_the_samples_a_client_may_ask_for_a_refusal(model):
+    warnings = model.clip(OUTSIDE, 30.0, "warn").trust.warnings
+    for ask in (
+        lambda: model.clip(OUTSIDE, 30.0, "refuse"),
+        lambda: model.pose(OUTSIDE, [0.0], "refuse"),
+    ):
+        with pytest.raises(OutsideSamples) as caught:
+            ask()
+        assert caught.value.field == "controls"
+        assert caught.value.message == "; ".join(warnings)
+
+
+def test_the_bounds_of_the_card_are_inside(model):
+    for end in ("minimum", "maximum"):
+        corner = {c.name: getattr(c, end) for c in model.session.card.controls}
+        assert model.pose(corner, [0.0], "refuse").trust.warnings == ()
+
+
+def test_farther_outside_there_is_less_trust(model):
+    inside, outside = (model.pose(p, [0.0], "warn").trust.sigma for p in (POINT, OUTSIDE))
+    assert 0.0 < inside < outside
+
+
+@pytest.mark.parametrize("rate", [24.0, 30.0, 29.97, 120.0, 1.0])
+def test_frame_i_is_the_pose_at_i_over_the_rate(model, duration, rate):
+    answer = model.clip(POINT, rate, "warn")
+    frames = len(answer.clip)
+    assert answer.clip.rate == rate
+    assert (frames - 1) / rate <= duration + 1e-6 < frames / rate + 2e-6
+    for frame in {0, frames // 2, frames - 1}:
+        pose = model.pose(POINT, [frame / rate], "warn")
+        assert np.abs(answer.clip.rotations[frame] - pose.rotations[0]).max() < FLOAT32
+        assert np.abs(answer.clip.root_path[frame] - pose.root_position[0]).max() < FLOAT32
+        assert np.abs(answer.clip.translations[frame, 1:] - pose.bone_offsets[1:]).max() < FLOAT32
+
+
+def test_one_frame_on_the_pose_is_another(model):
+    """Negative control of the frames' times: an error of one frame would be seen."""
+    clip = model.clip(POINT, 30.0, "warn").clip
+    middle = len(clip) // 2
+    pose = model.pose(POINT, [(middle + 1) / 30.0], "warn")
+    assert np.abs(clip.rotations[middle] - pose.rotations[0]).max() > 100 * FLOAT32
+
+
+def test_a_span_is_a_slice_of_the_whole(model):
+    whole = model.clip(POINT, 30.0, "warn").clip
+    part = model.clip(POINT, 30.0, "warn", start=0.2, end=0.7).clip
+    assert len(part) == 16
+    assert np.abs(part.rotations - whole.rotations[6:22]).max() < FLOAT32
+    assert np.abs(part.translations - whole.translations[6:22]).max() < FLOAT32
+    assert np.abs(part.rotations - whole.rotations[7:23]).max() > 100 * FLOAT32
+
+
+def test_a_clip_that_starts_late_goes_on_to_the_end(model):
+    whole = model.clip(POINT, 50.0, "warn").clip
+    rest = model.clip(POINT, 50.0, "warn", start=0.5).clip
+    assert len(rest) == len(whole) - 25
+    assert np.abs(rest.rotations - whole.rotations[25:]).max() < FLOAT32
+
+
+def test_an_answer_says_where_it_comes_from(model):
+    trust = model.clip(POINT, 30.0, "warn").trust
+    assert trust.model == model.identity == f"reaching@{model.session.digest}"
+    assert trust.controls == POINT
+    assert trust.duration == model.pose(POINT, [0.0], "warn").trust.duration
+
+
+def test_the_same_question_has_the_same_answer(model):
+    first, second = (model.clip(POINT, 30.0, "warn") for _ in range(2))
+    assert np.array_equal(first.clip.rotations, second.clip.rotations)
+    assert np.array_equal(first.clip.translations, second.clip.translations)
+    assert first.trust == second.trust
+
+
+def test_controls_may_come_in_any_order(model):
+    backwards = dict(reversed(POINT.items()))
+    assert (
+        poses_differ(model.pose(backwards, [0.5], "warn"), model.pose(POINT, [0.5], "warn")) == 0.0
+    )
+
+
+def test_answers_are_float64_whatever_the_graph_speaks(model):
+    answer = model.pose(POINT, [0.5], "warn")
+    arrays = (answer.times, answer.rotations, answer.root_position, answer.bone_offsets)
+    assert {array.dtype for array in arrays} == {np.dtype(np.float64)}

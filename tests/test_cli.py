@@ -1,0 +1,470 @@
+"""The command line: what it writes, what it says, and the code it ends with."""
+
+import json
+import re
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdSkel
+
+from model_export.sample import truth
+from service import __version__, cli
+from service.encode import ENCODERS
+from service.motion import bvh
+from service.synthesis import library
+
+POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh")
+
+
+@pytest.fixture
+def posefield(monkeypatch, capsys):
+    """Function that runs the command in this process; gives exit code, output and errors."""
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["posefield", *map(str, words)])
+        capsys.readouterr()
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as ending:
+            code = ending.code or 0
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+@pytest.fixture
+def refused(posefield):
+    """Function that expects the command to fail with a code and one line; gives the line."""
+
+    def of(code, *words):
+        found, out, err = posefield(*words)
+        assert (found, out) == (code, "")
+        assert err.startswith("posefield: ") and err.count("\n") == 1
+        return err.removeprefix("posefield: ").strip()
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def quick(reaching_folder):
+    """Path of a recipe of few clips and frames, beside the family's files."""
+    text = (reaching_folder / "recipe.toml").read_text()
+    text = re.sub(r'(?s)\[\[controls\]\]\nname = "stature".*?\n\n', "", text)
+    text = text.replace("frames = 100", "frames = 8").replace("0.5", "3.0")
+    condition = '[clips.where]\nperformer = { among = ["tall"] }\n\n[alignment]\nrounds = 0\n\n'
+    path = reaching_folder.parent / "quick_cli.toml"
+    path.write_text(text.replace("[size]", f"{condition}[size]"))
+    return path
+
+
+def test_it_says_its_version(posefield):
+    assert posefield("--version") == (0, f"posefield {__version__}\n", "")
+
+
+def test_it_is_a_command_of_its_own():
+    command = str(Path(sys.executable).parent / "posefield")
+    done = subprocess.run([command, "--help"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    for name in ("sample", "train", "inspect", "pose", "clip", "serve", "check"):
+        assert re.search(rf"\b{name}\b", done.stdout)
+
+
+def test_a_process_ends_with_the_code_of_its_fault(tmp_path):
+    command = str(Path(sys.executable).parent / "posefield")
+    words = [command, "inspect", str(tmp_path / "none.onnx")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (3, "")
+    said = f"posefield: {tmp_path / 'none.onnx'}: cannot be read: No such file or directory\n"
+    assert done.stderr == said
+
+
+# --- sample ---------------------------------------------------------------------------------------
+
+
+def test_sample_writes_the_family(posefield, tmp_path, reaching_folder):
+    code, out, _ = posefield("sample", "reaching", "-o", tmp_path / "family", "--json")
+    assert code == 0
+    assert json.loads(out) == {"recipe": str(tmp_path / "family" / "recipe.toml")}
+    for path in sorted(reaching_folder.rglob("*.*")):
+        again = tmp_path / "family" / path.relative_to(reaching_folder)
+        assert again.read_bytes() == path.read_bytes()
+
+
+def test_sample_says_what_to_do_next(posefield, reaching_folder):
+    code, out, _ = posefield("sample", "reaching", "-o", reaching_folder)
+    assert (code, out) == (
+        0,
+        f"{reaching_folder / 'recipe.toml'}: train it with posefield train\n",
+    )
+
+
+def test_sample_of_another_family_is_refused(refused, tmp_path):
+    said = refused(2, "sample", "dancing", "-o", tmp_path / "x")
+    assert said == "family: 'dancing', expected reaching"
+
+
+def test_sample_into_a_folder_of_something_else_is_refused(refused, tmp_path):
+    (tmp_path / "mine.txt").touch()
+    assert "not empty and not this family" in refused(3, "sample", "reaching", "-o", tmp_path)
+
+
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path, fps):
+    path = tmp_path / "truth.bvh"
+    words = ("sample", "reaching", "--truth", "-o", path, *CONTROLS, "--fps", fps, "--json")
+    code, out, _ = posefield(*words)
+    assert code == 0
+    expected = truth.clip(POINT, fps)
+    found = bvh.read(path)
+    assert (len(found.values), found.rate) == (len(expected), fps)
+    # A BVH file of ours is in centimetres.
+    clip = bvh.to_clip(found, metres_per_unit=0.01, up="y", root_offset="replace")
+    assert np.abs(clip.positions() - expected.positions()).max() < 1e-4
+    said = json.loads(out)
+    assert (said["model"], said["frames"], said["sigma"]) == ("reaching@truth", len(expected), 0.0)
+    assert said["duration"] == pytest.approx(truth.duration(POINT), abs=1.0 / fps)
+
+
+def test_sample_truth_of_what_no_body_can_do_is_refused(refused, tmp_path):
+    path = tmp_path / "truth.usda"
+    words = ("sample", "reaching", "--truth", "-o", path, *CONTROLS[:-1], "target_height=4.0")
+    assert "target_height" in refused(2, *words)
+    assert not path.exists()
+
+
+def test_sample_truth_without_controls_is_refused(refused, tmp_path):
+    said = refused(2, "sample", "reaching", "--truth", "-o", tmp_path / "truth.bvh")
+    assert said == "stature: missing control"
+
+
+# --- train and inspect ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def train_words(quick, reaching_folder):
+    return ("train", quick, "--data", reaching_folder)
+
+
+def test_train_writes_a_model_and_says_what_it_measured(posefield, train_words, tmp_path):
+    path = tmp_path / "new" / "quick.onnx"
+    code, out, err = posefield(*train_words, "-o", path, "--json")
+    assert code == 0
+    said = json.loads(out)
+    assert (said["file"], said["bytes"]) == (str(path), path.stat().st_size)
+    assert said["clips"] == 30 and said["tensor"] == [94, 8, 30]
+    assert 0.0 < said["parity_m"] < 1e-4
+    steps = [line.split(" s  ")[1] for line in err.splitlines()]
+    assert steps[0].startswith("reading ") and steps[1] == "aligning 30 clips"
+    assert steps[-1] == "done"
+    assert library.load([path]).models["quick"].session.card.frames == 8
+    assert [p.name for p in path.parent.iterdir()] == ["quick.onnx"]
+
+
+def test_train_tells_people_the_same(posefield, train_words, tmp_path):
+    path = tmp_path / "quick.onnx"
+    code, out, _ = posefield(*train_words, "-o", path)
+    assert code == 0
+    assert re.search(r"quick\.onnx: [0-9.]+ kB from 30 clips, ranks \[\d+, \d+, \d+\]", out)
+    assert "onnxruntime differs from the reference by at most 0.0" in out
+
+
+def test_train_finds_its_data_beside_the_recipe(posefield, quick, tmp_path):
+    """Where --data is not given; this recipe stands elsewhere, so its table is not found."""
+    said = refused_after_progress(posefield, 3, "train", quick, "-o", tmp_path / "x.onnx")
+    assert f"{quick.parent}: no file 'clips.csv'" in said
+
+
+def refused_after_progress(posefield, code, *words):
+    """As refused, for a command that had begun to tell of its progress."""
+    found, out, err = posefield(*words)
+    assert (found, out) == (code, "")
+    progress, _, last = err.rpartition("posefield: ")
+    assert all(re.match(r" +[0-9.]+ s  ", line) for line in progress.splitlines())
+    return last.strip()
+
+
+def test_samples_that_make_no_model_are_refused_with_code_4(
+    posefield, train_words, quick, tmp_path
+):
+    text = quick.read_text().replace('column = "turn"', 'column = "stature"')
+    still = tmp_path / "still.toml"
+    still.write_text(text)
+    path = tmp_path / "still.onnx"
+    words = ("train", still, *train_words[2:], "-o", path)
+    said = refused_after_progress(posefield, 4, *words)
+    assert said.startswith("control 'turn' has the value 1.88 in all 30 samples")
+    assert not path.exists()
+
+
+def test_a_recipe_that_is_wrong_is_refused_with_code_3(posefield, quick, tmp_path):
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(quick.read_text().replace("cyclic = false", "cyclic = 0"))
+    said = refused_after_progress(posefield, 3, "train", wrong, "-o", tmp_path / "x.onnx")
+    assert said.startswith(f"{wrong}: motion.cyclic: ")
+
+
+def test_a_model_is_an_onnx_file(refused, train_words, tmp_path):
+    said = refused(2, *train_words, "-o", tmp_path / "quick.bin")
+    assert said == "output: 'quick.bin', expected a name that ends in .onnx"
+
+
+def test_inspect_answers_as_json(posefield, model_path):
+    code, out, _ = posefield("inspect", model_path, "--json")
+    assert code == 0
+    card = json.loads(out)
+    assert card["identity"] == library.load([model_path]).models["reaching"].identity
+    assert [c["name"] for c in card["controls"]] == list(POINT)
+    assert card["skeleton"]["names"][0] == "Hips"
+    assert card["diagnostics"]["notes"] == []
+
+
+def test_inspect_tells_people_the_same(posefield, model_path):
+    code, out, _ = posefield("inspect", model_path)
+    assert code == 0
+    assert "reaching@" in out and "46 clips of 33 joints" in out and "licence: CC0-1.0" in out
+    for name in POINT:
+        assert re.search(rf"^  {name}: [-0-9.]+ to [0-9.]+ (m|deg), ", out, re.MULTILINE)
+
+
+def test_a_corrupt_model_is_refused_with_code_3(refused, model_path, tmp_path):
+    path = tmp_path / "half.onnx"
+    path.write_bytes(model_path.read_bytes()[:5000])
+    for words in (("inspect", path), ("pose", path, *CONTROLS)):
+        assert refused(3, *words).startswith(f"{path}: onnxruntime cannot load it: ")
+
+
+# --- pose -----------------------------------------------------------------------------------------
+
+
+def test_pose_answers_as_json(posefield, model_path):
+    code, out, err = posefield("pose", model_path, *CONTROLS, "--time", 0.25, "--time", 0.5)
+    assert (code, err) == (0, "")
+    said = json.loads(out)
+    assert said["times"] == [0.25, 0.5]
+    assert np.shape(said["rotations"]) == (2, 33, 4)
+    assert np.shape(said["root_position"]) == (2, 3)
+    assert np.shape(said["bone_offsets"]) == (33, 3)
+    assert said["trust"]["controls"] == POINT and said["trust"]["warnings"] == []
+    expected = library.load([model_path]).models["reaching"].pose(POINT, [0.25, 0.5], "warn")
+    assert np.abs(said["rotations"] - expected.rotations).max() < 1e-6
+
+
+def test_pose_without_a_time_is_the_first(posefield, model_path):
+    assert json.loads(posefield("pose", model_path, *CONTROLS)[1])["times"] == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (CONTROLS[:-2], "controls/target_height: missing; give a number in m"),
+        ([*CONTROLS, "-c", "speed=1"], "controls/speed: no such control; this model has stature"),
+        ([*CONTROLS[:-1], "target_height=high"], "controls/target_height: 'high', expected a num"),
+        ([*CONTROLS[:-1], "target_height=nan"], "controls/target_height: nan, expected a finite"),
+        ([*CONTROLS[:-1], "target_height"], "control: 'target_height', expected NAME=VALUE"),
+        ([*CONTROLS, *CONTROLS[:2]], "control: 'stature=1.7', expected NAME=VALUE, each name once"),
+        ([*CONTROLS, "--time", "99"], "times/0: 99 s, expected 0 to "),
+    ],
+)
+def test_a_question_without_an_answer_is_refused_with_code_2(refused, model_path, words, said):
+    assert refused(2, "pose", model_path, *words).startswith(said)
+
+
+OUTSIDE = [*CONTROLS[:-1], "target_height=2.5"]
+
+
+def test_outside_the_samples_is_warned_of_or_refused(posefield, refused, model_path):
+    code, out, err = posefield("pose", model_path, *OUTSIDE)
+    assert code == 0
+    assert err.startswith("warning: target_height = 2.5 m lies outside what was sampled, ")
+    assert [f"warning: {w}\n" for w in json.loads(out)["trust"]["warnings"]] == [err]
+    said = refused(2, "pose", model_path, *OUTSIDE, "--extrapolate", "refuse")
+    assert said.startswith("controls: target_height = 2.5 m lies outside")
+
+
+def test_words_that_the_command_does_not_know_end_with_code_2(posefield, model_path):
+    clamped = ("pose", model_path, *CONTROLS, "--extrapolate", "clamp")
+    for words in (("pose", model_path, "--speed", "1"), ("dance",), ("clip", model_path), clamped):
+        code, out, err = posefield(*words)
+        assert (code, out) == (2, "") and "Usage" in err
+
+
+# --- clip -----------------------------------------------------------------------------------------
+
+
+def test_the_five_formats_are_tested():
+    assert set(FORMATS) <= set(ENCODERS)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
+    path = tmp_path / "new" / f"clip.{ending}"
+    code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
+    assert (code, err) == (0, "")
+    answer = library.load([model_path]).models["reaching"].clip(POINT, 30.0, "warn")
+    said = json.loads(out)
+    assert said == {
+        "file": str(path),
+        "frames": len(answer.clip),
+        "rate": 30.0,
+        **answer.trust.facts(),
+    }
+    assert path.read_bytes() == ENCODERS[ending].encode(answer)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o644
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_clips_of_the_formats_hold_the_same_motion(posefield, model_path, tmp_path):
+    paths = {ending: tmp_path / f"clip.{ending}" for ending in FORMATS}
+    for path in paths.values():
+        assert posefield("clip", model_path, *CONTROLS, "-o", path)[0] == 0
+    frames = len(bvh.read(paths["bvh"]).values)
+    assert json.loads(paths["json"].read_text())
+    for ending in ("usda", "usdc", "usdz"):
+        stage = Usd.Stage.Open(str(paths[ending]))
+        assert stage.GetEndTimeCode() - stage.GetStartTimeCode() == frames - 1
+        assert any(prim.IsA(UsdSkel.Root) for prim in stage.Traverse())
+
+
+def test_clip_takes_a_rate_and_a_span(posefield, model_path, tmp_path):
+    path = tmp_path / "clip.bvh"
+    words = ("--fps", 60, "--start", 0.25, "--end", 0.75)
+    code, out, _ = posefield("clip", model_path, *CONTROLS, "-o", path, *words)
+    assert code == 0
+    assert re.match(rf"{path}: 31 frames at 60 a second, [0-9.]+ s, give or take [0-9.]+ cm", out)
+    assert (len(bvh.read(path).values), bvh.read(path).rate) == (31, 60.0)
+
+
+FAILING = {
+    "a rate of zero": [*CONTROLS, "--fps", "0"],
+    "a rate of ten thousand": [*CONTROLS, "--fps", "10000"],
+    "an end before the start": [*CONTROLS, "--start", "0.5", "--end", "0.1"],
+    "a control that is missing": CONTROLS[:-2],
+    "outside the samples": [*OUTSIDE, "--extrapolate", "refuse"],
+}
+
+
+@pytest.mark.parametrize("words", FAILING.values(), ids=FAILING)
+def test_a_clip_that_fails_leaves_no_file_and_spoils_none(refused, model_path, tmp_path, words):
+    path = tmp_path / "clip.usda"
+    refused(2, "clip", model_path, *words, "-o", path)
+    assert list(tmp_path.iterdir()) == []
+    path.write_text("made before")
+    refused(2, "clip", model_path, *words, "-o", path)
+    assert path.read_text() == "made before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_clip_replaces_one_that_was_there(posefield, model_path, tmp_path):
+    path = tmp_path / "clip.json"
+    path.write_text("made before")
+    assert posefield("clip", model_path, *CONTROLS, "-o", path)[0] == 0
+    assert json.loads(path.read_text())
+
+
+@pytest.mark.parametrize("name", ["clip.fbx", "clip", "clip.USDA"])
+def test_an_unknown_format_is_refused_before_anything_is_read(refused, tmp_path, name):
+    said = refused(2, "clip", tmp_path / "none.onnx", "-o", tmp_path / name)
+    assert said.startswith(f"output: {name!r} ends in none of usda, usdc")
+
+
+# --- check ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def written(posefield, model_path, tmp_path):
+    path = tmp_path / "clip.usda"
+    assert posefield("clip", model_path, *CONTROLS, "-o", path)[0] == 0
+    return path
+
+
+def test_check_finds_nothing_in_our_own_files(posefield, written):
+    assert posefield("check", written) == (0, f"{written}: 0 findings\n", "")
+    assert json.loads(posefield("check", written, "--json")[1]) == []
+
+
+def test_check_ends_with_code_1_where_it_finds_a_defect(posefield, written):
+    text = written.read_text()
+    broken = re.sub(r"uniform matrix4d\[\] bindTransforms = .*\n", "", text)
+    assert broken != text
+    written.write_text(broken)
+    code, out, _ = posefield("check", written, "--json")
+    findings = json.loads(out)
+    assert code == 1
+    assert [f["severity"] for f in findings if f["code"] == "missing-bindTransforms"] == ["error"]
+    assert set(findings[0]) == {"code", "severity", "prim", "message"}
+    code, out, _ = posefield("check", written)
+    assert code == 1
+    assert "[missing-bindTransforms]" in out
+    assert out.splitlines()[-1] == f"{written}: {len(findings)} findings"
+
+
+@pytest.mark.parametrize("content", [None, b"", b"#usda 1.0\n(", b"PXR-USDC"])
+def test_check_of_what_is_no_usd_ends_with_code_3(refused, tmp_path, content):
+    path = tmp_path / "broken.usda"
+    if content is not None:
+        path.write_bytes(content)
+    assert str(path) in refused(3, "check", path)
+
+
+# --- serve ----------------------------------------------------------------------------------------
+
+
+def test_serve_refuses_a_file_that_it_cannot_serve(refused, tmp_path):
+    path = tmp_path / "broken.onnx"
+    path.write_bytes(b"nothing")
+    assert refused(3, "serve", path).startswith(f"{path}: onnxruntime cannot load it: ")
+
+
+def test_serve_refuses_a_port_that_is_none(refused, model_path):
+    assert refused(2, "serve", model_path, "--port", "70000").endswith("70000, expected 0 to 65535")
+
+
+# In a process of its own, in which the training job's packages are not installed.
+WITHOUT_PACKAGES = """
+import sys
+
+class Hiding:
+    def __init__(self, finder):
+        self.finder = finder
+
+    def __getattr__(self, name):
+        return getattr(self.finder, name)
+
+    def find_spec(self, name, *rest):
+        hidden = name.partition(".")[0] in {"scipy", "onnx"}
+        return None if hidden else self.finder.find_spec(name, *rest)
+
+sys.meta_path[:] = [Hiding(finder) for finder in sys.meta_path]
+from service import cli
+cli.main()
+"""
+
+
+def without_packages(*words):
+    command = [sys.executable, "-c", WITHOUT_PACKAGES, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_what_ships_answers_without_the_training_jobs_packages(model_path, tmp_path):
+    path = tmp_path / "clip.usda"
+    done = without_packages("clip", model_path, *CONTROLS, "-o", path)
+    assert done.returncode == 0, done.stderr
+    assert path.exists()
+
+
+def test_train_without_its_packages_says_what_to_install(quick, reaching_folder, tmp_path):
+    path = tmp_path / "x.onnx"
+    done = without_packages("train", quick, "--data", reaching_folder, "-o", path)
+    assert done.returncode == 2
+    assert re.fullmatch(
+        r"posefield: needs (scipy|onnx)\S*: install posefield\[train\]\n", done.stderr
+    )
+    assert not path.exists()

@@ -1,0 +1,112 @@
+"""The fence between what ships and what trains, and that it would notice a hole."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+# In a process of its own: nothing of the training job can be imported, as in the image.
+HIDDEN = """
+import sys
+
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {"model_export", "scipy", "onnx", "pydantic"}:
+            raise ModuleNotFoundError(f"hidden: {name}", name=name)
+
+sys.meta_path.insert(0, Hidden())
+"""
+# Whoever imports onnxruntime finds telemetry switched off, or fails.
+WATCHED = """
+import os, sys
+
+class Watch:
+    def find_spec(self, name, path=None, target=None):
+        if name == "onnxruntime":
+            print("telemetry disabled:", os.environ.get("ORT_DISABLE_TELEMETRY"))
+
+os.environ.pop("ORT_DISABLE_TELEMETRY", None)
+sys.meta_path.insert(0, Watch())
+"""
+
+
+def lint(folder):
+    """Outcome of import-linter over the packages in a folder, by its own contracts."""
+    command = [str(Path(sys.executable).parent / "lint-imports"), "--no-cache"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def python(code):
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """The packages and their contracts, to make a hole in."""
+    for package in ("service", "model_export"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=lambda *_: ["__pycache__"])
+    shutil.copy(ROOT / ".importlinter", tmp_path)
+    return tmp_path
+
+
+def test_every_import_stays_within_its_layer():
+    done = lint(ROOT)
+    assert done.returncode == 0, done.stdout
+    assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "broken"),
+    [
+        ("service/motion/clip.py", "import orjson", "the floor needs numpy only"),
+        ("service/motion/clip.py", "import service.encode", "the service reads downhill"),
+        ("service/encode/usd.py", "import service.synthesis", "the service reads downhill"),
+        ("service/check/rig.py", "import service.encode", "the service reads downhill"),
+        ("service/encode/usd.py", "import starlette", "only the web speaks HTTP"),
+        ("service/web/app.py", "import model_export.train", "what ships never imports"),
+        ("service/synthesis/session.py", "import onnx", "what ships never imports"),
+        ("model_export/train.py", "import service.synthesis.session", "the training job uses"),
+        ("model_export/export.py", "import service.encode", "the training job uses"),
+    ],
+)
+def test_a_planted_breach_is_caught_and_named(copy, module, line, broken):
+    path = copy / module
+    path.write_text(f"{path.read_text()}\n{line}\n")
+    done = lint(copy)
+    assert done.returncode == 1
+    assert re.search(rf"{re.escape(broken)}[^\n]* BROKEN", done.stdout), done.stdout
+
+
+def test_what_ships_runs_without_the_training_job():
+    done = python(f"{HIDDEN}import service.cli, service.web.app, service.check\nprint('fine')")
+    assert (done.returncode, done.stdout) == (0, "fine\n"), done.stderr
+
+
+@pytest.mark.parametrize("module", ["model_export", "scipy.linalg", "onnx.helper", "pydantic"])
+def test_what_is_hidden_cannot_be_imported(module):
+    """Negative control of the test above."""
+    done = python(f"{HIDDEN}import {module}")
+    assert done.returncode == 1
+    assert "ModuleNotFoundError: hidden" in done.stderr
+
+
+@pytest.mark.parametrize("module", ["service.synthesis.session", "service.cli", "model_export.cli"])
+def test_telemetry_is_off_before_onnxruntime_is_imported(module):
+    done = python(f"{WATCHED}import {module}")
+    assert done.stdout.splitlines() == ["telemetry disabled: 1"], done.stderr
+
+
+def test_onnxruntime_by_itself_would_not_find_it_off():
+    """Negative control of the test above."""
+    assert python(f"{WATCHED}import onnxruntime").stdout == "telemetry disabled: None\n"
