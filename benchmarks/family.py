@@ -42,7 +42,7 @@ def make(folder: Path) -> Family:
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, path.parent)
     trained = train.train(own, examples, lambda _: None)
-    exported = export.export(own, examples, trained, notes)
+    exported = export.export(own, trained, notes)
     seconds = time.perf_counter() - start
     offsets = np.stack([example.offsets for example in examples])
     aligned = trained.aligned

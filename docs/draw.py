@@ -58,7 +58,8 @@ def light_and_look(scene: bpy.types.Scene) -> None:
     bpy.ops.mesh.primitive_plane_add(size=40, location=(middle, 0, 0))
     floor = bpy.data.materials.new("floor")
     floor.use_nodes = True
-    floor.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.3, 0.3, 0.32, 1.0)
+    surface = floor.node_tree.nodes["Principled BSDF"]
+    surface.inputs["Base Color"].default_value = (0.3, 0.3, 0.32, 1.0)
     bpy.context.object.data.materials.append(floor)
     bpy.ops.object.light_add(type="SUN", rotation=(math.radians(40), math.radians(15), 0.4))
     bpy.context.object.data.energy = 3.5

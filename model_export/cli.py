@@ -74,7 +74,7 @@ def train_command(
     examples, notes = ingest.ingest(own, data or recipe_file.parent)
     trained = train.train(own, examples, report)
     report("writing the graph and comparing it with the reference")
-    exported = export.export(own, examples, trained, notes)
+    exported = export.export(own, trained, notes)
     files.write(exported.content, output)
     report("done")
     typer.echo(_dump(_facts(exported, output)) if json else _summary(exported, output))

@@ -20,10 +20,17 @@ def find(folder: Path, name: str) -> Place:
         raise RecipeError(folder, f"file {name!r}, expected a path below the data folder")
     places = [folder / name, *_in_zip(folder, parts)]
     for place in places:
-        if place.is_file():
+        if _is_there(place):
             return place
     tried = ", ".join(str(place) for place in places)
     raise RecipeError(folder, f"no file {name!r}; tried {tried}")
+
+
+def _is_there(place: Place) -> bool:
+    try:
+        return place.is_file()
+    except OSError:  # a name that no file can have
+        return False
 
 
 def _in_zip(folder: Path, parts: tuple[str, ...]) -> list[Place]:

@@ -40,18 +40,16 @@ class Exported:
     parity: float
 
 
-def export(
-    recipe: Recipe, examples: Sequence[Example], trained: Trained, notes: list[str]
-) -> Exported:
+def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     """File of a trained model; the same data give the same bytes.
 
     Raises ExportRefused where onnxruntime answers anything else than the float64 reference does.
     """
     about = {"producer_name": "posefield", "producer_version": __version__}
     # The gate's finding is part of the card, so the weights are judged before it is written.
-    draft = _card(recipe, examples, trained, notes, parity=0.0)
+    draft = _card(recipe, trained, notes, parity=0.0)
     parity = gate(trained.model, trained.model.onnx(card.dump(draft), about), draft)
-    own_card = _card(recipe, examples, trained, notes, parity)
+    own_card = _card(recipe, trained, notes, parity)
     return Exported(trained.model.onnx(card.dump(own_card), about), own_card, parity)
 
 
@@ -94,12 +92,11 @@ def _gaps(
 
 def _card(
     recipe: Recipe,
-    examples: Sequence[Example],
     trained: Trained,
     notes: list[str],
     parity: float,
 ) -> ModelCard:
-    durations = trained.aligned.durations
+    examples, durations = trained.examples, trained.aligned.durations
     return ModelCard(
         name=recipe.name,
         description=recipe.description,
@@ -112,7 +109,7 @@ def _card(
         samples=len(examples),
         ranks=trained.model.decoder.reduced.core.shape,
         durations=(float(durations.min()), float(durations.max())),
-        diagnostics=_diagnostics(examples, trained, notes, parity),
+        diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
     )
 
@@ -135,9 +132,7 @@ def _controls(recipe: Recipe, values: Floats) -> tuple[Control, ...]:
     return tuple(controls)
 
 
-def _diagnostics(
-    examples: Sequence[Example], trained: Trained, notes: list[str], parity: float
-) -> dict[str, Any]:
+def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str, Any]:
     """What training measured, in metres and plain shares, rounded to what is worth reading."""
     full, kept = trained.full.core, trained.model.decoder.reduced.core
     cut = float(np.sum(np.square(full)) - np.sum(np.square(kept)))
@@ -152,7 +147,7 @@ def _diagnostics(
         "nugget": _round(hyper.nugget),
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
-        "notes": notes + _found(examples, trained),
+        "notes": notes + _found(trained),
     }
 
 
@@ -160,7 +155,7 @@ def _round(value: Any) -> float:
     return float(f"{float(value):.4g}")
 
 
-def _found(examples: Sequence[Example], trained: Trained) -> list[str]:
+def _found(trained: Trained) -> list[str]:
     """One sentence for every clip that a joint was cleaned in or watched in."""
     said: dict[tuple[int, str], list[str]] = {}
     for finding in trained.findings:
@@ -168,7 +163,7 @@ def _found(examples: Sequence[Example], trained: Trained) -> list[str]:
         entry = f"{joint} by {np.degrees(finding.angle):.0f} degrees"
         said.setdefault((finding.clip, finding.kind), []).append(entry)
     return [
-        f"line {examples[clip].row.line}, {examples[clip].row.place.name}: "
+        f"line {trained.examples[clip].row.line}, {trained.examples[clip].row.place.name}: "
         f"{_MEANING[kind]}: {', '.join(entries)}"
         for (clip, kind), entries in sorted(said.items())
     ]

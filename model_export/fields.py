@@ -55,6 +55,8 @@ def proportions(offsets: Floats) -> tuple[Proportions, Floats]:
     # A direction of no length has no sign either.
     signs = np.where(right[np.arange(rank), largest] < 0, -1.0, 1.0)
     directions = (signs[:, None] * right[:rank]).reshape(rank, -1, 3)
+    # The root has no bone; the decomposition leaves a rounding error where it was.
+    directions[:, 0] = 0.0
     return Proportions(mean, directions), left[:, :rank] * values[:rank] * signs
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from model_export import table
+from model_export import flips, table
+from model_export.flips import Finding
 from model_export.recipe import Recipe
 from model_export.table import Row
 from service.motion import bvh, quat
@@ -23,14 +24,15 @@ RIGID = 1e-4
 class Example:
     """One clip with what it is an example of.
 
-    controls (d,), landmarks: fractions of the clip, in order. offsets (J, 3): the performer's bone
-    offsets, m; the root's is zero.
+    controls (d,), landmarks: fractions of the clip, in order. jumps: what a solver did to small
+    joints between two frames, and is undone.
     """
 
     row: Row
     clip: Clip
     controls: Floats
     landmarks: tuple[float, ...]
+    jumps: tuple[Finding, ...]
 
     @property
     def offsets(self) -> Floats:
@@ -38,11 +40,6 @@ class Example:
         offsets = self.clip.translations.mean(axis=0)
         offsets[0] = 0.0
         return offsets
-
-    @property
-    def tips(self) -> Floats:
-        """End site offsets (E, 3) of the performer, m."""
-        return self.clip.skeleton.tip_offsets
 
 
 def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
@@ -88,10 +85,12 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
     stretch = np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0)
     if stretch > RIGID:
         notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
+    # Before a cycle is closed, which would spread a jump over all of it.
+    clip, jumps = flips.without_jumps(clip, 0)
     clip = _loop(_heading_out(clip)) if recipe.motion.cyclic else _origin_out(clip)
     if recipe.motion.root == "in_place":
         clip = _travel_out(clip)
-    return Example(row, clip, row.controls, _landmarks(row, last))
+    return Example(row, clip, row.controls, _landmarks(row, last), tuple(jumps))
 
 
 def _cut(clip: Clip, first: int, last: int) -> Clip:

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,11 +68,18 @@ def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
         records = [(reader.line_num, record) for record in reader]
     except csv.Error as fault:
         raise RecipeError(str(place), f"not CSV: {fault}", reader.line_num) from fault
+    _refuse_twin_columns(place, reader.fieldnames or [])
     for line, record in records:
         if None in record or None in record.values():
             columns = len(reader.fieldnames or [])
             raise RecipeError(str(place), f"not the {columns} cells of the heading", line)
     return records
+
+
+def _refuse_twin_columns(place: Place, names: Sequence[str]) -> None:
+    twins = sorted({name for name in names if names.count(name) > 1})
+    if twins:
+        raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,8 @@ class _Table:
 
     def number(self, line: int, record: dict[str, str], column: str) -> float:
         try:
-            value = float(record[column])
+            # Python reads 1_000 as a number; a table that holds it means something else.
+            value = float(record[column].replace("_", "?"))
         except ValueError:
             value = math.nan
         if not math.isfinite(value):

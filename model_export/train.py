@@ -11,7 +11,7 @@ from model_export.chart import Chart
 from model_export.decoder import Decoder
 from model_export.field_bank import FieldBank, Spread
 from model_export.fields import Fitted
-from model_export.flips import Finding, without_jumps
+from model_export.flips import Finding
 from model_export.hosvd import Multilinear
 from model_export.ingest import Example
 from model_export.model import Model
@@ -32,12 +32,14 @@ Report = Callable[[str], None]
 class Trained:
     """A model with what it was made from and what was seen on the way.
 
-    pose: the tuned pose field. missed (N,): mean squared joint distance, m², of each clip from what
-    all others predict for it. explained: for each field the share of the variation between clips
-    that leave-one-out predicts from the controls; one at or below zero is answered with its mean.
+    examples: in an order of their own, so that the model does not depend on the table's. pose: the
+    tuned pose field. missed (N,): mean squared joint distance, m², of each clip from what all
+    others predict for it. explained: for each field the share of the variation between clips that
+    leave-one-out predicts from the controls; one at or below zero is answered with its mean.
     """
 
     model: Model
+    examples: tuple[Example, ...]
     skeleton: Skeleton
     aligned: Aligned
     tensor: MotionTensor
@@ -64,6 +66,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
 
     Raises TrainingError where the samples cannot carry a field.
     """
+    examples = _sorted(examples)
     controls = np.stack([example.controls for example in examples])
     names = tuple(control.name for control in recipe.controls)
     kriging.check(controls, names, recipe.kriging.drift, recipe.kriging.nugget == 0)
@@ -79,23 +82,30 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     return _fit(recipe, examples, controls, moved, own_tensor, full)
 
 
+def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
+    """By controls, and repeated trials by their duration and pace."""
+
+    def key(example: Example) -> tuple[float, ...]:
+        return (*example.controls, example.clip.duration, *example.clip.root_path[-1])
+
+    return tuple(sorted(examples, key=key))
+
+
 def _joint_weights(recipe: Recipe, skeleton: Skeleton) -> Floats:
     return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in skeleton.names])
 
 
 def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
-    """Clips cleaned, aligned and written as pose vectors."""
-    cleaned = [without_jumps(example.clip, index) for index, example in enumerate(examples)]
-    jumps = [finding for _, found in cleaned for finding in found]
-    clean = [replace(e, clip=clip) for e, (clip, _) in zip(examples, cleaned, strict=True)]
+    """Clips aligned and written as pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
-    aligned = align.align(clean, recipe.motion.frames, basis, settings.rounds, weights)
+    aligned = align.align(examples, recipe.motion.frames, basis, settings.rounds, weights)
     travels = {}
     if recipe.motion.cyclic:
         aligned, travels["travel"] = travel.take_out(aligned)
     offsets = np.stack([example.offsets for example in examples])
     parents = examples[0].clip.skeleton.parents
     numbers, chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
+    jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
     return _Moved(aligned, numbers, chart, travels, jumps + noticed)
 
 
@@ -131,6 +141,7 @@ def _fit(
     explained = {name: found.explained for name, found in fitted.items()}
     return Trained(
         model,
+        tuple(examples),
         _mean_skeleton(examples, offsets),
         moved.aligned,
         own_tensor,

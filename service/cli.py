@@ -22,6 +22,7 @@ from service.motion.answer import ClipAnswer
 from service.motion.errors import (
     FileError,
     InvalidField,
+    ModelError,
     MotionError,
     TrainingError,
     UnknownFormat,
@@ -147,6 +148,8 @@ def check(
 
 def open_model(path: Path) -> Synthesizer:
     """The one model of a file."""
+    if path.is_dir():
+        raise ModelError(path, "a folder, expected one .onnx file")
     return next(iter(library.load([path]).models.values()))
 
 

@@ -56,7 +56,7 @@ def model_path(
 ) -> Path:
     """The small model as a file, reaching.onnx."""
     path = tmp_path_factory.mktemp("models") / "reaching.onnx"
-    path.write_bytes(export.export(small_recipe, examples, trained, []).content)
+    path.write_bytes(export.export(small_recipe, trained, []).content)
     return path
 
 

@@ -18,6 +18,8 @@ Policy = Literal["warn", "refuse"]
 """What to do with controls outside what was sampled."""
 
 RATES = (1.0, 1000.0)
+# A clip this many times longer or shorter than any that was captured is no motion any more.
+FARTHEST = 10.0
 MOST_POSES = 10_000
 
 
@@ -45,6 +47,7 @@ class Synthesizer:
         if not 1 <= len(times) <= MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
         when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
+        self._duration(point)
         answer = self._answer(point, when, controls, warnings)
         for index, value in enumerate(when):
             _within(f"times/{index}", value, 0.0, answer.trust.duration, "s")
@@ -64,7 +67,7 @@ class Synthesizer:
         """
         point, warnings = self._door(controls, extrapolate)
         _within("fps", _number("fps", rate), *RATES, "frames a second")
-        duration = float(self.session.run(point, np.zeros((1, 1)), "duration")[0][0])
+        duration = self._duration(point)
         last = duration if end is None else _number("end", end)
         _within("end", last, 0.0, duration, "s")
         _within("start", _number("start", start), 0.0, last, "s")
@@ -98,6 +101,18 @@ class Synthesizer:
         if said and extrapolate == "refuse":
             raise OutsideSamples("controls", "; ".join(said))
         return point, said
+
+    def _duration(self, point: Floats) -> float:
+        """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
+        duration = float(self.session.run(point, np.zeros((1, 1)), "duration")[0][0])
+        low, high = self.session.card.durations
+        if not low / FARTHEST <= duration <= high * FARTHEST:
+            raise OutsideSamples(
+                "controls",
+                f"so far outside what was sampled that the clip would last {duration:.3g} s; "
+                f"captured clips last {low:.3g} to {high:.3g} s",
+            )
+        return duration
 
     def _answer(
         self,
@@ -137,9 +152,13 @@ def _required(control: Control, controls: Mapping[str, float]) -> float:
 def _number(field: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidField(field, f"{value!r}, expected a number")
-    if not math.isfinite(value):
-        raise InvalidField(field, f"{value}, expected a finite number")
-    return float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InvalidField(field, f"{number}, expected a finite number")
+    return number
 
 
 def _within(field: str, value: float, low: float, high: float, unit: str) -> None:

@@ -31,7 +31,7 @@ def _answer(path: Path, data: Path) -> tuple[str, ClipAnswer]:
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, data)
     trained = train.train(own, examples, lambda _: None)
-    exported = export.export(own, examples, trained, notes)
+    exported = export.export(own, trained, notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))
     controls = {control.name: control.default for control in exported.card.controls}
     return own.name, model.clip(controls, 30.0, "refuse")

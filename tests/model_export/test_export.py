@@ -79,7 +79,7 @@ def asked(trained, opened):
 def made_in_this_process(path, folder):
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, folder)
-    return export.export(own, examples, train.train(own, examples, lambda _: None), notes).content
+    return export.export(own, train.train(own, examples, lambda _: None), notes).content
 
 
 def test_the_same_data_give_the_same_bytes_in_every_process(
@@ -102,7 +102,7 @@ def test_other_data_give_other_bytes(quick_recipe, reaching_folder):
     path[:, 0, 1] += 1e-3
     moved = [replace(examples[0], clip=replace(examples[0].clip, translations=path)), *examples[1:]]
     made = [
-        export.export(own, these, train.train(own, these, lambda _: None), notes).content
+        export.export(own, train.train(own, these, lambda _: None), notes).content
         for these in (examples, moved)
     ]
     assert made[0] != made[1]

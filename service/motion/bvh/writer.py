@@ -16,8 +16,13 @@ POSITIONS = "Xposition Yposition Zposition"
 STILL = 1e-9
 """A translation that varies by no more, in metres, is the bone's offset and gets no channels."""
 
-FINEST = 1e-7
-"""Step of written lengths in metres, so that a chain of joints still returns within 1e-6."""
+FINEST = 1e-8
+FEWEST_DECIMALS = 7
+"""Step of written lengths in metres, and digits of an angle in degrees.
+
+Six digits hold each joint within 1e-6, but not the hand at the end of a chain: its error is the sum
+of all roundings before it, each turned into a length by the arm behind it.
+"""
 
 
 def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
@@ -36,7 +41,7 @@ def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
 
 
 def refuse_unwritable(clip: Clip, metres_per_unit: float) -> None:
-    """Raise ValueError for a clip that would not be read back as it is."""
+    """Raise ValueError for a unit, names or numbers that no BVH file can hold."""
     if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
         raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
     for name in clip.skeleton.names:
@@ -104,8 +109,8 @@ class Sheet:
 
     @property
     def decimals(self) -> int:
-        """Digits behind the point of every number: six, or more for a unit above a decimetre."""
-        return max(6, int(np.ceil(np.log10(self.metres_per_unit / FINEST))))
+        """Digits behind the point of every number: more for a unit above a decimetre."""
+        return max(FEWEST_DECIMALS, int(np.ceil(np.log10(self.metres_per_unit / FINEST))))
 
     def rows(self) -> str:
         """A line of numbers a frame."""

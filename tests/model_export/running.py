@@ -1,0 +1,29 @@
+"""A piece of a graph run on its own in onnxruntime."""
+
+from collections.abc import Callable
+
+import numpy as np
+import onnxruntime
+
+from model_export.net import Net
+from service.motion.conventions import Floats
+
+
+def outputs(
+    build: Callable[..., str | tuple[str, ...]], axes: tuple[int, ...], **inputs: Floats
+) -> list[Floats]:
+    """What `build(net, *names of the inputs)` answers, in float32; axes: how many each has."""
+    net = Net()
+    built = build(net, *inputs)
+    names = [built] if isinstance(built, str) else list(built)
+    shapes = {name: [f"{name}_{i}" for i in range(a.ndim)] for name, a in inputs.items()}
+    results = {f"result_{i}": [f"axis_{i}_{j}" for j in range(n)] for i, n in enumerate(axes)}
+    for result, name in zip(results, names, strict=True):
+        net.named(result, name)
+    content = net.model(shapes, results, {}, {"producer_name": "test"})
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    feed = {name: array.astype(np.float32) for name, array in inputs.items()}
+    return session.run(list(results), feed)

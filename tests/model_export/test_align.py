@@ -1,0 +1,240 @@
+"""Alignment of a family whose true warps are known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model_export import align, dtw, ingest
+from model_export.ingest import Example
+from model_export.table import Row
+from model_export.warp import DENSE, WarpBasis
+from service.motion import clip, quat
+from service.motion.conventions import UP
+from service.motion.skeleton import Skeleton
+
+PARENTS = (-1, 0, 1, 2)
+JOINTS = Skeleton(
+    ("hips", "chest", "arm", "hand"),
+    PARENTS,
+    np.array([[0, 0.9, 0], [0, 0.4, 0], [0.3, 0, 0], [0.3, 0, 0.0]]),
+    (),
+    np.zeros((0, 3)),
+)
+BASIS = WarpBasis(6)
+CLIPS, FRAMES, EVENT = 12, 60, 0.4
+CANONICAL = np.linspace(0.0, 1.0, FRAMES)
+WEIGHTS = np.ones(4)
+
+
+def poses(s, size):
+    """Rotations (S, J, 4) and root path (S, 3) of a reach of some size at canonical times (S,)."""
+    bell = np.exp(-0.5 * ((s - EVENT) / 0.12) ** 2)
+    angles = [0.3 * s, 0.2 * np.sin(4 * s), size * bell, 0.8 * size * np.sin(6 * s) * s]
+    axes = [UP, np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), UP]
+    rotations = np.stack([quat.about(a, v) for a, v in zip(axes, angles, strict=True)], axis=1)
+    return rotations, np.stack([0.5 * s, 0.9 + 0.05 * bell, 0.1 * s**2], axis=1)
+
+
+def example(size, times, landmarks=()):
+    """Clip that is at canonical time `times` (F,) at each of its frames."""
+    rotations, path = poses(times, size)
+    row = Row(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([size]), ())
+    own = clip.assemble(JOINTS, rotations, path, JOINTS.offsets, 60.0)
+    return Example(row, own, row.controls, landmarks, jumps=())
+
+
+@pytest.fixture
+def logs(rng):
+    return 0.4 * rng.normal(size=(CLIPS, BASIS.knots))
+
+
+@pytest.fixture
+def family(logs, rng):
+    """Examples, each of its own length, pace and size."""
+    frames = rng.integers(70, 130, CLIPS)
+    sizes = np.linspace(0.9, 1.1, CLIPS)
+    return [
+        example(size, BASIS.evaluate(log, np.linspace(0.0, 1.0, count)))
+        for size, log, count in zip(sizes, logs, frames, strict=True)
+    ]
+
+
+def aligned(family, rounds=2, basis=BASIS):
+    return align.align(family, FRAMES, basis, rounds, WEIGHTS)
+
+
+def disagreement(found, true):
+    """Root-mean-square by which clips disagree on when the same canonical moment happens.
+
+    A reparametrisation that all clips share is no fault: canonical time is the family's own.
+    """
+    moments = np.stack(
+        [
+            BASIS.evaluate(own, BASIS.invert(known, DENSE))
+            for own, known in zip(found, true, strict=True)
+        ]
+    )
+    return np.sqrt(np.mean(moments.var(axis=0)))
+
+
+def test_known_warps_are_recovered(family, logs):
+    # Paths go from frame to frame of 100.
+    assert disagreement(aligned(family).logs, logs) < 0.01
+    assert disagreement(np.zeros_like(logs), logs) > 0.04
+
+
+def test_equal_clips_are_not_warped(family):
+    found = aligned([family[0]] * 5)
+    assert np.max(np.abs(found.logs)) < 1e-9
+    assert np.max(np.abs(aligned(family).logs)) > 0.1
+
+
+def mean_inverse(logs):
+    return np.mean([BASIS.invert(log, DENSE) for log in logs], axis=0)
+
+
+def test_mean_warp_is_the_identity(family, logs):
+    found = aligned(family)
+    # What six increments cannot follow of the correction.
+    assert np.max(np.abs(mean_inverse(found.logs) - DENSE)) < 0.004
+    assert np.max(np.abs(mean_inverse(logs) - DENSE)) > 0.02
+
+
+def test_where_nothing_moves_landmarks_say_what_time_it_is(rng):
+    marks = rng.uniform(0.35, 0.65, CLIPS)
+    still = [example(1.0, np.full(80, 0.9), (mark,)) for mark in marks]
+    unmarked = [replace(e, landmarks=()) for e in still]
+
+    def spread(family):
+        logs = aligned(family).logs
+        return np.ptp(
+            [BASIS.evaluate(o, np.array([m]))[0] for o, m in zip(logs, marks, strict=True)]
+        )
+
+    # Six increments bend for a landmark to within two frames of 100.
+    assert spread(still) < 0.02
+    assert spread(unmarked) > 0.2
+
+
+def acceleration(positions):
+    return np.sqrt(np.mean(np.square(np.diff(positions, n=2, axis=1))))
+
+
+def positions(rotations, path):
+    return clip.assemble(JOINTS, rotations, path, JOINTS.offsets, 1.0).positions()
+
+
+def test_alignment_does_not_multiply_acceleration(family):
+    offsets = np.tile(JOINTS.offsets, (CLIPS, 1, 1))
+    truth = np.stack([positions(*poses(CANONICAL, e.controls[0])) for e in family])
+    found = align.positions(aligned(family), PARENTS, offsets)
+    assert acceleration(found) < 1.2 * acceleration(truth)
+    even = np.stack([positions(*align.resample(e.clip, CANONICAL)) for e in family])
+    paths = dtw.warp(even.reshape(CLIPS, FRAMES, -1), truth[5].reshape(FRAMES, -1))
+    by_path = [
+        positions(*align.resample(e.clip, np.interp(CANONICAL, path, CANONICAL)))
+        for e, path in zip(family, paths, strict=True)
+    ]
+    assert acceleration(np.stack(by_path)) > 1.2 * acceleration(truth)
+
+
+def test_aligned_clips_differ_by_their_controls_and_no_longer_by_their_timing(family):
+    found = aligned(family)
+    offsets = np.tile(JOINTS.offsets, (CLIPS, 1, 1))
+    uniform = np.stack(
+        [
+            clip.assemble(
+                JOINTS, *align.resample(e.clip, CANONICAL), JOINTS.offsets, 1.0
+            ).positions()
+            for e in family
+        ]
+    )
+
+    def scatter(joints):
+        """Root-mean-square distance of hands from the line through them by size, m."""
+        hands = joints[:, :, 3] - joints[:, :, 0]
+        sizes = np.stack([np.ones(CLIPS), np.linspace(-1.0, 1.0, CLIPS)], axis=1)
+        flat = hands.reshape(CLIPS, -1)
+        left = flat - sizes @ np.linalg.lstsq(sizes, flat, rcond=None)[0]
+        return np.sqrt(np.mean(np.sum(left.reshape(hands.shape) ** 2, axis=-1)))
+
+    assert scatter(align.positions(found, PARENTS, offsets)) < 0.2 * scatter(uniform)
+
+
+def test_rounds_to_the_mean_better_the_one_to_the_medoid(family, logs):
+    none, four = (disagreement(aligned(family, rounds).logs, logs) for rounds in (0, 4))
+    assert four < none
+
+
+def test_durations_are_the_clips_own(family):
+    assert aligned(family).durations.tolist() == [e.clip.duration for e in family]
+
+
+def test_order_of_clips_does_not_matter(family, rng):
+    order = rng.permutation(CLIPS)
+    first, second = aligned(family), aligned([family[i] for i in order])
+    assert np.max(np.abs(second.logs - first.logs[order])) < 1e-6
+    assert np.max(np.abs(second.logs - first.logs)) > 1e-2
+    assert order[second.reference] == first.reference
+
+
+def turned(family, angle, shift):
+    """Every clip somewhere else, facing elsewhere."""
+    return [
+        replace(e, clip=ingest.place(e.clip, -np.array(shift), np.array(-angle))) for e in family
+    ]
+
+
+def placed(family):
+    """What ingest does: the first frame stands over the origin and faces straight ahead."""
+    return [
+        replace(
+            e,
+            clip=ingest.place(e.clip, e.clip.root_path[0] * (1.0 - UP), ingest.heading(e.clip)[0]),
+        )
+        for e in family
+    ]
+
+
+def test_half_a_turn_of_all_clips_changes_nothing(family):
+    away = turned(family, np.radians(178.0), [3.0, 0.0, -2.0])
+    first, second = aligned(placed(family)), aligned(placed(away))
+    assert np.max(np.abs(second.logs - first.logs)) < 1e-6
+    assert np.max(np.abs(second.root_path - first.root_path)) < 1e-9
+    matrices = quat.to_matrix(second.rotations) - quat.to_matrix(first.rotations)
+    assert np.max(np.abs(matrices)) < 1e-9
+    unplaced = aligned(away)
+    assert np.max(np.abs(unplaced.root_path - first.root_path)) > 1.0
+
+
+def test_resampled_clip_meets_its_frames_and_keeps_within_its_ends(family):
+    own = family[0].clip
+    rotations, path = align.resample(own, np.linspace(0.0, 1.0, len(own)))
+    assert np.max(np.abs(path - own.root_path)) < 1e-12
+    assert np.max(np.abs(quat.to_matrix(rotations) - quat.to_matrix(own.rotations))) < 1e-12
+    _, outside = align.resample(own, np.array([-1.0, 2.0]))
+    assert np.array_equal(outside, own.root_path[[0, -1]])
+
+
+def test_weights_of_joints_decide_what_is_aligned(rng):
+    """Two joints that tell of different times: the heavier is believed."""
+
+    def two_minds(size, times, other):
+        right = example(size, times)
+        rotations = right.clip.rotations.copy()
+        rotations[:, 1] = poses(other, 1.0)[0][:, 2]
+        return replace(right, clip=replace(right.clip, rotations=rotations))
+
+    u = np.linspace(0.0, 1.0, 90)
+    first, second = 0.4 * rng.normal(size=(2, 8, BASIS.knots))
+    family = [
+        two_minds(1.0, BASIS.evaluate(a, u), BASIS.evaluate(b, u))
+        for a, b in zip(first, second, strict=True)
+    ]
+    even = aligned(family)
+    # Where the arm is follows from the chest alone.
+    arm = align.align(family, FRAMES, BASIS, 2, np.array([1.0, 1.0, 400.0, 1.0]))
+    assert disagreement(arm.logs, second) < 0.7 * disagreement(even.logs, second)
+    assert disagreement(arm.logs, first) > disagreement(even.logs, first)

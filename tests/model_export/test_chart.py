@@ -1,0 +1,103 @@
+"""Poses as numbers and back, past half a turn too."""
+
+import numpy as np
+import pytest
+
+from model_export import chart
+from service.motion import quat
+
+UP = np.array([0.0, 1.0, 0.0])
+TOLERANCE = 1e-12
+
+
+@pytest.fixture
+def rotations(rng):
+    """(6, 40, 3, 4), within a third of a turn of a mean of their own."""
+    time = np.linspace(0.0, 3.0, 40)[:, None, None]
+    swing = quat.exp(0.6 * np.sin(time + rng.normal(size=(6, 1, 3, 3))))
+    return quat.mul(quat.exp(rng.normal(size=(3, 3))), swing)
+
+
+@pytest.fixture
+def path(rng):
+    return rng.normal(size=(6, 40, 3))
+
+
+def apart(a, b):
+    return np.max(np.abs(quat.to_matrix(a) - quat.to_matrix(b)))
+
+
+def raised(peak):
+    """One joint in five clips that swing up to an angle from where they start and back."""
+    bell = np.sin(np.linspace(0.0, np.pi, 80))
+    peaks = np.array([0.3, 0.3, 0.3, 0.3, peak])
+    return quat.about(UP, peaks[:, None] * bell)[:, :, None]
+
+
+def test_poses_of_numbers_are_the_poses(rotations, path):
+    own, findings = chart.fit(rotations)
+    back, root = own.poses(own.numbers(rotations, path))
+    assert apart(back, rotations) < TOLERANCE
+    assert np.array_equal(root, path)
+    assert findings == []
+    other = chart.Chart(own.means[::-1])
+    assert apart(other.poses(own.numbers(rotations, path))[0], rotations) > 0.1
+
+
+def test_layout_is_root_and_then_three_numbers_a_joint(rotations, path):
+    own, _ = chart.fit(rotations)
+    numbers = own.numbers(rotations, path)
+    assert numbers.shape == (6, 40, 12)
+    assert np.array_equal(numbers[..., :3], path)
+    second = quat.log(quat.mul(quat.conj(own.means[1]), rotations[:, :, 1]))
+    assert np.max(np.abs(numbers[..., 6:9] - second)) < TOLERANCE
+
+
+def test_quaternion_and_its_negative_are_one_pose(rotations, path, rng):
+    own, _ = chart.fit(rotations)
+    signed = rotations * rng.choice([-1.0, 1.0], size=rotations.shape[:-1])[..., None]
+    flipped, _ = chart.fit(signed)
+    assert np.max(np.abs(flipped.means - own.means)) < TOLERANCE
+    gap = flipped.numbers(signed, path) - own.numbers(rotations, path)
+    assert np.max(np.abs(gap)) < TOLERANCE
+
+
+def test_turn_of_the_whole_family_changes_no_numbers(rotations, path):
+    away = rotations.copy()
+    away[:, :, 0] = quat.mul(quat.about(UP, np.array(np.radians(178.0))), rotations[:, :, 0])
+    first, second = chart.fit(rotations)[0], chart.fit(away)[0]
+    gap = second.numbers(away, path) - first.numbers(rotations, path)
+    assert np.max(np.abs(gap)) < 1e-9
+    assert np.max(np.abs(first.numbers(away, path) - first.numbers(rotations, path))) > 1.0
+
+
+def test_arm_past_half_a_turn_is_followed_without_a_jump():
+    rotations = raised(1.4 * np.pi)
+    own, findings = chart.fit(rotations)
+    numbers = own.numbers(rotations, np.zeros((5, 80, 3)))[..., 3:]
+    plain = quat.log(quat.mul(quat.conj(own.means), rotations))[:, :, 0]
+    assert np.linalg.norm(np.diff(numbers, axis=1), axis=-1).max() < 0.3
+    assert np.linalg.norm(np.diff(plain, axis=1), axis=-1).max() > 5.0
+    assert np.linalg.norm(numbers, axis=-1).max() > 1.05 * np.pi
+    assert (
+        apart(own.poses(np.concatenate([np.zeros((5, 80, 3)), numbers], -1))[0], rotations) < 1e-9
+    )
+    assert [(f.kind, f.joint, f.clip) for f in findings] == [("wrap", 0, 4)]
+
+
+def test_clips_that_stay_near_are_on_the_same_sheet_as_one_that_wraps():
+    rotations = raised(1.4 * np.pi)
+    own, _ = chart.fit(rotations)
+    numbers = own.numbers(rotations, np.zeros((5, 80, 3)))[..., 3:]
+    # All five start at one pose.
+    assert np.max(np.abs(numbers[:, 0] - numbers[0, 0])) < TOLERANCE
+
+
+def test_joint_close_to_half_a_turn_is_named_but_not_changed():
+    rotations = raised(1.05 * np.pi)
+    own, findings = chart.fit(rotations)
+    assert [(f.kind, f.joint, f.clip) for f in findings] == [("far", 0, 4)]
+    assert 0.9 * np.pi < findings[0].angle <= np.pi
+    plain = quat.log(quat.mul(quat.conj(own.means), rotations))[:, :, 0]
+    numbers = own.numbers(rotations, np.zeros((5, 80, 3)))[..., 3:]
+    assert np.array_equal(numbers, plain)

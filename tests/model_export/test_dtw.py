@@ -1,0 +1,121 @@
+"""Dynamic time warping with a limited slope."""
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from model_export import dtw
+
+TOLERANCE = 1e-9
+LEAST, MOST = 1.0 / 3.0, 3.0
+
+
+def best_path(sequence, reference):
+    """Cost and cells of the best path, by plain recursion over the steps that are allowed."""
+    costs = np.sum(np.square(sequence[:, None] - reference), axis=-1)
+
+    def toll(i, j, down, right):
+        # A long step passes every cell on its way; all steps pay for the distance they go.
+        cells = [(i - min(k, down - 1), j - min(k, right - 1)) for k in range(max(down, right))]
+        return (down + right) * float(np.mean([costs[cell] for cell in cells]))
+
+    @cache
+    def reach(i, j):
+        if (i, j) == (0, 0):
+            return float(costs[0, 0]), ((0, 0),)
+        ways = [(np.inf, ())]
+        for down, right in ((1, 1), (1, 2), (2, 1), (1, 3), (3, 1)):
+            if i >= down and j >= right:
+                cost, path = reach(i - down, j - right)
+                ways.append((cost + toll(i, j, down, right), (*path, (i, j))))
+        return min(ways)
+
+    return reach(len(sequence) - 1, len(reference) - 1)
+
+
+def wandering(rng, count, frames, features=2):
+    return np.cumsum(rng.normal(size=(count, frames, features)), axis=1)
+
+
+def test_cost_and_path_are_those_of_the_plain_recursion(rng):
+    sequences, (reference,) = wandering(rng, 6, 12), wandering(rng, 1, 12)
+    found, phases = dtw.total_cost(sequences, reference), dtw.warp(sequences, reference)
+    for sequence, cost, phase in zip(sequences, found, phases, strict=True):
+        expected, path = best_path(sequence, reference)
+        rows, columns = np.array(path).T
+        assert abs(cost - expected) < TOLERANCE
+        assert np.max(np.abs(phase - np.interp(np.arange(12), rows, columns) / 11)) < TOLERANCE
+        even = np.sum(np.square(sequence - reference)) * 2 - np.sum((sequence - reference)[0] ** 2)
+        assert cost < even - 1e-3
+        assert np.max(np.abs(phase - np.linspace(0.0, 1.0, 12))) > 1e-2
+
+
+def test_many_at_once_are_warped_as_one_by_one(rng):
+    sequences, (reference,) = wandering(rng, 5, 20), wandering(rng, 1, 20)
+    together = dtw.warp(sequences, reference)
+    alone = [dtw.warp(sequence[None], reference)[0] for sequence in sequences]
+    assert np.array_equal(together, alone)
+    assert not np.array_equal(together, alone[::-1])
+
+
+def test_slope_keeps_within_a_third_and_three(rng):
+    sequences, (reference,) = wandering(rng, 30, 40), wandering(rng, 1, 40)
+    slopes = np.diff(dtw.warp(sequences, reference), axis=1) * 39
+    assert LEAST - TOLERANCE <= slopes.min() < LEAST + TOLERANCE
+    assert MOST - TOLERANCE < slopes.max() <= MOST + TOLERANCE
+
+
+def test_pause_is_not_followed_beyond_the_slope_limit():
+    time = np.linspace(0.0, 1.0, 60)
+    pausing = np.interp(time, [0.0, 0.4, 0.7, 1.0], [0.0, 0.5, 0.5, 1.0])
+    (phase,) = dtw.warp(pausing[None, :, None], time[:, None])
+    slopes = np.diff(phase) * 59
+    assert slopes.min() > LEAST - TOLERANCE
+    assert np.diff(pausing).min() * 59 < LEAST - TOLERANCE
+
+
+def test_ends_meet_and_time_never_runs_backwards(rng):
+    phases = dtw.warp(wandering(rng, 30, 40), wandering(rng, 1, 40)[0])
+    assert np.array_equal(phases[:, [0, -1]], np.tile([0.0, 1.0], (30, 1)))
+    assert np.diff(phases, axis=1).min() > 0.0
+
+
+def test_sequence_is_not_warped_to_itself(rng):
+    (sequence,) = wandering(rng, 1, 40)
+    assert np.max(np.abs(dtw.warp(sequence[None], sequence)[0] - np.linspace(0, 1, 40))) < 1e-12
+    assert dtw.total_cost(sequence[None], sequence)[0] < TOLERANCE
+    (other,) = wandering(rng, 1, 40)
+    assert dtw.total_cost(other[None], sequence)[0] > 1.0
+
+
+@pytest.mark.parametrize("exponent", [0.7, 1.4])
+def test_known_warp_is_recovered(exponent):
+    u = np.linspace(0.0, 1.0, 100)
+
+    def motion(s):
+        return np.stack([np.sin(5.0 * s), np.cos(3.0 * s), s], axis=-1)
+
+    true = u**exponent
+    (phase,) = dtw.warp(motion(true)[None], motion(u))
+    # A frame, since paths go from frame to frame.
+    assert np.max(np.abs(phase - true)) < 1.5 / 99
+    assert np.max(np.abs(u - true)) > 3.0 / 99
+
+
+def test_long_steps_bring_no_gain(rng):
+    """What is passed over is paid for: the cost of a path is its length times its mean cost."""
+    frames = 30
+    sequence = np.zeros((1, frames, 1))
+    assert abs(dtw.total_cost(sequence, np.ones((frames, 1)))[0] - (2 * frames - 1)) < TOLERANCE
+    noisy = np.tile([[0.0], [1.0]], (frames // 2, 1))
+    (phase,) = dtw.warp(noisy[None], noisy[::-1])
+    assert all(later > earlier for earlier, later in pairwise(phase))
+    assert dtw.total_cost(noisy[None], noisy[::-1])[0] > 0.0
+
+
+def test_cost_of_a_warp_is_the_same_both_ways(rng):
+    (a, b) = wandering(rng, 2, 25)
+    there, back = dtw.total_cost(a[None], b)[0], dtw.total_cost(b[None], a)[0]
+    assert abs(there - back) < TOLERANCE * there

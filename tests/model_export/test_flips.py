@@ -1,0 +1,127 @@
+"""Half turns that a solver makes are undone where nobody sees them, and only there."""
+
+import numpy as np
+import pytest
+
+from model_export import flips
+from service.motion import quat
+from service.motion.clip import Clip
+from service.motion.skeleton import Skeleton
+
+PARENTS = (-1, 0, 1, 2)
+OFFSETS = np.array([[0, 0.9, 0], [0, 0.4, 0], [0.3, 0, 0], [0.08, 0, 0]])
+JOINTS = Skeleton(("hips", "arm", "hand", "finger"), PARENTS, OFFSETS, (), np.zeros((0, 3)))
+AXIS = np.array([1.0, 0.0, 0.0])
+HALF_TURN = quat.about(AXIS, np.array(np.pi))
+ARM, HAND, FINGER = 1, 2, 3
+
+
+@pytest.fixture
+def smooth(rng):
+    """Rotations (50, J, 4) that swing slowly."""
+    time = np.linspace(0.0, 3.0, 50)[:, None, None]
+    return quat.exp(0.5 * np.sin(time + rng.normal(size=(1, 4, 3))))
+
+
+@pytest.fixture
+def family(rng):
+    """Aligned rotations (9, 50, J, 4) that swing about a common mean."""
+    time = np.linspace(0.0, 3.0, 50)[:, None, None]
+    middle = quat.exp(rng.normal(size=(4, 3)))
+    return quat.mul(middle, quat.exp(0.3 * np.sin(time + rng.normal(size=(9, 1, 4, 3)))))
+
+
+def clip(rotations):
+    return Clip(JOINTS, rotations, np.tile(OFFSETS, (len(rotations), 1, 1)), 60.0)
+
+
+def steps(rotations):
+    return np.linalg.norm(quat.log(quat.mul(quat.conj(rotations[:-1]), rotations[1:])), axis=-1)
+
+
+def apart(a, b):
+    """Largest angle between rotations, rad."""
+    return np.max(np.linalg.norm(quat.log(quat.mul(quat.conj(a), b)), axis=-1))
+
+
+def test_small_joints_carry_nothing_beyond_a_hand():
+    assert flips.small_joints(PARENTS, OFFSETS).tolist() == [False, False, True, True]
+    assert flips.small_joints(PARENTS, 0.1 * OFFSETS).tolist() == [True] * 4
+    # A straight chain counts to its end, not to its next joint.
+    chain = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0, 0], [0.1, 0, 0]])
+    assert flips.small_joints(PARENTS, chain).tolist() == [False, False, True, True]
+
+
+def test_jump_of_a_small_joint_is_taken_out(smooth):
+    broken = smooth.copy()
+    broken[20:, FINGER] = quat.mul(broken[20:, FINGER], HALF_TURN)
+    clean, (finding,) = flips.without_jumps(clip(broken), 7)
+    assert steps(broken).max() > 3.0
+    assert steps(clean.rotations).max() < 0.1
+    assert apart(clean.rotations[:20], smooth[:20]) < 1e-7
+    assert np.array_equal(clean.rotations[:, :FINGER], broken[:, :FINGER])
+    assert (finding.kind, finding.joint, finding.clip) == ("jump", FINGER, 7)
+    assert abs(finding.angle - np.pi) < 0.1
+
+
+def test_what_follows_a_jump_keeps_its_own_motion(smooth):
+    broken = smooth.copy()
+    broken[20:, FINGER] = quat.mul(HALF_TURN, broken[20:, FINGER])
+    clean, _ = flips.without_jumps(clip(broken), 0)
+    own = steps(smooth)[20:, FINGER]
+    assert np.max(np.abs(steps(clean.rotations)[20:, FINGER] - own)) < 1e-7
+    assert np.ptp(own) > 1e-3
+
+
+def test_jump_of_an_arm_is_left_alone(smooth):
+    broken = smooth.copy()
+    broken[20:, ARM] = quat.mul(broken[20:, ARM], HALF_TURN)
+    clean, findings = flips.without_jumps(clip(broken), 0)
+    assert np.array_equal(clean.rotations, broken)
+    assert findings == []
+
+
+def test_smooth_clip_is_left_alone(smooth):
+    clean, findings = flips.without_jumps(clip(smooth), 0)
+    assert np.array_equal(clean.rotations, smooth)
+    assert findings == []
+
+
+def test_sign_of_a_quaternion_is_no_jump(smooth):
+    signed = smooth.copy()
+    signed[20:] *= -1.0
+    assert flips.without_jumps(clip(signed), 0)[1] == []
+
+
+def test_clip_of_one_frame_has_no_jumps(smooth):
+    clean, findings = flips.without_jumps(clip(smooth[:1]), 0)
+    assert np.array_equal(clean.rotations, smooth[:1])
+    assert findings == []
+
+
+@pytest.mark.parametrize("joint", [HAND, FINGER])
+def test_clip_half_a_turn_off_is_turned_back(family, joint):
+    broken = family.copy()
+    broken[4, :, joint] = quat.mul(broken[4, :, joint], HALF_TURN)
+    small = flips.small_joints(PARENTS, OFFSETS)
+    clean, (finding,) = flips.without_flips(broken, small)
+    assert (finding.kind, finding.joint, finding.clip) == ("flip", joint, 4)
+    assert abs(finding.angle - np.pi) < 0.5
+    # The clip's own middle becomes the family's: it lies within its swing of it.
+    assert apart(clean[4, :, joint], family[4, :, joint]) < 1.2
+    assert apart(broken[4, :, joint], family[4, :, joint]) > 3.0
+    others = np.arange(9) != 4
+    assert np.array_equal(clean[others], broken[others])
+
+
+def test_flip_of_an_arm_is_left_alone(family):
+    family[4, :, ARM] = quat.mul(family[4, :, ARM], HALF_TURN)
+    clean, findings = flips.without_flips(family, flips.small_joints(PARENTS, OFFSETS))
+    assert np.array_equal(clean, family)
+    assert findings == []
+
+
+def test_clip_that_only_passes_half_a_turn_is_no_flip(family):
+    sweep = quat.about(AXIS, np.linspace(0.0, 3.0, 50))
+    family[4, :, FINGER] = quat.mul(family[4, :, FINGER], sweep)
+    assert flips.without_flips(family, flips.small_joints(PARENTS, OFFSETS))[1] == []

@@ -1,0 +1,184 @@
+"""The theorems of De Lathauwer, De Moor and Vandewalle (2000), on tensors of every shape."""
+
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+
+from model_export import hosvd
+from service.motion.errors import TrainingError
+
+SHAPES = [(5, 4, 3), (3, 7, 4), (2, 9, 3), (4, 3, 2, 5)]
+# Roundings of sums of a few hundred products of numbers of size one.
+TOLERANCE = 1e-11
+
+
+@pytest.fixture(params=SHAPES, ids=str)
+def tensor(request, rng):
+    return rng.normal(size=request.param)
+
+
+def gram(core, mode):
+    unfolded = hosvd.unfold(core, mode)
+    return unfolded @ unfolded.T
+
+
+def off_diagonal(matrix):
+    return np.max(np.abs(matrix - np.diag(np.diagonal(matrix))), initial=0.0)
+
+
+def test_unfolding_holds_the_fibres_of_its_mode_as_columns():
+    tensor = np.arange(24.0).reshape(2, 3, 4)
+    assert hosvd.unfold(tensor, 0).tolist() == tensor.reshape(2, 12).tolist()
+    assert hosvd.unfold(tensor, 1)[:, 1].tolist() == tensor[0, :, 1].tolist()
+    assert hosvd.unfold(tensor, 2)[:, 5].tolist() == tensor[1, 2, :].tolist()
+    assert [hosvd.unfold(tensor, mode).shape for mode in range(3)] == [(2, 12), (3, 8), (4, 6)]
+
+
+@pytest.mark.parametrize(
+    ("mode", "formula"), [(0, "xa,abc->xbc"), (1, "xb,abc->axc"), (2, "xc,abc->abx")]
+)
+def test_mode_product_applies_the_matrix_to_every_fibre(mode, formula, rng):
+    tensor = rng.normal(size=(5, 5, 5))
+    matrix = rng.normal(size=(5, 5))
+    expected = np.einsum(formula, matrix, tensor)
+    assert np.max(np.abs(hosvd.mode_dot(tensor, matrix, mode) - expected)) < TOLERANCE
+    assert np.max(np.abs(hosvd.mode_dot(tensor, matrix.T, mode) - expected)) > 0.1
+
+
+def test_full_ranks_restore_the_tensor(tensor):
+    full = hosvd.decompose(tensor)
+    assert np.max(np.abs(full.restored() - tensor)) < TOLERANCE
+    one_short = full.truncated((*full.core.shape[:-1], full.core.shape[-1] - 1))
+    assert np.max(np.abs(one_short.restored() - tensor)) > 1e-3
+
+
+def test_bases_are_orthonormal(tensor):
+    for basis in hosvd.decompose(tensor).bases:
+        assert np.max(np.abs(basis.T @ basis - np.eye(basis.shape[1]))) < TOLERANCE
+
+
+def test_core_is_all_orthogonal(tensor):
+    core = hosvd.decompose(tensor).core
+    for mode in range(core.ndim):
+        assert off_diagonal(gram(core, mode)) < TOLERANCE
+        assert off_diagonal(gram(tensor, mode)) > 1e-2
+
+
+def test_slices_of_the_core_are_ordered(tensor):
+    core = hosvd.decompose(tensor).core
+    for mode in range(core.ndim):
+        norms = np.linalg.norm(hosvd.unfold(core, mode), axis=1)
+        assert np.all(np.diff(norms) <= TOLERANCE)
+    assert any(
+        np.any(np.diff(np.linalg.norm(hosvd.unfold(tensor, mode), axis=1)) > TOLERANCE)
+        for mode in range(core.ndim)
+    )
+
+
+def test_norms_of_slices_are_the_singular_values(tensor):
+    core = hosvd.decompose(tensor).core
+    for mode in range(core.ndim):
+        norms = np.linalg.norm(hosvd.unfold(core, mode), axis=1)
+        singular = np.linalg.svd(hosvd.unfold(tensor, mode), compute_uv=False)
+        # The Gram matrix's eigenvalues are squares: what is zero here is 1e-8 there.
+        assert np.max(np.abs(norms[: len(singular)] - singular)) < 1e-7
+
+
+def left_out(core, ranks):
+    """Squared singular values that ranks cut off, summed for each mode."""
+    unfolded = (hosvd.unfold(core, mode) for mode in range(core.ndim))
+    return [np.sum(np.square(rows[rank:])) for rows, rank in zip(unfolded, ranks, strict=True)]
+
+
+def all_ranks(core):
+    return product(*(range(1, size + 1) for size in core.shape))
+
+
+def test_error_of_every_truncation_is_known_beforehand(tensor):
+    full = hosvd.decompose(tensor)
+    known = hosvd.squared_errors(full.core)
+    bounds = []
+    for ranks in all_ranks(full.core):
+        true = np.sum(np.square(full.truncated(ranks).restored() - tensor))
+        assert abs(true - known[tuple(rank - 1 for rank in ranks)]) < TOLERANCE
+        bounds.append(abs(true - sum(left_out(full.core, ranks))))
+    assert max(bounds) > 1e-1
+
+
+def test_error_of_every_truncation_keeps_within_the_bounds(tensor):
+    full = hosvd.decompose(tensor)
+    known = hosvd.squared_errors(full.core)
+    worst = []
+    for ranks in all_ranks(full.core):
+        left = left_out(full.core, ranks)
+        error = known[tuple(rank - 1 for rank in ranks)]
+        assert max(left) - TOLERANCE <= error <= sum(left) + TOLERANCE
+        last = full.core[
+            tuple(slice(size - rank, size) for size, rank in zip(tensor.shape, ranks, strict=True))
+        ]
+        worst.append(np.sum(np.square(full.core)) - np.sum(np.square(last)) - sum(left))
+    assert max(worst) > 1e-1, "keeping the last vectors and not the first breaks the upper bound"
+
+
+def test_squared_errors_end_in_zero_and_never_rise(tensor):
+    known = hosvd.squared_errors(hosvd.decompose(tensor).core)
+    assert known[(-1,) * tensor.ndim] == 0.0
+    assert all(np.all(np.diff(known, axis=axis) <= 0.0) for axis in range(tensor.ndim))
+
+
+def test_truncations_are_nested_prefixes(rng):
+    full = hosvd.decompose(rng.normal(size=(6, 5, 4)))
+    wide = full.truncated((5, 4, 3))
+    narrow = full.truncated((3, 2, 2))
+    again = wide.truncated((3, 2, 2))
+    assert np.array_equal(narrow.core, again.core)
+    assert np.array_equal(narrow.core, full.core[:3, :2, :2])
+    for a, b, whole in zip(narrow.bases, again.bases, full.bases, strict=True):
+        assert np.array_equal(a, b)
+        assert np.array_equal(a, whole[:, : a.shape[1]])
+
+
+def test_tensor_of_low_rank_is_restored_by_that_rank(rng):
+    bases = [rng.normal(size=(size, 2)) for size in (8, 7, 6)]
+    tensor = np.einsum("ar,bs,ct,rst->abc", *bases, rng.normal(size=(2, 2, 2)))
+    full = hosvd.decompose(tensor)
+    assert np.max(np.abs(full.truncated((2, 2, 2)).restored() - tensor)) < 1e-10
+    assert np.max(np.abs(full.truncated((2, 1, 2)).restored() - tensor)) > 1e-2
+
+
+def test_largest_entry_of_every_basis_vector_is_positive(tensor):
+    for basis in hosvd.decompose(tensor).bases:
+        largest = basis[np.argmax(np.abs(basis), axis=0), np.arange(basis.shape[1])]
+        assert np.all(largest > 0)
+
+
+@pytest.mark.parametrize("mode", range(3))
+def test_reordered_samples_reorder_a_basis_and_nothing_else(mode, rng):
+    tensor = rng.normal(size=(5, 6, 4))
+    order = rng.permutation(tensor.shape[mode])
+    first, second = hosvd.decompose(tensor), hosvd.decompose(np.take(tensor, order, axis=mode))
+    assert np.max(np.abs(second.core - first.core)) < TOLERANCE
+    for own, (a, b) in enumerate(zip(first.bases, second.bases, strict=True)):
+        expected = a[order] if own == mode else a
+        assert np.max(np.abs(b - expected)) < TOLERANCE
+    assert np.max(np.abs(second.bases[mode] - first.bases[mode])) > 0.1
+
+
+def test_distance_of_samples_is_that_of_their_scaled_rows(rng):
+    tensor = rng.normal(size=(6, 5, 8))
+    full = hosvd.decompose(tensor)
+    spectrum = np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
+    for a, b in combinations(range(8), 2):
+        true = np.linalg.norm(tensor[..., a] - tensor[..., b])
+        rows = (full.bases[2][a] - full.bases[2][b]) * spectrum
+        assert abs(np.linalg.norm(rows) - true) < TOLERANCE
+        assert abs(np.linalg.norm(full.bases[2][a] - full.bases[2][b]) - true) > 1e-2
+
+
+@pytest.mark.parametrize("ranks", [(0, 2, 2), (4, 2, 2), (3, 3, 2), (3, 2, -1)])
+def test_rank_that_is_not_there_is_refused(ranks, rng):
+    full = hosvd.decompose(rng.normal(size=(3, 2, 4)))
+    with pytest.raises(TrainingError) as refusal:
+        full.truncated(ranks)
+    assert str(refusal.value) == f"ranks {ranks}, expected 1 to (3, 2, 4)"

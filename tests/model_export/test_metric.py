@@ -1,0 +1,128 @@
+"""The metric of pose space against forward kinematics that are only evaluated."""
+
+import numpy as np
+import pytest
+
+from model_export import metric
+from service.motion import quat, skeleton
+
+PARENTS = (-1, 0, 1, 2, 1, 4)
+JOINTS, POSES = 6, 5
+# Central differences with a step of 1e-5 are good to its square.
+TOLERANCE = 1e-8
+
+
+@pytest.fixture
+def family(rng):
+    """Means (J, 4), vectors (P, J, 3) and translations (P, J, 3) of differing performers."""
+    means = quat.normalize(rng.normal(size=(JOINTS, 4)))
+    return means, 0.8 * rng.normal(size=(POSES, JOINTS, 3)), rng.normal(size=(POSES, JOINTS, 3))
+
+
+@pytest.fixture
+def weights(rng):
+    return rng.uniform(0.5, 2.0, JOINTS)
+
+
+def skin(means, numbers, bones):
+    """Six points (J * 6, 3) on the sphere of skin around every joint, in one pose."""
+    rotations = quat.mul(means, quat.exp(numbers[3:].reshape(-1, 3)))
+    translations = np.vstack([numbers[:3], bones[1:]])
+    positions, orientations = skeleton.forward(PARENTS, rotations, translations)
+    axes = metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
+    return (positions[:, None] + quat.rotate(orientations[:, None], axes)).reshape(-1, 3)
+
+
+def by_differences(means, vectors, translations, weights):
+    """Mean over poses of JᵀJ, with the derivative of every number by central differences."""
+    total, step = 0.0, 1e-5
+    for vector, bones in zip(vectors, translations, strict=True):
+        numbers = np.concatenate([bones[0], vector.ravel()])
+        columns = []
+        for index in range(len(numbers)):
+            moved = step * np.eye(len(numbers))[index]
+            gap = skin(means, numbers + moved, bones) - skin(means, numbers - moved, bones)
+            columns.append(gap / (2.0 * step))
+        jacobian = np.stack(columns)
+        # Each sphere's mass is spread over its six points.
+        masses = np.repeat(weights / 6.0, 6)
+        total = total + np.einsum("apx,bpx,p->ab", jacobian, jacobian, masses)
+    return total / len(vectors)
+
+
+def gram(means, vectors, translations, weights):
+    rotations = quat.mul(means, quat.exp(vectors))
+    return metric.gram(PARENTS, rotations, vectors, translations, weights)
+
+
+def test_gram_matrix_is_that_of_finite_differences(family, weights):
+    expected = by_differences(*family, weights)
+    scale = np.max(np.abs(expected))
+    assert np.max(np.abs(gram(*family, weights) - expected)) < TOLERANCE * scale
+    assert np.max(np.abs(gram(*family, np.ones(JOINTS)) - expected)) > 1e-2 * scale
+    means, vectors, translations = family
+    no_curvature = metric.gram(
+        PARENTS, quat.mul(means, quat.exp(vectors)), 0.0 * vectors, translations, weights
+    )
+    assert np.max(np.abs(no_curvature - expected)) > 1e-2 * scale
+
+
+def test_turn_about_a_bone_counts_by_the_skin():
+    """A lone joint: only its own sphere moves, by two thirds of its squared radius."""
+    still = np.zeros((1, 1, 3)), np.zeros((1, 1, 3))
+    found = metric.gram((-1,), quat.exp(still[0]), *still, np.array([2.0]))
+    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * metric.SHELL**2] * 3)
+    assert np.max(np.abs(found - expected)) < 1e-15
+
+
+def test_tiny_and_vanishing_vectors_are_no_special_case(family, weights):
+    means, vectors, translations = family
+    for size in (0.0, 1e-9, 9e-5, 1.1e-4):
+        small = size * vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+        expected = by_differences(means, small, translations, weights)
+        found = gram(means, small, translations, weights)
+        assert np.max(np.abs(found - expected)) < TOLERANCE * np.max(np.abs(expected))
+
+
+def test_each_joint_adds_its_own_mass(family, weights):
+    alone = [
+        gram(*family, weight * row) for weight, row in zip(weights, np.eye(JOINTS), strict=True)
+    ]
+    assert np.max(np.abs(sum(alone) - gram(*family, weights))) < 1e-12
+    assert all(np.max(np.abs(part)) > 1e-2 for part in alone)
+
+
+def test_joint_is_moved_by_those_above_it_and_no_others(family):
+    tip = 3
+    found = gram(*family, np.eye(JOINTS)[tip])
+    moved = np.diagonal(found)[3:].reshape(JOINTS, 3).max(axis=1) > 1e-9
+    assert moved.tolist() == [True, True, True, True, False, False]
+
+
+def test_gram_matrix_is_symmetric_and_has_no_negative_direction(family, weights):
+    found = gram(*family, weights)
+    assert np.array_equal(found, found.T)
+    assert np.linalg.eigvalsh(found)[0] > 0.0
+
+
+def test_root_moves_the_whole_mass(family, weights):
+    found = gram(*family, weights)[:3, :3]
+    assert np.max(np.abs(found - weights.sum() * np.eye(3))) < 1e-12
+
+
+def test_whitening_is_the_square_root_and_its_inverse(family, weights):
+    found = gram(*family, weights)
+    root, inverse = metric.whitening(found)
+    assert np.linalg.eigvalsh(found)[0] > metric.FLOOR * np.linalg.eigvalsh(found)[-1]
+    assert np.max(np.abs(root @ root.T - found)) < 1e-12 * np.max(found)
+    assert np.max(np.abs(root @ inverse - np.eye(len(found)))) < 1e-10
+    assert np.max(np.abs(root - root.T)) < 1e-12 * np.max(root)
+    assert np.max(np.abs(np.diag(np.sqrt(np.diagonal(found))) ** 2 - found)) > 1e-2
+
+
+def test_direction_that_moves_nothing_is_held_at_the_floor(rng):
+    basis = np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    root, inverse = metric.whitening((basis * [4.0, 1.0, 1e-9, 0.0]) @ basis.T)
+    values = np.sort(np.linalg.eigvalsh(root))
+    assert np.allclose(values, [2e-3, 2e-3, 1.0, 2.0], rtol=1e-9)
+    assert np.max(np.abs(root @ inverse - np.eye(4))) < 1e-10

@@ -1,0 +1,288 @@
+"""Every stage of the model: its graph answers what its float64 reference does."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.random import PCG64, Generator
+from running import outputs
+
+from model_export import hosvd, kriging
+from model_export.covariance import COVARIANCES
+from model_export.decoder import Decoder, Proportions
+from model_export.field_bank import Constant, FieldBank, Spread
+from model_export.hosvd import Multilinear
+from model_export.kriging import Hyper
+from model_export.timing import Timing
+from model_export.travel import Travel
+from model_export.warp import WarpBasis
+from service.motion import quat
+
+SAMPLES, CONTROLS, BATCH, STEPS = 25, 3, 40, 11
+LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
+
+
+def rng():
+    return Generator(PCG64(5))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A stage's answers both ways, and what float32 may cost them.
+
+    wrong: the reference's answers to a question, or of a stage, that is a little different.
+    """
+
+    found: list
+    expected: list
+    wrong: list
+    allowed: float
+
+
+def bank(covariance="matern52", drift=1, constant=(), same_drift=True):
+    """Fields pose, offsets, duration and warp; `constant` ones do not depend on the controls."""
+    own = rng()
+    samples = own.uniform(-1.0, 1.0, (SAMPLES, CONTROLS))
+    fields = {}
+    for name, size in {"pose": 6, "offsets": 2, "duration": 1, "warp": 4}.items():
+        hyper = Hyper(covariance, drift, own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3))
+        if name == "offsets" and not same_drift:
+            hyper = replace(hyper, drift=1 - drift)
+        values = own.normal(size=(SAMPLES, size))
+        solved = kriging.solve(hyper, samples, values)
+        fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
+    pose = fields.pop("pose")
+    return FieldBank(LOW, HIGH, pose, fields)
+
+
+def asked():
+    """Controls inside and outside of what was sampled, and two samples themselves."""
+    points = rng().uniform(-1.3, 1.3, (BATCH, CONTROLS))
+    points[:2] = bank().pose.samples[:2]
+    controls = 0.5 * (points * (HIGH - LOW) + HIGH + LOW)
+    # The graph sees float32, and so must the reference.
+    return controls.astype(np.float32).astype(np.float64)
+
+
+def field_bank(**given):
+    own, controls = bank(**given), asked()
+    found = outputs(lambda net, c: tuple(own.onnx(net, c)[1].values()), (2,) * 4, controls=controls)
+    expected = own.numpy(controls)
+    assert list(expected) == ["pose", "offsets", "duration", "warp"]
+    other = replace(own, high=HIGH * 1.05).numpy(controls)
+    # At a sample the distance is a root of what rounding leaves, where these have their kink.
+    kinked = given.get("covariance") in ("exponential", "spherical")
+    allowed = 2e-3 if kinked else 2e-4
+    return Case(found, list(expected.values()), list(other.values()), allowed)
+
+
+def basis_of_bank():
+    own, controls = bank(), asked()
+    found = outputs(lambda net, c: own.onnx(net, c)[0], (2,), controls=controls)
+    points = own.points(controls)
+    near = [kriging.covariances(field.hyper, points, field.samples) for field in own.kriged]
+    return Case(found, [np.hstack([points, *near])], [np.hstack([points, *near[::-1]])], 2e-5)
+
+
+def spread(covariance, drift):
+    own, controls = bank(covariance, drift), asked()
+    stage = Spread(own.pose, 0.04)
+    found = outputs(lambda net, c: stage.onnx(net, own.onnx(net, c)[0]), (1,), controls=controls)
+    points = own.points(controls)
+    without_nugget = np.sqrt(0.04 * own.pose.variance(points))
+    return Case(found, [stage.numpy(points)], [without_nugget], 1e-4)
+
+
+def timing(knots=6):
+    own = rng()
+    stage = Timing(WarpBasis(knots), 60)
+    length, logs = own.normal(size=(BATCH, 1)), 0.5 * own.normal(size=(BATCH, knots))
+    time = own.uniform(-0.2, 1.3, (BATCH, STEPS)) * np.exp(length)
+    time[:, :2] = 0.0, 100.0
+    length, logs, time = (a.astype(np.float32).astype(np.float64) for a in (length, logs, time))
+
+    def build(net, length, logs, time):
+        duration, place = stage.onnx(net, length, logs, time)
+        return duration, net("Squeeze", place, net.indices(2))
+
+    found = outputs(build, (1, 2), length=length, logs=logs, time=time)
+    duration, place = stage.numpy(length, logs, time)
+    assert place.min() == 0.0
+    assert place.max() > 58.999
+    wrong = Timing(stage.basis, 61).numpy(length + 0.01, logs, time)
+    # Frames, of which 0.01 is less than a thousandth of a second; cubes of many knots cancel.
+    return Case(found, [duration, place], list(wrong), 2e-4 if knots <= 6 else 1e-2)
+
+
+def decoder_stage():
+    own = rng()
+    full = hosvd.decompose(own.normal(size=(12, 20, 15)))
+    return Decoder(
+        full.truncated((7, 5, 6)),
+        own.normal(size=15),
+        0.3 * own.normal(size=(15, 12)),
+        quat.normalize(own.normal(size=(4, 4))),
+    )
+
+
+def decoder():
+    own, stage = rng(), decoder_stage()
+    coefficients = own.normal(size=(BATCH, 6))
+    place = own.uniform(0.0, 19.0, (BATCH, STEPS))
+    place[:, :4] = 0.0, 19.0, 7.0, 18.5
+    coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
+
+    def build(net, coefficients, place):
+        return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)))
+
+    found = outputs(build, (4, 3), coefficients=coefficients, place=place)
+    nearest = stage.numpy(coefficients, np.rint(place))
+    return Case(found, list(stage.numpy(coefficients, place)), list(nearest), 2e-5)
+
+
+def poses_at_the_means():
+    """No rotation vector at all: the sine over the angle has its value at zero."""
+    stage = decoder_stage()
+    still = replace(stage, mean=np.zeros(15))
+    nothing = np.zeros((3, 6))
+
+    def build(net, coefficients, place):
+        return still.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)))[0]
+
+    found = outputs(build, (4,), coefficients=nothing, place=np.zeros((3, 2)))
+    expected = np.broadcast_to(still.means, (3, 2, 4, 4))
+    return Case(found, [expected], [-expected], 1e-6)
+
+
+def proportions():
+    own = rng()
+    stage = Proportions(own.normal(size=(5, 3)), own.normal(size=(2, 5, 3)))
+    coefficients = own.normal(size=(BATCH, 2)).astype(np.float32).astype(float)
+    found = outputs(stage.onnx, (3,), coefficients=coefficients)
+    wrong = stage.numpy(coefficients[:, ::-1])
+    return Case(found, [stage.numpy(coefficients)], [wrong], 2e-6)
+
+
+def travel():
+    own, stage = rng(), Travel(20)
+    given = {
+        "rotations": quat.normalize(own.normal(size=(BATCH, STEPS, 5, 4))),
+        "root": own.normal(size=(BATCH, STEPS, 3)),
+        "travel": own.normal(size=(BATCH, 3)),
+        "place": own.uniform(0.0, 19.0, (BATCH, STEPS)),
+    }
+    given = {name: array.astype(np.float32).astype(float) for name, array in given.items()}
+
+    def build(net, rotations, root, travel, place):
+        steps = net("Unsqueeze", place, net.indices(2))
+        return stage.onnx(net, rotations, root, travel, steps)
+
+    found = outputs(build, (4, 3), **given)
+    wrong = stage.numpy(**{**given, "travel": given["travel"] * [1.0, 1.0, -1.0]})
+    return Case(found, list(stage.numpy(**given)), list(wrong), 2e-6)
+
+
+CASES = {
+    **{
+        f"fields, {name}, drift {drift}": (field_bank, {"covariance": name, "drift": drift})
+        for name in COVARIANCES
+        for drift in (0, 1)
+    },
+    "fields, one constant": (field_bank, {"constant": ("duration",)}),
+    "fields, all but the pose constant": (
+        field_bank,
+        {"constant": ("offsets", "duration", "warp")},
+    ),
+    "fields, constant without drift": (field_bank, {"constant": ("warp",), "drift": 0}),
+    "fields, drifts of both degrees": (field_bank, {"same_drift": False}),
+    "basis of the fields": (basis_of_bank, {}),
+    **{
+        f"spread, {name}, drift {drift}": (spread, {"covariance": name, "drift": drift})
+        for name in COVARIANCES
+        for drift in (0, 1)
+    },
+    **{f"timing, {knots} knots": (timing, {"knots": knots}) for knots in (3, 4, 6, 12, 24)},
+    "decoder": (decoder, {}),
+    "decoder at the means": (poses_at_the_means, {}),
+    "proportions": (proportions, {}),
+    "travel of a cycle": (travel, {}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_graph_answers_what_the_reference_does(name):
+    make, given = CASES[name]
+    case = make(**given)
+    assert len(case.found) == len(case.expected)
+    for found, expected in zip(case.found, case.expected, strict=True):
+        assert found.shape == expected.shape
+        assert np.max(np.abs(found - expected)) < case.allowed
+    beside = zip(case.found, case.wrong, strict=True)
+    assert max(np.max(np.abs(found - wrong)) for found, wrong in beside) > 3.0 * case.allowed
+
+
+def test_constant_field_ignores_the_controls():
+    own = bank(constant=("duration",))
+    values = own.numpy(asked())["duration"]
+    assert np.array_equal(values, np.repeat(values[:1], BATCH, axis=0))
+    assert np.ptp(own.numpy(asked())["pose"], axis=0).min() > 1e-2
+
+
+def test_sampled_range_is_minus_one_to_one():
+    assert np.max(np.abs(bank().points(np.stack([LOW, HIGH])) - [[-1.0], [1.0]])) < 1e-12
+
+
+def test_spread_at_a_sample_is_never_less_than_the_nugget():
+    own = bank()
+    found = Spread(own.pose, 0.04).numpy(own.pose.samples)
+    assert np.all(found >= np.sqrt(0.04 * own.pose.hyper.nugget))
+    away = Spread(own.pose, 0.04).numpy(np.full((1, CONTROLS), 5.0))
+    assert away > 2.0 * found.max()
+
+
+def test_times_outside_the_clip_count_as_its_ends():
+    stage, logs = Timing(WarpBasis(6), 60), 0.3 * rng().normal(size=(1, 6))
+    _, place = stage.numpy(np.zeros((1, 1)), logs, np.array([[-5.0, 0.0, 1.0, 9.0]]))
+    assert np.max(np.abs(place - [0.0, 0.0, 59.0, 59.0])) < 1e-9
+
+
+def test_poses_at_whole_frames_are_those_of_the_tensor():
+    stage = decoder_stage()
+    coefficients = stage.reduced.bases[2]
+    frames = np.tile(np.arange(20.0), (15, 1))
+    found = stage.numpy(coefficients, frames)
+    numbers = stage.mean + stage.reduced.restored().transpose(2, 1, 0) @ stage.unwhiten.T
+    rotations = quat.mul(stage.means, quat.exp(numbers[..., 3:].reshape(15, 20, 4, 3)))
+    assert np.max(np.abs(quat.to_matrix(found[0]) - quat.to_matrix(rotations))) < 1e-12
+    assert np.max(np.abs(found[1] - numbers[..., :3])) < 1e-12
+    full = Multilinear(stage.reduced.core[::-1], stage.reduced.bases)
+    other = replace(stage, reduced=full).numpy(coefficients, frames)
+    assert np.max(np.abs(other[1] - numbers[..., :3])) > 1e-2
+
+
+def test_between_frames_the_root_goes_straight():
+    stage, coefficients = decoder_stage(), rng().normal(size=(3, 6))
+    at = np.tile([4.0, 4.25, 5.0], (3, 1))
+    root = stage.numpy(coefficients, at)[1]
+    assert np.max(np.abs(root[:, 1] - (0.75 * root[:, 0] + 0.25 * root[:, 2]))) < 1e-12
+
+
+def test_at_full_ranks_and_without_nugget_the_clips_come_back_at_their_controls(trained):
+    points = trained.model.bank.pose.samples
+    hyper = replace(trained.pose.hyper, nugget=0.0)
+    exact = kriging.solve(hyper, points, trained.full.bases[2])
+    own = trained.tensor
+    whole = Decoder(trained.full, own.mean, own.unwhiten, own.chart.means)
+    numbers = own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T
+    rotations, root = own.chart.poses(numbers)
+    frames = np.tile(np.arange(float(root.shape[1])), (len(points), 1))
+
+    def away(stage, coefficients):
+        found = stage.numpy(coefficients, frames)
+        turns = quat.to_matrix(found[0]) - quat.to_matrix(rotations)
+        return max(np.max(np.abs(turns)), np.max(np.abs(found[1] - root)))
+
+    assert away(whole, exact.predict(points)) < 1e-6
+    smoothed = kriging.solve(trained.pose.hyper, points, trained.full.bases[2])
+    assert away(whole, smoothed.predict(points)) > 1e-3
+    assert away(trained.model.decoder, trained.model.decoder.reduced.bases[2]) > 1e-3

@@ -1,0 +1,141 @@
+"""The motion tensor: its distances are those of bodies, and its numbers lead back to poses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model_export import align, chart, metric, tensor
+from model_export.align import Aligned
+from service.motion import quat, skeleton
+
+PARENTS = (-1, 0, 1, 2, 1)
+BONES = np.array([[0, 0, 0], [0, 0.5, 0], [0.3, 0, 0], [0.25, 0, 0], [0, 0.2, 0.05]])
+CLIPS, FRAMES = 8, 30
+WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 1.0])
+
+
+def family(rng, size):
+    """Aligned clips that swing by about `size` rad and metres; the head (4) never turns."""
+    time = np.linspace(0.0, 2.0, FRAMES)[:, None, None]
+    swing = size * np.sin(time + rng.normal(size=(CLIPS, 1, 5, 3)))
+    swing[:, :, 4] = 0.0
+    rotations = quat.mul(quat.exp(rng.normal(size=(5, 3))), quat.exp(swing))
+    root = size * np.cos(time[..., 0] + rng.normal(size=(CLIPS, 1, 3))) + [0.0, 0.9, 0.0]
+    root[..., 2] = 0.25
+    return Aligned(rotations, root, np.zeros((CLIPS, 6)), np.ones(CLIPS), 0)
+
+
+@pytest.fixture
+def small(rng):
+    return family(rng, 0.02)
+
+
+@pytest.fixture
+def offsets(rng):
+    """Bone offsets (N, J, 3) of one performer."""
+    return np.tile(BONES, (CLIPS, 1, 1))
+
+
+def build(aligned, offsets):
+    numbers, own_chart, _ = tensor.pose_vectors(aligned, PARENTS, offsets)
+    return tensor.build(numbers, own_chart, PARENTS, offsets, WEIGHTS)
+
+
+def skin(aligned, offsets):
+    """Points (N, T, J, 6, 3) on the skin around every joint."""
+    translations = np.repeat(offsets[:, None], FRAMES, axis=1)
+    translations[:, :, 0] = aligned.root_path
+    positions, turns = skeleton.forward(PARENTS, aligned.rotations, translations)
+    axes = metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
+    return positions[..., None, :] + quat.rotate(turns[..., None, :], axes)
+
+
+def between_pairs(values):
+    """Squared distances of all pairs of clips of values (N, …)."""
+    flat = values.reshape(CLIPS, -1)
+    a, b = np.triu_indices(CLIPS, k=1)
+    return np.sum(np.square(flat[a] - flat[b]), axis=1)
+
+
+def test_distances_in_the_tensor_are_those_of_joints(small, offsets):
+    own = build(small, offsets)
+    true = between_pairs(skin(small, offsets) * np.sqrt(WEIGHTS / 6.0)[:, None, None])
+    found = between_pairs(own.values.transpose(2, 1, 0))
+    # To first order in 0.02 rad.
+    assert np.max(np.abs(found / true - 1.0)) < 0.03
+    numbers = own.chart.numbers(small.rotations, small.root_path)
+    share = between_pairs(numbers) / true
+    assert np.max(np.abs(share / share.mean() - 1.0)) > 0.1
+    unweighted = between_pairs(skin(small, offsets) / np.sqrt(6.0))
+    assert np.max(np.abs(found / unweighted - 1.0)) > 0.1
+
+
+def test_rms_of_a_squared_distance_is_that_of_its_joints(small, offsets):
+    own = build(small, offsets)
+    still = small.root_path + np.array([0.03, 0.0, 0.0])
+    moved = own.chart.numbers(small.rotations, still) - own.chart.numbers(
+        small.rotations, small.root_path
+    )
+    squared = np.sum(np.square(moved @ own.whiten.T))
+    assert abs(own.rms(np.array(squared)) - 0.03) < 1e-9
+
+
+def test_constant_degrees_of_freedom_are_left_out_and_come_back(small, offsets):
+    own = build(small, offsets)
+    numbers = own.chart.numbers(small.rotations, small.root_path)
+    # The head's three numbers and the root's third.
+    assert own.values.shape == (3 + 15 - 4, FRAMES, CLIPS)
+    restored = own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T
+    assert np.max(np.abs(restored - numbers)) < 1e-9
+    assert np.max(np.abs(own.mean - numbers)) > 1e-2
+    constant = [2, 15, 16, 17]
+    assert np.array_equal(own.whiten[:, constant], np.zeros((14, 4)))
+    assert np.array_equal(own.unwhiten[constant], np.zeros((4, 14)))
+    assert np.max(np.abs(restored[..., constant] - numbers[..., constant])) < 1e-9
+
+
+def test_whitening_and_back_are_inverse(small, offsets):
+    own = build(small, offsets)
+    assert np.max(np.abs(own.whiten @ own.unwhiten - np.eye(14))) < 1e-9
+
+
+def test_tensor_is_centred(small, offsets):
+    assert np.max(np.abs(build(small, offsets).values.mean(axis=(1, 2)))) < 1e-12
+
+
+def test_order_of_clips_is_the_order_of_slices(small, offsets, rng):
+    order = rng.permutation(CLIPS)
+    # So few frames that the metric is an average over all poses, not over some of them.
+    few = replace(small, rotations=small.rotations[:, ::6], root_path=small.root_path[:, ::6])
+    assert CLIPS * len(few.root_path[0]) <= metric.POSES
+    shuffled = replace(few, rotations=few.rotations[order], root_path=few.root_path[order])
+    first, second = build(few, offsets), build(shuffled, offsets[order])
+    assert np.max(np.abs(second.values - first.values[..., order])) < 1e-9
+    assert np.max(np.abs(second.values - first.values)) > 1e-2
+
+
+def test_facing_of_the_whole_family_changes_no_distance(small, offsets):
+    turn = quat.about(np.array([0.0, 1.0, 0.0]), np.array(np.radians(178.0)))
+    rotations = small.rotations.copy()
+    rotations[:, :, 0] = quat.mul(turn, rotations[:, :, 0])
+    away = Aligned(rotations, quat.rotate(turn, small.root_path), small.logs, small.durations, 0)
+    first, second = build(small, offsets), build(away, offsets)
+    near = between_pairs(first.values.transpose(2, 1, 0))
+    gap = between_pairs(second.values.transpose(2, 1, 0)) / near - 1.0
+    assert np.max(np.abs(gap)) < 1e-6
+    identity = chart.Chart(np.tile(quat.IDENTITY, (5, 1)))
+    plain = identity.numbers(small.rotations, small.root_path)
+    turned = identity.numbers(rotations, away.root_path)
+    assert np.max(np.abs(between_pairs(turned) / between_pairs(plain) - 1.0)) > 1e-2
+
+
+def test_poses_of_the_tensor_are_the_aligned_poses(rng, offsets):
+    """At full swing too, where the metric is an average and no longer exact."""
+    wide = family(rng, 0.6)
+    own = build(wide, offsets)
+    rotations, root = own.chart.poses(own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T)
+    found = align.positions(
+        Aligned(rotations, root, wide.logs, wide.durations, 0), PARENTS, offsets
+    )
+    assert np.max(np.abs(found - align.positions(wide, PARENTS, offsets))) < 1e-9

@@ -1,0 +1,148 @@
+"""The experimental variogram and its fits."""
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from model_export import hosvd, variogram
+from model_export.covariance import COVARIANCES
+from model_export.variogram import FAR, FEWEST_PAIRS, LAGS, RANGES, Experimental
+
+TOLERANCE = 1e-9
+
+
+@pytest.fixture
+def samples(rng):
+    return rng.uniform(-1.0, 1.0, size=(40, 3))
+
+
+@pytest.fixture
+def values(samples, rng):
+    return np.sin(samples @ rng.normal(size=(3, 5))) + 0.1 * rng.normal(size=(40, 5))
+
+
+def model(covariance, nugget, sill, reach, distances):
+    return nugget + sill * (1.0 - COVARIANCES[covariance].numpy(np.square(distances / reach)))
+
+
+def seen(values, distances=None, pairs=None):
+    distances = np.linspace(0.1, 2.0, len(values)) if distances is None else distances
+    return Experimental(distances, values, np.full(len(values), 30.0) if pairs is None else pairs)
+
+
+def test_lags_hold_the_pairs_of_their_distance(samples, values):
+    found = variogram.experimental(samples, values)
+    gaps = np.linalg.norm(samples[:, None] - samples, axis=-1)
+    width = FAR * gaps.max() / LAGS
+    expected = []
+    for lag in range(LAGS):
+        pairs = [
+            (gaps[i, j], 0.5 * np.sum((values[i] - values[j]) ** 2))
+            for i in range(40)
+            for j in range(i)
+            if lag * width < gaps[i, j] <= (lag + 1) * width
+        ]
+        if len(pairs) >= FEWEST_PAIRS:
+            expected.append([*np.mean(pairs, axis=0), len(pairs)])
+    rows = np.stack([found.distances, found.values, found.pairs], axis=1)
+    assert np.max(np.abs(rows - expected)) < TOLERANCE
+    assert np.max(np.abs(rows[1:, 1] - np.array(expected)[:-1, 1])) > 1e-2
+
+
+def test_order_of_samples_does_not_matter(samples, values, rng):
+    order = rng.permutation(40)
+    a = variogram.experimental(samples, values)
+    b = variogram.experimental(samples[order], values[order])
+    assert np.max(np.abs(a.values - b.values)) < TOLERANCE
+    assert np.array_equal(a.pairs, b.pairs)
+
+
+def test_dissimilarity_is_the_distance_of_slices_of_the_core_tensor(samples, rng):
+    tensor = rng.normal(size=(6, 5, 40))
+    full = hosvd.decompose(tensor)
+    slices = hosvd.mode_dot(full.core, full.bases[2], 2).reshape(-1, 40).T
+    rows = full.bases[2] * np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
+    by_slices = variogram.experimental(samples, slices).values
+    assert np.max(np.abs(variogram.experimental(samples, rows).values - by_slices)) < TOLERANCE
+    plain = variogram.experimental(samples, full.bases[2]).values
+    assert np.max(np.abs(plain - by_slices)) > 1.0
+
+
+@pytest.mark.parametrize("degree", [0, 1])
+def test_residuals_hold_nothing_of_the_drift(degree, samples, values):
+    left = variogram.residuals(samples, values, degree)
+    assert np.max(np.abs(left.sum(axis=0))) < TOLERANCE
+    slopes = np.max(np.abs(samples.T @ left))
+    assert slopes < TOLERANCE if degree else slopes > 1.0
+
+
+def test_residuals_of_a_linear_field_are_nothing(samples):
+    assert np.max(np.abs(variogram.residuals(samples, samples @ np.ones((3, 2)) + 4.0, 1))) < 1e-12
+
+
+@pytest.mark.parametrize("covariance", COVARIANCES)
+@pytest.mark.parametrize("reach", RANGES[[12, 20, 25]])
+def test_fit_finds_the_model_that_was_put_in(covariance, reach):
+    distances = np.linspace(0.05, 2.0, 15)
+    found = variogram.fit(
+        seen(model(covariance, 0.3, 2.0, reach, distances), distances), covariance
+    )
+    assert found.range == reach
+    assert abs(found.nugget - 0.3) < 1e-8
+    assert abs(found.sill - 2.0) < 1e-8
+    other = "exponential" if covariance == "gaussian" else "gaussian"
+    assert (
+        abs(
+            variogram.fit(
+                seen(model(other, 0.3, 2.0, reach, distances), distances), covariance
+            ).nugget
+            - 0.3
+        )
+        > 1e-3
+    )
+
+
+def misfit(fit, data, covariance):
+    gap = model(covariance, fit.nugget, fit.sill, fit.range, data.distances) - data.values
+    return np.sum(data.pairs / data.values**2 * gap**2)
+
+
+@pytest.mark.parametrize("shape", ["rising", "falling", "steep", "even"])
+def test_fit_is_the_least_weighted_square_over_the_ranges(shape, rng):
+    distances = np.linspace(0.1, 2.0, 15)
+    values = {
+        "rising": 0.5 + distances,
+        "falling": 3.0 - distances,
+        "steep": distances**3,
+        "even": np.ones(15),
+    }[shape] * rng.uniform(0.8, 1.2, 15)
+    data = seen(values, distances, rng.integers(3, 60, 15).astype(float))
+    roots = np.sqrt(data.pairs) / data.values
+    least = min(
+        nnls(np.stack([np.ones(15), rising], axis=1) * roots[:, None], values * roots)[1] ** 2
+        for rising in 1.0 - COVARIANCES["matern52"].numpy(np.square(distances / RANGES[:, None]))
+    )
+    found = variogram.fit(data, "matern52")
+    assert found.nugget >= 0.0
+    assert found.sill >= 0.0
+    assert abs(misfit(found, data, "matern52") - least) < 1e-8 * max(least, 1.0)
+    unweighted = variogram.fit(seen(values, distances, data.values**2), "matern52")
+    assert misfit(unweighted, data, "matern52") > least * (1.0 + 1e-6)
+
+
+def test_search_finds_no_worse_a_fit_than_the_grid(samples, values):
+    data = variogram.experimental(samples, variogram.residuals(samples, values, 1))
+    for covariance in ("gaussian", "exponential", "matern52"):
+        by_grid = misfit(variogram.fit(data, covariance), data, covariance)
+        by_search = misfit(variogram.fit_by_search(data, covariance), data, covariance)
+        # The grid's ranges are 10 % apart, which is what the search may gain.
+        assert 0.9 * by_grid < by_search < 1.001 * by_grid
+
+
+def test_trend_passes_for_range_unless_it_is_taken_out(samples, rng):
+    trend = samples @ np.array([[3.0], [2.0], [1.0]])
+    noise = 0.2 * rng.normal(size=(40, 1))
+    raw = variogram.fit(variogram.experimental(samples, trend + noise), "gaussian")
+    left = variogram.residuals(samples, trend + noise, 1)
+    clean = variogram.fit(variogram.experimental(samples, left), "gaussian")
+    assert raw.sill > 10.0 * (clean.sill + clean.nugget)

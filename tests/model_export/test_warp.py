@@ -1,0 +1,157 @@
+"""Warps of a few knots: any numbers make a valid one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.interpolate import PchipInterpolator
+
+from model_export.warp import DENSE, FLOOR, WarpBasis
+
+TOLERANCE = 1e-12
+EVEN = np.ones(len(DENSE))
+ANY_LOGS = st.integers(3, 24).flatmap(
+    lambda knots: arrays(float, knots, elements=st.floats(-40.0, 40.0))
+)
+
+
+@pytest.fixture(params=[3, 4, 6, 12, 24], ids="{} knots".format)
+def basis(request):
+    return WarpBasis(request.param)
+
+
+@pytest.fixture
+def logs(basis, rng):
+    return 0.5 * rng.normal(size=(20, basis.knots))
+
+
+@settings(derandomize=True, database=None, max_examples=300, deadline=None)
+@given(ANY_LOGS)
+def test_any_logs_make_a_warp_of_the_unit_interval_onto_itself(logs):
+    s = WarpBasis(len(logs)).evaluate(logs, DENSE)
+    assert abs(s[0]) < TOLERANCE
+    assert abs(s[-1] - 1.0) < TOLERANCE
+    # Where increments of 1e-35 follow one another, a step is less than a rounding of s.
+    assert np.diff(s).min() > -1e-15
+
+
+@settings(derandomize=True, database=None, max_examples=100, deadline=None)
+@given(st.integers(3, 24).flatmap(lambda k: arrays(float, k, elements=st.floats(-3.0, 3.0))))
+def test_warp_of_moderate_logs_rises_everywhere(logs):
+    assert np.diff(WarpBasis(len(logs)).evaluate(logs, DENSE)).min() > 0.0
+
+
+def test_zeros_do_nothing(basis):
+    assert np.max(np.abs(basis.evaluate(np.zeros(basis.knots), DENSE) - DENSE)) < TOLERANCE
+    uneven = np.linspace(0.0, 0.1, basis.knots)
+    assert np.max(np.abs(basis.evaluate(uneven, DENSE) - DENSE)) > 1e-3
+
+
+def test_constant_added_to_the_logs_changes_nothing(basis, logs):
+    moved = basis.evaluate(logs + 7.0, DENSE)
+    assert np.max(np.abs(moved - basis.evaluate(logs, DENSE))) < TOLERANCE
+
+
+def test_warps_of_a_batch_are_those_of_its_rows(basis, logs):
+    together = basis.evaluate(logs, DENSE)
+    assert together.shape == (20, len(DENSE))
+    for row, own in zip(together, logs, strict=True):
+        assert np.max(np.abs(row - basis.evaluate(own, DENSE))) < TOLERANCE
+
+
+def test_own_times_of_each_warp_are_its_own(basis, logs, rng):
+    times = rng.uniform(size=(20, 7))
+    together = basis.evaluate(logs, times)
+    for row, own, u in zip(together, logs, times, strict=True):
+        assert np.max(np.abs(row - basis.evaluate(own, u))) < TOLERANCE
+
+
+def test_power_form_is_the_same_basis(basis):
+    # The hinges of 24 knots are nearly alike: their solution loses four digits.
+    found = basis.powers(DENSE) @ basis.power_form
+    assert np.max(np.abs(found - basis.design(DENSE))) < 1e-8
+    moved = basis.powers(np.minimum(DENSE + 1e-4, 1.0)) @ basis.power_form
+    assert np.max(np.abs(moved - basis.design(DENSE))) > 1e-5
+
+
+def test_inverse_leads_back(basis, logs):
+    for own in logs:
+        back = basis.evaluate(own, basis.invert(own, DENSE))
+        # Straight lines between 501 points.
+        assert np.max(np.abs(back - DENSE)) < 1e-4
+        coarse = np.interp(DENSE, basis.evaluate(own, DENSE[::50]), DENSE[::50])
+        assert np.max(np.abs(basis.evaluate(own, coarse) - DENSE)) > 1e-4
+
+
+def jumps(warp, breaks, order):
+    """Largest jump of a derivative at the breaks, by one-sided differences."""
+    step = 1e-4 if order == 1 else 1e-3
+    stencil = {1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0]}[order]
+    side = np.arange(order + 1) * step
+    after = np.stack([warp(at + side) for at in breaks]) @ stencil
+    before = np.stack([warp(at - side) for at in breaks]) @ stencil * (-1.0) ** order
+    return np.max(np.abs(after - before)) / step**order
+
+
+@pytest.mark.parametrize("knots", [4, 6, 8])
+def test_acceleration_is_continuous(knots, rng):
+    basis = WarpBasis(knots)
+    logs = 0.5 * rng.normal(size=knots)
+    places = np.concatenate([[0.0], basis.breaks, [1.0]])
+    pchip = PchipInterpolator(places, basis.evaluate(logs, places))
+
+    def warp(u):
+        return basis.evaluate(logs, u)
+
+    # One-sided differences a step apart see the third derivative, which does jump, times the step.
+    allowed = 0.1 * jumps(pchip, basis.breaks, 2)
+    assert jumps(warp, basis.breaks, 2) < allowed
+    assert jumps(pchip, basis.breaks, 1) < 0.05
+
+
+def test_fit_recovers_the_increments_it_was_made_of(basis, logs):
+    for own in logs:
+        fitted = basis.fit(basis.evaluate(own, DENSE), EVEN)
+        true = basis.increments(own)
+        if np.any(true < FLOOR * basis.still):
+            continue
+        assert np.max(np.abs(basis.increments(fitted) - true)) < 1e-9
+        assert np.max(np.abs(basis.increments(np.zeros(basis.knots)) - true)) > 1e-3
+
+
+def test_fit_never_freezes_a_pose(basis):
+    frozen = np.clip(2.0 * DENSE - 0.5, 0.0, 1.0)
+    fitted = basis.increments(basis.fit(frozen, EVEN))
+    assert np.min(fitted / basis.still) > 0.99 * FLOOR
+    assert np.min(np.diff(basis.evaluate(basis.fit(frozen, EVEN), DENSE))) > 0.0
+    if basis.knots > 4:
+        assert np.min(fitted / basis.still) < 1.01 * FLOOR
+
+
+def test_fit_of_a_noisy_warp_is_a_warp(basis, rng):
+    noisy = DENSE + 0.05 * rng.normal(size=len(DENSE))
+    s = basis.evaluate(basis.fit(noisy, EVEN), DENSE)
+    assert np.diff(s).min() > 0.0
+    assert np.diff(noisy).min() < 0.0
+
+
+def test_fit_meets_what_weighs_more():
+    basis, wanted = WarpBasis(6), np.clip(2.0 * DENSE - 0.5, 0.0, 1.0)
+    weights = EVEN.copy()
+    weights[150] = 1e5
+    heavy = basis.evaluate(basis.fit(wanted, weights), DENSE)[150]
+    light = basis.evaluate(basis.fit(wanted, EVEN), DENSE)[150]
+    assert abs(heavy - wanted[150]) < 1e-3 < abs(light - wanted[150])
+
+
+def test_fit_leaves_the_weights_as_they_were():
+    weights = EVEN.copy()
+    WarpBasis(6).fit(DENSE, weights)
+    assert np.array_equal(weights, EVEN)
+
+
+def test_too_few_knots_are_refused():
+    with pytest.raises(ValueError) as refusal:
+        WarpBasis(2)
+    assert str(refusal.value) == "2 knots, expected at least 3"

@@ -1,0 +1,482 @@
+"""Awkward files that are valid: each is read to the joint positions that it means.
+
+The expected positions come from matrices, a channel at a time, over joints that the tests state
+beside the file's text.
+"""
+
+import zipfile
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from service.motion import bvh
+
+# Both sides compute in float64 from the same decimals.
+TOLERANCE = 1e-9
+
+ZXY = "Zrotation Xrotation Yrotation"
+XYZ_POSITION = "Xposition Yposition Zposition"
+
+# What the text below says: a name, the parent, the OFFSET and the CHANNELS of each joint.
+JOINTS = [
+    ("hips", -1, (0, 0, 0), f"{XYZ_POSITION} {ZXY}"),
+    ("spine", 0, (0, 10, 0), ZXY),
+    ("head", 1, (1, 20, 2), ZXY),
+    ("arm", 1, (-8, 3, 0.5), ZXY),
+    ("hand", 3, (-12, 0, 1), ZXY),
+]
+ROWS = [
+    [1, 92.5, 3, 10, 20, 30, -40, 50, 60, 70, -80, 85, 15, 25, -35, 5, 6, 7],
+    [-1.5, 90, 4.25, 170, -20, 33, 44, 55, -66, 77, 8, 99, -11, 22, 133, 1, 2, 3],
+]
+PLAIN = """\
+HIERARCHY
+ROOT hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT spine
+  {
+    OFFSET 0 10 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT head
+    {
+      OFFSET 1 20 2
+      CHANNELS 3 Zrotation Xrotation Yrotation
+      End Site
+      {
+        OFFSET 0 15 1
+      }
+    }
+    JOINT arm
+    {
+      OFFSET -8 3 0.5
+      CHANNELS 3 Zrotation Xrotation Yrotation
+      JOINT hand
+      {
+        OFFSET -12 0 1
+        CHANNELS 3 Zrotation Xrotation Yrotation
+        End Site
+        {
+          OFFSET -5 0 0
+        }
+      }
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.0333333
+1 92.5 3 10 20 30 -40 50 60 70 -80 85 15 25 -35 5 6 7
+-1.5 90 4.25 170 -20 33 44 55 -66 77 8 99 -11 22 133 1 2 3
+"""
+
+
+def matrix(channel, value):
+    """One channel as a 4x4 matrix."""
+    step = np.eye(4)
+    if channel.lower().endswith("position"):
+        step["XYZ".index(channel[0].upper()), 3] = value
+    else:
+        step[:3, :3] = Rotation.from_euler(channel[0].upper(), value, degrees=True).as_matrix()
+    return step
+
+
+def local(offset, channels, values, add):
+    """Local matrix of a joint: its positions replace the OFFSET's components, or follow them."""
+    moved, turned = np.array(offset, dtype=float), np.eye(4)
+    for channel, value in zip(channels, values, strict=True):
+        if channel.lower().endswith("position"):
+            axis = "XYZ".index(channel[0].upper())
+            moved[axis] = value + (moved[axis] if add else 0.0)
+        else:
+            turned = turned @ matrix(channel, value)
+    turned[:3, 3] = moved
+    return turned
+
+
+def world(joints, row, add_root=False):
+    """World positions (J, 3) in the file's unit and axes."""
+    frames, values = [], list(row)
+    for _, parent, offset, channels in joints:
+        count = len(channels.split())
+        own = local(offset, channels.split(), values[:count], add_root and parent < 0)
+        frames.append(own if parent < 0 else frames[parent] @ own)
+        values = values[count:]
+    return np.array([frame[:3, 3] for frame in frames])
+
+
+def worlds(joints, rows, **kwargs):
+    return np.array([world(joints, row, **kwargs) for row in rows])
+
+
+def text_of(joints, rows):
+    """A file of the joints, which may only hang on the one before."""
+    lines = ["HIERARCHY"]
+    for name, parent, offset, channels in joints:
+        count = len(channels.split())
+        lines += [f"{'JOINT' if parent >= 0 else 'ROOT'} {name}", "{"]
+        lines += ["OFFSET " + " ".join(map(str, offset)), f"CHANNELS {count} {channels}"]
+    lines += ["}"] * len(joints)
+    lines += ["MOTION", f"Frames: {len(rows)}", "Frame Time: 0.01"]
+    return "\n".join(lines + [" ".join(map(str, row)) for row in rows]) + "\n"
+
+
+def clip_of(content, up="y", root_offset="replace", metres_per_unit=1.0):
+    content = content if isinstance(content, bytes) else content.encode()
+    file = bvh.loads(content, "case.bvh")
+    return bvh.to_clip(file, metres_per_unit=metres_per_unit, up=up, root_offset=root_offset)
+
+
+def assert_positions(clip, expected):
+    np.testing.assert_allclose(clip.positions(), expected, rtol=0, atol=TOLERANCE)
+
+
+def assert_plain(content):
+    clip = clip_of(content)
+    assert_positions(clip, worlds(JOINTS, ROWS))
+    return clip
+
+
+def chain(*channels, rows, offsets=((0, 0, 0), (0, 10, 0), (3, 4, 5))):
+    """Joints a, b, c in a chain, and the clip read from their file."""
+    joints = [
+        ("abc"[index], index - 1, offset, names)
+        for index, (offset, names) in enumerate(zip(offsets, channels, strict=True))
+    ]
+    return joints, text_of(joints, rows)
+
+
+def test_plain_file():
+    clip = assert_plain(PLAIN)
+    assert clip.skeleton.names == ("hips", "spine", "head", "arm", "hand")
+    assert clip.skeleton.parents == (-1, 0, 1, 1, 3)
+    assert clip.skeleton.tip_joints == (2, 4)
+    np.testing.assert_array_equal(clip.skeleton.tip_offsets, [[0, 15, 1], [-5, 0, 0]])
+    np.testing.assert_array_equal(clip.skeleton.offsets, [joint[2] for joint in JOINTS])
+    assert clip.rate == 30.0
+
+
+def test_one_frame():
+    short = PLAIN.replace("Frames: 2", "Frames: 1").rsplit("\n", 2)[0] + "\n"
+    assert_positions(clip_of(short), worlds(JOINTS, ROWS[:1]))
+
+
+@pytest.mark.parametrize("newline", ["\r\n", "\r"])
+def test_newlines_of_other_systems(newline):
+    assert_plain(PLAIN.replace("\n", newline))
+
+
+def test_missing_final_newline_keeps_the_last_frame():
+    assert_plain(PLAIN.rstrip("\n"))
+
+
+def test_trailing_blank_lines():
+    assert_plain(PLAIN + "\n  \n\t\n\r\n")
+
+
+def test_blank_lines_between_sections_and_frames():
+    text = PLAIN.replace("MOTION\n", "\nMOTION\n\n").replace("0.0333333\n", "0.0333333\n\n")
+    assert_plain(text.replace("\n-1.5 90", "\n\n-1.5 90"))
+
+
+def test_no_indentation():
+    assert_plain("\n".join(line.strip() for line in PLAIN.split("\n")))
+
+
+@pytest.mark.parametrize("blank", ["\t", "  ", " \t "])
+def test_tabs_and_double_spaces_between_all_words(blank):
+    lines = [line.strip().replace(" ", blank) for line in PLAIN.split("\n")]
+    clip = assert_plain("\n".join(line + blank if line else "" for line in lines))
+    assert clip.skeleton.names[0] == "hips"
+
+
+def test_frames_header_with_a_tab():
+    assert_plain(PLAIN.replace("Frames: 2", "Frames:\t2").replace("Time: ", "Time:\t"))
+
+
+def test_brace_on_the_same_line():
+    lines = [line.strip() for line in PLAIN.split("\n")]
+    clip = assert_plain("\n".join(lines).replace("\n{", " {"))
+    assert clip.skeleton.names == ("hips", "spine", "head", "arm", "hand")
+
+
+def test_braces_without_blanks_around_them():
+    assert_plain("\n".join(line.strip() for line in PLAIN.split("\n")).replace("\n{\n", "{"))
+
+
+@pytest.mark.parametrize("change", [str.lower, str.upper])
+def test_channel_names_in_any_case(change):
+    text = PLAIN
+    for name in [*ZXY.split(), *XYZ_POSITION.split()]:
+        text = text.replace(name, change(name))
+    assert_plain(text)
+    channels = bvh.loads(text.encode(), "case.bvh").joints[0].channels
+    assert channels == tuple(f"{XYZ_POSITION} {ZXY}".split())
+
+
+def test_keywords_in_any_case():
+    text = PLAIN
+    for word in ("HIERARCHY", "ROOT", "OFFSET", "JOINT", "End Site", "MOTION", "Frame Time"):
+        text = text.replace(word, word.lower())
+    assert_plain(text)
+
+
+def test_frame_wrapped_over_lines():
+    assert_plain(PLAIN.replace(" 10 20 30 -40", " 10 20\n30 -40"))
+
+
+def test_numbers_with_exponents_signs_and_bare_points():
+    text = PLAIN.replace("1 92.5 3 10", "+1. 9.25e1 .3E+1 1000e-2")
+    assert_plain(text.replace("OFFSET -8 3 0.5", "OFFSET -.8e1 +3. .5"))
+
+
+def test_utf8_byte_order_mark():
+    clip = assert_plain(b"\xef\xbb\xbf" + PLAIN.encode())
+    assert clip.skeleton.names[0] == "hips"
+
+
+def test_japanese_names_in_cp932_even_where_a_byte_is_a_brace():
+    name = "センター ボーン"
+    assert b"\x83{" in name.encode("cp932")
+    clip = assert_plain(PLAIN.replace("hips", name).encode("cp932"))
+    assert clip.skeleton.names[0] == name
+
+
+def test_japanese_names_in_utf8_keep_their_wide_space():
+    clip = assert_plain(PLAIN.replace("hips", "左　腕"))
+    assert clip.skeleton.names[0] == "左　腕"
+
+
+def test_names_in_latin1_where_neither_unicode_nor_cp932_decodes():
+    clip = assert_plain(PLAIN.replace("hips", "H\xfcfte \xff").encode("latin-1"))
+    assert clip.skeleton.names[0] == "Hüfte ÿ"
+
+
+@pytest.mark.parametrize("name", ["Left Upper Arm", "mixamorig:Hips", "a:b c.d-e_f|g", "42"])
+def test_names_with_blanks_colons_and_signs(name):
+    clip = assert_plain(PLAIN.replace("ROOT hips", f"ROOT {name}"))
+    assert clip.skeleton.names[0] == name
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "OFFSET_ctrl",
+        "MOTION_head",
+        "MOTION",
+        "Frames: 3",
+        "JOINT",
+        "End Site",
+        "CHANNELS 3",
+        "Frame Time:",
+    ],
+)
+def test_names_that_hold_keywords(name):
+    clip = assert_plain(PLAIN.replace("JOINT arm", f"JOINT {name}"))
+    assert clip.skeleton.names[3] == name
+
+
+def test_different_euler_order_in_each_joint():
+    joints, text = chain(
+        f"{XYZ_POSITION} Yrotation Xrotation Zrotation",
+        "Xrotation Zrotation Yrotation",
+        "Zrotation Yrotation Xrotation",
+        rows=(rows := [[1, 2, 3, 40, 50, 60, 70, -80, 90, 10, 20, 30]]),
+    )
+    assert_positions(clip_of(text), worlds(joints, rows))
+
+
+def test_every_euler_order():
+    for axes in ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"):
+        names = " ".join(f"{axis}rotation" for axis in axes)
+        joints, text = chain(names, names, "", rows=(rows := [[10, 80, -35, 121, -47, 63]]))
+        assert_positions(clip_of(text), worlds(joints, rows))
+
+
+def test_six_channels_on_every_joint_replace_the_offset():
+    six = f"{XYZ_POSITION} {ZXY}"
+    rows = [[1, 2, 3, 10, 20, 30, 0, 11, 0.5, 40, 50, 60, 3.5, 4.5, 5.5, 70, 80, 90]]
+    joints, text = chain(six, six, six, rows=rows)
+    clip = clip_of(text)
+    assert_positions(clip, worlds(joints, rows))
+    np.testing.assert_array_equal(clip.translations[0, 1], [0, 11, 0.5])
+    np.testing.assert_array_equal(clip.skeleton.offsets[1], [0, 10, 0])
+
+
+def test_rotation_channels_before_position():
+    joints, text = chain(f"{ZXY} {XYZ_POSITION}", ZXY, "", rows=(rows := [[*range(7, 70, 7)]]))
+    assert_positions(clip_of(text), worlds(joints, rows))
+
+
+def test_rotation_and_position_channels_mixed():
+    mixed = "Zrotation Yposition Xrotation Zposition Yrotation Xposition"
+    joints, text = chain(mixed, ZXY, "", rows=(rows := [[*range(7, 70, 7)]]))
+    assert_positions(clip_of(text), worlds(joints, rows))
+
+
+def test_positions_in_the_order_z_x_y():
+    root = f"Zposition Xposition Yposition {ZXY}"
+    joints, text = chain(root, ZXY, "", rows=(rows := [[3, 1, 2, 10, 20, 30, 40, 50, 60]]))
+    clip = clip_of(text)
+    assert_positions(clip, worlds(joints, rows))
+    np.testing.assert_array_equal(clip.root_path, [[1, 2, 3]])
+
+
+def test_no_one_and_two_rotation_channels():
+    joints, text = chain(
+        "Yrotation Xrotation", "", "Zrotation", rows=(rows := [[30, 40, 50], [60, 70, 80]])
+    )
+    assert_positions(clip_of(text), worlds(joints, rows))
+    joints, text = chain(
+        f"{XYZ_POSITION} Yrotation", "Xrotation", "", rows=(rows := [[1, 2, 3, 30, 40]])
+    )
+    assert_positions(clip_of(text), worlds(joints, rows))
+
+
+def test_joint_without_a_channels_line():
+    joints, text = chain("Yrotation", "", "", rows=(rows := [[30]]))
+    assert_positions(clip_of(text.replace("CHANNELS 0 \n", "")), worlds(joints, rows))
+
+
+def test_root_without_position_channels_stays_at_its_offset():
+    offsets = ((1, 90, 2), (0, 10, 0), (3, 4, 5))
+    joints, text = chain(ZXY, ZXY, ZXY, rows=(rows := [[*range(9)]]), offsets=offsets)
+    for root_offset in ("replace", "add"):
+        clip = clip_of(text, root_offset=root_offset)
+        assert_positions(clip, worlds(joints, rows))
+        np.testing.assert_array_equal(clip.root_path, [[1, 90, 2]])
+
+
+def test_missing_position_channel_takes_the_offset():
+    offsets = ((1, 90, 2), (0, 10, 0), (3, 4, 5))
+    root, joint = f"Yposition {ZXY}", f"Xposition Zposition {ZXY}"
+    rows = [[95, 10, 20, 30, 7, 8, 40, 50, 60]]
+    joints, text = chain(root, joint, "", rows=rows, offsets=offsets)
+    clip = clip_of(text)
+    assert_positions(clip, worlds(joints, rows))
+    np.testing.assert_array_equal(clip.translations[0, :2], [[1, 95, 2], [7, 10, 8]])
+    added = clip_of(text, root_offset="add")
+    assert_positions(added, worlds(joints, rows, add_root=True))
+    np.testing.assert_array_equal(added.translations[0, :2], [[1, 185, 2], [7, 10, 8]])
+
+
+@pytest.mark.parametrize(("root_offset", "height"), [("replace", 95.0), ("add", 185.0)])
+def test_root_offset_is_replaced_or_added_as_asked(root_offset, height):
+    offsets = ((1, 90, 2), (0, 10, 0), (3, 4, 5))
+    rows = [[4, 95, 6, 10, 20, 30, 40, 50, 60]]
+    joints, text = chain(f"{XYZ_POSITION} {ZXY}", ZXY, "", rows=rows, offsets=offsets)
+    clip = clip_of(text, root_offset=root_offset)
+    assert_positions(clip, worlds(joints, rows, add_root=root_offset == "add"))
+    assert clip.root_path[0, 1] == height
+
+
+def test_no_end_site():
+    joints, text = chain(f"{XYZ_POSITION} {ZXY}", ZXY, "", rows=(rows := [[*range(9)]]))
+    clip = clip_of(text)
+    assert_positions(clip, worlds(joints, rows))
+    assert clip.skeleton.tip_joints == ()
+    assert clip.skeleton.tip_offsets.shape == (0, 3)
+
+
+def test_several_end_sites_on_one_joint_and_beside_children():
+    site = "End Site\n{\nOFFSET 0 15 1\n}\n"
+    more = site + "End Site\n{\nOFFSET 7 8 9\n}\n"
+    text = "\n".join(line.strip() for line in PLAIN.split("\n")).replace(site, more)
+    clip = assert_plain(text.replace("JOINT head", site + "JOINT head"))
+    assert clip.skeleton.tip_joints == (1, 2, 2, 4)
+    expected = [[0, 15, 1], [0, 15, 1], [7, 8, 9], [-5, 0, 0]]
+    np.testing.assert_array_equal(clip.skeleton.tip_offsets, expected)
+
+
+def test_z_up_stands_upright_and_moves_alike():
+    turned = worlds(JOINTS, ROWS)[..., [0, 2, 1]] * [1, 1, -1]
+    clip = clip_of(PLAIN, up="z")
+    assert_positions(clip, turned)
+    expected = np.array([joint[2] for joint in JOINTS])[:, [0, 2, 1]] * [1, 1, -1]
+    np.testing.assert_array_equal(clip.skeleton.offsets, expected)
+    np.testing.assert_array_equal(clip.skeleton.tip_offsets, [[0, 1, -15], [-5, 0, 0]])
+
+
+def test_z_up_rest_pose_is_the_identity():
+    text = text_of([("a", -1, (0, 0, 0), ZXY), ("b", 0, (0, 0, 30), "")], [[0, 0, 0]])
+    clip = clip_of(text, up="z")
+    np.testing.assert_array_equal(clip.rotations, [[[1, 0, 0, 0]] * 2])
+    np.testing.assert_array_equal(clip.positions()[0, 1], [0, 30, 0])
+
+
+def test_unit_scales_every_length_and_no_angle():
+    clip = clip_of(PLAIN, metres_per_unit=0.01)
+    assert_positions(clip, 0.01 * worlds(JOINTS, ROWS))
+    np.testing.assert_allclose(clip.skeleton.offsets[1], [0, 0.1, 0])
+    np.testing.assert_allclose(clip.skeleton.tip_offsets[0], [0, 0.15, 0.01])
+    np.testing.assert_array_equal(clip.rotations, clip_of(PLAIN).rotations)
+
+
+@pytest.mark.parametrize("unit", [0.0, -1.0, np.nan, np.inf])
+def test_a_unit_that_is_no_length_is_refused(unit):
+    with pytest.raises(ValueError, match="expected a positive number"):
+        clip_of(PLAIN, metres_per_unit=unit)
+
+
+@pytest.mark.parametrize("choice", [{"up": "x"}, {"root_offset": "auto"}])
+def test_an_unknown_choice_is_refused(choice):
+    with pytest.raises(ValueError, match="expected 'y' or 'z', 'replace' or 'add'"):
+        clip_of(PLAIN, **choice)
+
+
+@pytest.mark.parametrize(
+    ("written", "rate"),
+    [
+        ("0.033333", 30.0),
+        ("0.0333333", 30.0),
+        (".0083333", 120.0),
+        ("0.008333", 120.0),
+        ("0.016667", 60.0),
+        ("0.041667", 24.0),
+        ("0.04", 25.0),
+        ("0.0416667", 24.0),
+        ("0.0417083", 24000 / 1001),
+        ("0.033367", 30000 / 1001),
+        ("0.0166833", 60000 / 1001),
+        ("0.00834167", 120000 / 1001),
+        ("1", 1.0),
+        ("2.5", 0.4),
+        ("0.0333", 1 / 0.0333),
+        ("1e-2", 100.0),
+    ],
+)
+def test_rate_is_the_one_that_a_cut_frame_time_stands_for(written, rate):
+    file = bvh.loads(PLAIN.replace("0.0333333", written).encode(), "case.bvh")
+    assert file.frame_time == float(written)
+    assert file.rate == rate
+
+
+def test_reads_a_path_and_a_member_of_an_archive(tmp_path):
+    path = tmp_path / "walk.bvh"
+    path.write_text(PLAIN)
+    with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
+        archive.writestr("sub/walk.bvh", PLAIN)
+    assert bvh.read(path).source == str(path)
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        file = bvh.read(zipfile.Path(archive, "sub/walk.bvh"))
+    assert file.source.endswith("all.zip/sub/walk.bvh")
+    np.testing.assert_array_equal(file.values, ROWS)
+
+
+def test_wrong_readings_miss_the_tolerance():
+    """Negative control: reversed Euler order, an added offset and a shifted column are seen."""
+    right = worlds(JOINTS, ROWS)
+    reverse = [
+        (*joint[:3], joint[3].replace(ZXY, "Yrotation Xrotation Zrotation")) for joint in JOINTS
+    ]
+    swapped = [[*row[:3], *np.reshape(row[3:], (-1, 3))[:, ::-1].ravel()] for row in ROWS]
+    lifted = [("hips", -1, (0, 1e-6, 0), JOINTS[0][3]), *JOINTS[1:]]
+    wrong = [
+        worlds(reverse, swapped),
+        worlds(lifted, ROWS, add_root=True),
+        worlds(JOINTS, [[*row[1:], row[0]] for row in ROWS]),
+    ]
+    for positions in wrong:
+        assert np.abs(positions - right).max() > TOLERANCE

@@ -1,0 +1,476 @@
+"""Files that are refused: each error says what was found, what was expected, and the line."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from service.motion import bvh
+from service.motion.errors import BvhError
+
+VALID = """\
+HIERARCHY
+ROOT hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT spine
+  {
+    OFFSET 0 10 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 5 0
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: 0.0333333
+1 2 3 4 5 6 7 8 9
+1 2 3 4 5 6 7 8 9
+1 2 3 4 5 6 7 8 9
+"""
+ROW = "1 2 3 4 5 6 7 8 9\n"
+
+
+def refused(content):
+    content = content if isinstance(content, bytes) else content.encode()
+    with pytest.raises(BvhError) as caught:
+        bvh.loads(content, "clips/walk.bvh")
+    assert caught.value.path == "clips/walk.bvh"
+    assert str(caught.value) == f"clips/walk.bvh:{caught.value.line}: {caught.value.message}"
+    return caught.value
+
+
+def changed(old, new, count=1):
+    assert old in VALID
+    return VALID.replace(old, new, count)
+
+
+def line_changed(number, new):
+    """The valid file with another text in one line."""
+    lines = VALID.split("\n")
+    lines[number - 1] = new
+    return "\n".join(lines)
+
+
+def test_the_unchanged_file_is_read():
+    assert bvh.loads(VALID.encode(), "clips/walk.bvh").values.shape == (3, 9)
+
+
+JOINT_PLACES = "expected OFFSET, CHANNELS, JOINT, End Site or '}' in joint"
+OWN_LINES = "each frame on lines of its own"
+
+HIERARCHY_FAULTS = {
+    "empty file": ("", 1, "found the end of the file, expected HIERARCHY"),
+    "blank file": ("\n\n  \n", 4, "found the end of the file, expected HIERARCHY"),
+    "another format": ("; FBX 7.3\n", 1, "found ';', expected HIERARCHY"),
+    "only motion": (
+        "MOTION\nFrames: 1\nFrame Time: 1\n0\n",
+        1,
+        "found MOTION, expected HIERARCHY",
+    ),
+    "no root": (line_changed(2, "JOINT hips"), 2, "found 'JOINT', expected ROOT"),
+    "root without a name": (
+        line_changed(2, "ROOT"),
+        2,
+        "found no name, expected a joint's name on this line",
+    ),
+    "joint without a name": (
+        line_changed(6, "JOINT {"),
+        6,
+        "found no name, expected a joint's name on this line",
+    ),
+    "no opening brace": (line_changed(3, ""), 4, "found 'OFFSET', expected {"),
+    "unknown statement": (
+        line_changed(9, "SCALE 1"),
+        9,
+        f"found 'SCALE', {JOINT_PLACES} 'spine' of line 6",
+    ),
+    "missing offset": (
+        line_changed(8, ""),
+        14,
+        "found the end of joint 'spine' of line 6, expected its OFFSET first",
+    ),
+    "second offset": (
+        line_changed(9, "OFFSET 1 2 3"),
+        9,
+        "found a second OFFSET in joint 'spine', expected one",
+    ),
+    "second channels": (
+        line_changed(4, "OFFSET 0 0 0\nCHANNELS 0"),
+        6,
+        "found a second CHANNELS in joint 'hips', expected one",
+    ),
+    "channels after a child": (
+        line_changed(9, "End Site { OFFSET 0 0 0 }\nCHANNELS 1 Xrotation"),
+        10,
+        "found CHANNELS of joint 'spine' after a child, expected it before",
+    ),
+    "offset of two numbers": (
+        line_changed(8, "OFFSET 0 10"),
+        9,
+        "found 'CHANNELS', expected a number, the Z of an OFFSET of three",
+    ),
+    "offset of four numbers": (
+        line_changed(8, "OFFSET 0 10 0 3"),
+        8,
+        f"found '3', {JOINT_PLACES} 'spine' of line 6",
+    ),
+    "offset with a decimal comma": (
+        line_changed(8, "OFFSET 0 10,5 0"),
+        8,
+        "found '10,5', expected a number, the Y of an OFFSET of three",
+    ),
+    "offset not a number": (
+        line_changed(8, "OFFSET nan 10 0"),
+        8,
+        "found 'nan', expected a number, the X of an OFFSET of three",
+    ),
+    "offset past all floats": (
+        line_changed(8, "OFFSET 1e999 10 0"),
+        8,
+        "found '1e999', expected an OFFSET of at most 1e+09",
+    ),
+    "end without site": (line_changed(10, "End Effector"), 10, "found 'Effector', expected Site"),
+    "end site without offset": (line_changed(12, ""), 13, "found '}', expected OFFSET"),
+    "end site with channels": (
+        line_changed(12, "OFFSET 0 5 0\nCHANNELS 1 Xrotation"),
+        13,
+        "found 'CHANNELS', expected }",
+    ),
+    "unknown channel": (
+        changed("3 Zrotation Xrotation", "3 Zrotation Wrotation"),
+        9,
+        "found 'Wrotation', expected a channel, one of "
+        "Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation",
+    ),
+    "duplicate channel": (
+        changed("3 Zrotation Xrotation", "3 Zrotation zROTATION"),
+        9,
+        "found channel Zrotation a second time in one joint, expected once",
+    ),
+    "fewer channels than declared": (
+        changed("CHANNELS 3", "CHANNELS 4"),
+        9,
+        "found 3 channel names, expected CHANNELS 4",
+    ),
+    "more channels than declared": (
+        changed("CHANNELS 3", "CHANNELS 2"),
+        9,
+        "found 3 channel names, expected CHANNELS 2",
+    ),
+    "channels without a number": (
+        changed("CHANNELS 3 Z", "CHANNELS Z"),
+        9,
+        "found 'Zrotation', expected the number of CHANNELS",
+    ),
+    "negative number of channels": (
+        changed("CHANNELS 3", "CHANNELS -3"),
+        9,
+        "found '-3', expected the number of CHANNELS",
+    ),
+    "duplicate joint name": (
+        changed("JOINT spine", "JOINT hips"),
+        6,
+        "joint name 'hips' stands at line 2 and again at line 6, "
+        "expected every joint to have its own name",
+    ),
+    "duplicate joint name in one line": (
+        line_changed(9, "JOINT a { OFFSET 0 0 0 } JOINT a { OFFSET 0 0 0 }"),
+        9,
+        "joint name 'a' stands at line 9 and again at line 9, "
+        "expected every joint to have its own name",
+    ),
+    "brace missing before motion": (
+        line_changed(15, ""),
+        16,
+        f"found MOTION, {JOINT_PLACES} 'hips' of line 2",
+    ),
+    "brace too many": (
+        line_changed(15, "} }"),
+        15,
+        "found '}', expected a line MOTION after the root's closing brace",
+    ),
+    "file cut in the hierarchy": (
+        VALID[: VALID.index("    End Site")],
+        10,
+        f"found the end of the file, {JOINT_PLACES} 'spine' of line 6",
+    ),
+    "second root": (
+        line_changed(15, "}\nROOT prop\n{\nOFFSET 0 0 0\nCHANNELS 0\n}"),
+        16,
+        "one root expected, found a second at line 16",
+    ),
+    "text before motion": (
+        line_changed(15, "}\nSCALE 1"),
+        16,
+        "found 'SCALE', expected a line MOTION after the root's closing brace",
+    ),
+    "no motion": (
+        VALID[: VALID.index("MOTION")],
+        16,
+        "found the end of the file, expected a line MOTION after the root's closing brace",
+    ),
+    "motion not alone in its line": (
+        line_changed(16, "MOTION Frames: 3"),
+        16,
+        "found 'MOTION', expected a line MOTION after the root's closing brace",
+    ),
+    "no channel at all": (
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 999999999999\nFrame Time: 1\n",
+        6,
+        "found no channel in 1 joints, expected at least one",
+    ),
+}
+
+FRAME_TIME = "expected a positive number of seconds from 1e-06 to 1e+06"
+
+MOTION_FAULTS = {
+    "ends after motion": (
+        VALID[: VALID.index("Frames")],
+        17,
+        "found the end of the file, expected 'Frames: N', N a whole number",
+    ),
+    "no frames line": (
+        line_changed(17, ""),
+        18,
+        "found 'Frame Time: 0.0333333', expected 'Frames: N', N a whole number",
+    ),
+    "negative frames": (
+        line_changed(17, "Frames: -3"),
+        17,
+        "found 'Frames: -3', expected 'Frames: N', N a whole number",
+    ),
+    "broken number of frames": (
+        line_changed(17, "Frames: 3.5"),
+        17,
+        "found 'Frames: 3.5', expected 'Frames: N', N a whole number",
+    ),
+    "zero frames": (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
+    "no frame time": (
+        line_changed(18, ""),
+        19,
+        f"found '{ROW.strip()}', expected 'Frame Time: seconds'",
+    ),
+    "frame time not a number": (
+        line_changed(18, "Frame Time: nan"),
+        18,
+        "found 'Frame Time: nan', expected 'Frame Time: seconds'",
+    ),
+    "zero frame time": (
+        line_changed(18, "Frame Time: 0"),
+        18,
+        f"found frame time 0, {FRAME_TIME}",
+    ),
+    "negative frame time": (
+        line_changed(18, "Frame Time: -0.01"),
+        18,
+        f"found frame time -0.01, {FRAME_TIME}",
+    ),
+    "infinite frame time": (
+        line_changed(18, "Frame Time: 1e999"),
+        18,
+        f"found frame time 1e999, {FRAME_TIME}",
+    ),
+    "frame time whose inverse overflows": (
+        line_changed(18, "Frame Time: 1e-320"),
+        18,
+        f"found frame time 1e-320, {FRAME_TIME}",
+    ),
+    "fewer frames than declared": (
+        changed("Frames: 3", "Frames: 4"),
+        21,
+        "found 27 numbers in 3 lines, expected 4 frames x 9 channels = 36, " + OWN_LINES,
+    ),
+    "more frames than declared": (
+        changed("Frames: 3", "Frames: 2"),
+        21,
+        "found 27 numbers in 3 lines, expected 2 frames x 9 channels = 18, " + OWN_LINES,
+    ),
+    "no frame at all": (
+        VALID.replace(ROW, ""),
+        19,
+        "found 0 numbers in 0 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
+    ),
+    "cut in a frame": (
+        VALID[: -len(" 7 8 9\n")],
+        21,
+        "found 24 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
+    ),
+    "a number too few in a line": (
+        line_changed(20, "1 2 3 4 5 6 7 8"),
+        20,
+        "found 26 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
+    ),
+    "a number too many in a line": (
+        line_changed(20, "1 2 3 4 5 6 7 8 9 10"),
+        20,
+        "found 28 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
+    ),
+    "one too few made up by one too many": (
+        "\n".join([*VALID.split("\n")[:18], "1 2 3 4 5 6 7 8", ROW + "1 2 3 4 5 6 7 8 9 10", ""]),
+        19,
+        "found 27 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
+    ),
+    "not a number": (
+        line_changed(20, "1 2 3 nan 5 6 7 8 9"),
+        20,
+        "found 'nan', expected a number",
+    ),
+    "infinity": (line_changed(21, "1 2 3 4 5 6 7 8 -inf"), 21, "found '-inf', expected a number"),
+    "past all floats": (
+        line_changed(20, "1 2 3 4 1e999 6 7 8 9"),
+        20,
+        "found '1e999', expected at most 1e+09",
+    ),
+    "past all lengths": (
+        line_changed(20, "1 2 3 4 -1e300 6 7 8 9"),
+        20,
+        "found '-1e300', expected at most 1e+09",
+    ),
+    "decimal comma": (
+        line_changed(20, "1 2 3 4,5 5 6 7 8 9"),
+        20,
+        "found '4,5', expected a number",
+    ),
+    "underscore, which Python's float takes": (
+        line_changed(20, "1 2 3 4 5 6 7 8 9_0"),
+        20,
+        "found '9_0', expected a number",
+    ),
+    "wide digits, which Python's float takes": (
+        line_changed(20, "1 2 3 4 5 6 7 8 ９"),
+        20,
+        "found '９', expected a number",
+    ),
+    "signs in a number's place": (
+        line_changed(19, "1 2 - 4 5 6 7 8 9"),
+        19,
+        "found '-', expected a number",
+    ),
+    "two numbers run together": (
+        line_changed(19, "1 2-3 4 5 6 7 8 9"),
+        19,
+        "found '2-3', expected a number",
+    ),
+    "text after the data": (
+        VALID + "\nNotes by hand\n",
+        23,
+        "found 'Notes' after the last frame, expected nothing",
+    ),
+    "a second file after the data": (
+        VALID + VALID,
+        22,
+        "found 'HIERARCHY' after the last frame, expected nothing",
+    ),
+}
+
+FAULTS = HIERARCHY_FAULTS | MOTION_FAULTS
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_named_with_its_line(fault):
+    content, line, message = FAULTS[fault]
+    error = refused(content)
+    assert (error.line, error.message) == (line, message)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_line_is_the_same_with_carriage_returns(fault):
+    content, line, message = FAULTS[fault]
+    error = refused(content.replace("\n", "\r\n"))
+    assert (error.line, error.message) == (line, message)
+
+
+def nested(levels):
+    head = "".join(
+        f"{'JOINT' if level else 'ROOT'} j{level}\n{{\nOFFSET 0 1 0\nCHANNELS 1 Xrotation\n"
+        for level in range(levels)
+    )
+    values = " ".join(["0"] * levels)
+    motion = f"MOTION\nFrames: 1\nFrame Time: 0.1\n{values}\n"
+    return f"HIERARCHY\n{head}{'}' * levels}\n{motion}"
+
+
+def flat(joints):
+    many = "".join(f"JOINT j{index} {{ OFFSET 0 0 0 }}\n" for index in range(1, joints))
+    head = f"HIERARCHY\nROOT j0 {{ OFFSET 0 0 0 CHANNELS 1 Xrotation\n{many}}}\n"
+    return head + "MOTION\nFrames: 1\nFrame Time: 0.1\n0\n"
+
+
+def test_depth_is_bounded():
+    assert len(bvh.loads(nested(256).encode(), "deep.bvh").joints) == 256
+    error = refused(nested(257))
+    assert error.message == "found 257 levels, expected at most 256"
+    assert error.line == 2 + 256 * 4
+    assert refused(nested(100_000)).line == error.line
+
+
+def test_number_of_joints_is_bounded():
+    assert len(bvh.loads(flat(1000).encode(), "wide.bvh").joints) == 1000
+    error = refused(flat(1001))
+    assert (error.line, error.message) == (1002, "found 1001 joints, expected at most 1000")
+
+
+def test_a_huge_declared_count_allocates_nothing():
+    tracemalloc.start()
+    try:
+        error = refused(changed("Frames: 3", "Frames: 999999999999999999"))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert "found 27 numbers in 3 lines, expected 999999999999999999 frames x 9" in error.message
+    assert peak < 1_000_000
+
+
+def test_a_count_of_thousands_of_digits_is_refused():
+    error = refused(changed("Frames: 3", f"Frames: {'9' * 10_000}"))
+    assert error.line == 17
+    assert error.message.endswith("...', expected 'Frames: N', N a whole number")
+
+
+def test_joints_that_cost_the_file_nothing_are_bounded():
+    frames = 10_001
+    text = flat(1000).replace("Frames: 1\n", f"Frames: {frames}\n") + "0\n" * (frames - 1)
+    error = refused(text)
+    assert error.message == (
+        "found 10001 frames of 1000 joints, expected at most 10000000 poses of a joint"
+    )
+
+
+@pytest.mark.parametrize("digits", ["1" * 200_000 + "x", "1." + "1" * 200_000 + "x"])
+def test_a_long_word_is_refused_in_linear_time_and_cut_in_the_message(digits):
+    error = refused(line_changed(20, digits))
+    assert (error.line, len(error.message)) == (20, len("found '', expected a number") + 40)
+    assert refused(line_changed(8, f"OFFSET 0 0 {digits}")).line == 8
+    assert refused(line_changed(18, f"Frame Time: {digits}")).line == 18
+
+
+def test_a_long_blank_line_is_passed_in_linear_time():
+    assert refused(" " * 1_000_000 + "\n" + "\t" * 1_000_000).line == 2
+    assert refused(line_changed(17, " " * 1_000_000 + "Frames")).line == 17
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_binary_garbage_is_refused(seed):
+    content = np.random.default_rng(seed).bytes(5000)
+    assert "expected HIERARCHY" in refused(content).message
+
+
+@pytest.mark.parametrize("content", [b"\0" * 100_000, b"Kaydara FBX Binary  \0\x1a\0", b"\xff\xfe"])
+def test_binary_formats_are_refused_at_the_first_line(content):
+    error = refused(content)
+    assert error.line == 1
+    assert "expected HIERARCHY" in error.message
+    assert len(error.message) < 200
+
+
+def test_utf16_is_refused():
+    assert "expected HIERARCHY" in refused(VALID.encode("utf-16")).message
+
+
+def test_a_missing_file_is_the_callers_fault(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        bvh.read(tmp_path / "none.bvh")

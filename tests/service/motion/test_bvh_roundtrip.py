@@ -1,0 +1,349 @@
+"""Clips written and read again, and valid files broken at random."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from service.motion import bvh, quat
+from service.motion.clip import Clip
+from service.motion.errors import BvhError
+from service.motion.skeleton import Skeleton
+
+# Metres and radians, of each joint and of the end of a chain of 31 joints of a metre and more.
+TOLERANCE = 1e-6
+
+GOLDEN = b"""\
+HIERARCHY
+ROOT hips
+{
+	OFFSET 0.0000000 0.0000000 0.0000000
+	CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+	End Site
+	{
+		OFFSET 0.0000000 0.0000000 -10.0000000
+	}
+	JOINT left leg
+	{
+		OFFSET 10.0000000 -5.0000000 0.0000000
+		CHANNELS 3 Zrotation Yrotation Xrotation
+		JOINT foot:L
+		{
+			OFFSET 0.0000000 -40.0000000 0.5000000
+			CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+			End Site
+			{
+				OFFSET 0.0000000 -5.0000000 12.0000000
+			}
+			End Site
+			{
+				OFFSET 0.0000000 -5.0000000 -4.0000000
+			}
+		}
+	}
+	JOINT spine
+	{
+		OFFSET 0.0000000 20.0000000 0.0000000
+		CHANNELS 3 Zrotation Yrotation Xrotation
+		End Site
+		{
+			OFFSET 0.0000000 0.0000000 0.0000000
+		}
+	}
+}
+MOTION
+Frames: 2
+Frame Time: 0.03333333333
+0.0000000 90.0000000 0.0000000 0.0000000 0.0000000 30.0000000 0.0000000 0.0000000 0.0000000 \
+0.0000000 -40.0000000 0.0000000 0.0000000 -45.0000000 0.0000000 90.0000000 0.0000000 0.0000000
+1.5000000 90.0000000 0.0000000 0.0000000 0.0000000 40.0000000 0.0000000 0.0000000 0.0000000 \
+0.0000000 -40.0000000 1.0000000 0.0000000 -45.0000000 0.0000000 100.0000000 0.0000000 0.0000000
+"""
+
+
+def turn(axes, *degrees):
+    return quat.from_euler(np.deg2rad(np.array(degrees, dtype=float)), axes)
+
+
+def small_clip():
+    """Four joints, not depth first, of which the foot slides; the spine has no tip."""
+    offsets = np.array([[0, 0.9, 0], [0.1, -0.05, 0], [0, 0.2, 0], [0, -0.4, 0.005]])
+    tips = np.array([[0, -0.05, 0.12], [0, 0, -0.1], [0, -0.05, -0.04]])
+    names = ("hips", "left leg", "spine", "foot:L")
+    skeleton = Skeleton(names, (-1, 0, 0, 1), offsets, (3, 0, 3), tips)
+    rotations = np.tile(quat.IDENTITY, (2, 4, 1))
+    rotations[:, 0] = [turn("X", 30), turn("X", 40)]
+    rotations[:, 2] = [turn("Z", 90), turn("Z", 100)]
+    rotations[:, 3] = turn("Y", -45)
+    translations = np.tile(offsets, (2, 1, 1))
+    translations[1, 0, 0] = 0.015
+    translations[:, 3, 2] = [0.0, 0.01]
+    return Clip(skeleton, rotations, translations, 30.0)
+
+
+def random_clip(rng, parents, frames=5, rate=30.0):
+    """Full random motion: every second joint slides, tips hang on random joints."""
+    joints = len(parents)
+    names = tuple(f"joint {index}" for index in range(joints))
+    owners = tuple(int(owner) for owner in rng.integers(0, joints, size=3))
+    skeleton = Skeleton(
+        names, parents, rng.normal(size=(joints, 3)), owners, rng.normal(size=(3, 3))
+    )
+    translations = np.tile(skeleton.offsets, (frames, 1, 1))
+    translations[:, ::2] += rng.normal(size=translations[:, ::2].shape)
+    rotations = quat.normalize(rng.normal(size=(frames, joints, 4)))
+    return Clip(skeleton, rotations, translations, rate)
+
+
+def returned(content, metres_per_unit):
+    file = bvh.loads(content, "written.bvh")
+    return bvh.to_clip(file, metres_per_unit=metres_per_unit, up="y", root_offset="add")
+
+
+def angles_between(a, b):
+    return np.linalg.norm(quat.log(quat.mul(quat.conj(a), b)), axis=-1)
+
+
+def worst(clip, other):
+    """Largest difference of local translations, world positions and local rotations."""
+    order = [other.skeleton.names.index(name) for name in clip.skeleton.names]
+    return max(
+        np.abs(clip.translations - other.translations[:, order]).max(),
+        np.abs(clip.positions() - other.positions()[:, order]).max(),
+        angles_between(clip.rotations, other.rotations[:, order]).max(),
+    )
+
+
+def tip_places(skeleton):
+    """Owner's name and offset of each tip that has a length, in a fixed order."""
+    pairs = zip(skeleton.tip_joints, skeleton.tip_offsets, strict=True)
+    return sorted(
+        (skeleton.names[owner], tuple(offset)) for owner, offset in pairs if np.any(offset)
+    )
+
+
+def assert_returns(clip, metres_per_unit):
+    other = returned(bvh.dumps(clip, metres_per_unit=metres_per_unit), metres_per_unit)
+    assert set(other.skeleton.names) == set(clip.skeleton.names)
+    for joint, name in enumerate(clip.skeleton.names[1:], start=1):
+        same = other.skeleton.names.index(name)
+        parent = clip.skeleton.names[clip.skeleton.parents[joint]]
+        assert other.skeleton.names[other.skeleton.parents[same]] == parent
+    for (owner, offset), (same, read) in zip(
+        tip_places(clip.skeleton), tip_places(other.skeleton), strict=True
+    ):
+        assert owner == same
+        np.testing.assert_allclose(offset, read, rtol=0, atol=TOLERANCE)
+    assert worst(clip, other) < TOLERANCE
+    assert other.rate == pytest.approx(clip.rate, rel=1e-9)
+
+
+@st.composite
+def clips(draw):
+    joints = draw(st.integers(1, 8))
+    parents = (-1, *(draw(st.integers(0, joint - 1)) for joint in range(1, joints)))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    clip = random_clip(rng, parents, draw(st.integers(1, 4)), draw(st.sampled_from(RATES)))
+    quarter = st.sampled_from([-180.0, -90.0, -45.0, 0.0, 90.0, 90.0 - 1e-7, 90.0 + 1e-5, 180.0])
+    angle = st.one_of(quarter, st.floats(-720, 720))
+    count = len(clip) * joints * 3
+    degrees = np.array(draw(st.lists(angle, min_size=count, max_size=count)))
+    rotations = quat.from_euler(np.deg2rad(degrees).reshape(len(clip), joints, 3), "ZYX")
+    return replace(clip, rotations=rotations)
+
+
+RATES = (0.5, 24.0, 24000 / 1001, 30.0, 59.5, 60.0, 120.0, 1000.0)
+UNITS = (0.001, 0.01, 0.0254, 0.05644, 0.3048, 1.0, 10.0)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(clips(), st.sampled_from(UNITS))
+def test_any_clip_returns(clip, metres_per_unit):
+    assert_returns(clip, metres_per_unit)
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_long_chain_returns(rng, unit):
+    assert_returns(random_clip(rng, tuple(range(-1, 30)), frames=20), unit)
+
+
+@pytest.mark.parametrize("middle", [90, -90, 90 - 1e-9, 90 - 1e-7, -90 + 1e-6, 90 + 1e-4])
+def test_gimbal_poses_return(middle):
+    outer = np.deg2rad(np.linspace(-180, 180, 25))
+    first, last = np.meshgrid(outer, outer)
+    angles = np.stack([first, np.full_like(first, np.deg2rad(middle)), last], axis=-1)
+    rotations = quat.from_euler(angles.reshape(-1, 1, 3), "ZYX")
+    skeleton = Skeleton(("a",), (-1,), np.zeros((1, 3)), (), np.zeros((0, 3)))
+    assert_returns(Clip(skeleton, rotations, np.zeros((len(rotations), 1, 3)), 60.0), 0.01)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20261121)
+
+
+def test_bytes_are_these():
+    assert bvh.dumps(small_clip(), metres_per_unit=0.01) == GOLDEN
+
+
+def test_bytes_hang_on_the_numbers_and_not_on_their_layout(rng):
+    clip = random_clip(rng, (-1, 0, 1, 0, 3, 3))
+    other = replace(
+        clip,
+        rotations=np.asfortranarray(clip.rotations),
+        translations=np.asfortranarray(clip.translations),
+    )
+    assert bvh.dumps(clip, metres_per_unit=0.01) == bvh.dumps(other, metres_per_unit=0.01)
+
+
+def test_writing_again_and_again_does_not_drift(rng):
+    clip = last = random_clip(rng, (-1, 0, 1, 0, 3, 3))
+    for _ in range(20):
+        last = returned(bvh.dumps(last, metres_per_unit=0.01), 0.01)
+    assert worst(clip, last) < TOLERANCE
+
+
+def test_root_offset_is_zero_so_that_both_readings_agree():
+    file = bvh.loads(bvh.dumps(small_clip(), metres_per_unit=0.01), "written.bvh")
+    assert file.joints[0].offset == (0, 0, 0)
+    added, replaced = (
+        bvh.to_clip(file, metres_per_unit=0.01, up="y", root_offset=choice)
+        for choice in ("add", "replace")
+    )
+    np.testing.assert_array_equal(added.translations, replaced.translations)
+
+
+def test_only_joints_that_slide_have_position_channels():
+    clip = small_clip()
+    still = clip.translations.copy()
+    still[1, 3] = still[0, 3] + 1e-10
+    for translations, channels in ((clip.translations, 6), (still, 3)):
+        content = bvh.dumps(replace(clip, translations=translations), metres_per_unit=0.01)
+        joints = {joint.name: joint for joint in bvh.loads(content, "written.bvh").joints}
+        assert len(joints["foot:L"].channels) == channels
+        assert len(joints["spine"].channels) == 3
+
+
+def test_angles_go_on_where_the_middle_one_passes_a_quarter_turn():
+    angles = np.deg2rad(np.linspace(0, 1000, 251))
+    skeleton = Skeleton(("a",), (-1,), np.zeros((1, 3)), (), np.zeros((0, 3)))
+    for axis in "XYZ":
+        rotations = quat.from_euler(angles[:, None, None], axis)
+        clip = Clip(skeleton, rotations, np.zeros((len(angles), 1, 3)), 60.0)
+        values = bvh.loads(bvh.dumps(clip, metres_per_unit=1.0), "written.bvh").values
+        column = 3 + "ZYX".index(axis)
+        np.testing.assert_allclose(values[:, column], np.rad2deg(angles), atol=1e-5)
+        assert_returns(clip, 1.0)
+
+
+def test_no_negative_zero_is_written():
+    clip = small_clip()
+    clip = replace(clip, translations=-1e-12 - 0.0 * clip.translations)
+    assert b"-0.0000000" not in bvh.dumps(clip, metres_per_unit=0.01)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a\nb", "a\r", "a{b", "a }", " a", "a ", "a  b", "a\tb", "{", "a { b"]
+)
+def test_a_name_that_would_break_the_grammar_is_refused(name):
+    clip = small_clip()
+    skeleton = replace(clip.skeleton, names=("hips", name, "spine", "foot"))
+    with pytest.raises(ValueError, match="expected words parted by single blanks") as caught:
+        bvh.dumps(replace(clip, skeleton=skeleton), metres_per_unit=0.01)
+    assert repr(name) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["左　腕", "mixamorig:Hips", "MOTION", "End Site", "Hüfte", "\x85"]
+)
+def test_a_name_that_the_grammar_can_hold_returns(name):
+    clip = small_clip()
+    skeleton = replace(clip.skeleton, names=("hips", name, "spine", "foot"))
+    assert_returns(replace(clip, skeleton=skeleton), 0.01)
+
+
+@pytest.mark.parametrize("part", ["rotations", "translations"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_numbers_that_are_not_finite_are_refused(part, value):
+    clip = small_clip()
+    broken = getattr(clip, part).copy()
+    broken[1, 2, 0] = value
+    with pytest.raises(ValueError, match="not finite"):
+        bvh.dumps(replace(clip, **{part: broken}), metres_per_unit=0.01)
+
+
+@pytest.mark.parametrize("unit", [0.0, -1.0, np.nan, np.inf])
+def test_a_unit_that_is_no_length_is_refused(unit):
+    with pytest.raises(ValueError, match="expected a positive number"):
+        bvh.dumps(small_clip(), metres_per_unit=unit)
+
+
+def swapped_outer(content):
+    return content.replace(b"Zrotation Yrotation Xrotation", b"Xrotation Yrotation Zrotation")
+
+
+def swapped_lengths(content):
+    return content.replace(b"Xposition Yposition", b"Yposition Xposition")
+
+
+def three_digits(content):
+    head, data = content.split(b"MOTION\n")
+    frames, time, *rows = data.decode().rstrip("\n").split("\n")
+    cut = [" ".join(f"{float(word):.3f}" for word in row.split()) for row in rows]
+    return head + "\n".join(["MOTION", frames, time, *cut]).encode()
+
+
+def first_frame_twice(content):
+    lines = content.split(b"\n")
+    row = lines.index(b"MOTION") + 3
+    return b"\n".join([*lines[: row + 1], lines[row], *lines[row + 2 :]])
+
+
+@pytest.mark.parametrize("wrong", [swapped_outer, swapped_lengths, three_digits, first_frame_twice])
+def test_wrong_bytes_miss_the_tolerance(rng, wrong):
+    """Negative control: each of these is read without complaint and seen by the comparison."""
+    clip = random_clip(rng, (-1, 0, 1, 1))
+    content = bvh.dumps(clip, metres_per_unit=0.01)
+    assert worst(clip, returned(content, 0.01)) < TOLERANCE
+    assert worst(clip, returned(wrong(content), 0.01)) > TOLERANCE
+
+
+def broken(rng, content):
+    """The file cut, or with a few bytes replaced, left out, doubled or moved."""
+    kind = rng.integers(5)
+    start, stop = sorted(int(at) for at in rng.integers(0, len(content), size=2))
+    if kind == 0:
+        return content[:stop]
+    if kind == 1:
+        return content[:start] + content[min(stop, start + 20) :]
+    if kind == 2:
+        lines = content.split(b"\n")
+        one, two = rng.integers(len(lines), size=2)
+        lines[one], lines[two] = lines[two], lines[one]
+        return b"\n".join(lines)
+    if kind == 3:
+        return content[:stop] + content[start:]
+    changed = bytearray(content)
+    for at in rng.integers(0, len(content), size=rng.integers(1, 4)):
+        changed[at] = rng.choice(list(b"{}\n\r \t0-.eE+:nN\0\xff\x83J"))
+    return bytes(changed)
+
+
+def test_broken_files_are_refused_or_read_but_nothing_else(rng):
+    outcomes = {"read": 0, "refused": 0}
+    for _ in range(1500):
+        content = broken(rng, GOLDEN)
+        try:
+            file = bvh.loads(content, "broken.bvh")
+        except BvhError as error:
+            assert error.line is not None
+            assert 1 <= error.line <= content.count(b"\n") + content.count(b"\r") + 2
+            outcomes["refused"] += 1
+            continue
+        clip = bvh.to_clip(file, metres_per_unit=0.01, up="z", root_offset="add")
+        assert np.all(np.isfinite(clip.positions()))
+        outcomes["read"] += 1
+    # Both ways out were taken: a reader that refuses everything would pass the loop above.
+    assert min(outcomes.values()) > 50

@@ -1,0 +1,126 @@
+"""The model card: what is written is what is read, and what is not a card is refused."""
+
+import json
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from service.motion import card
+from service.motion.card import Control, ModelCard
+from service.motion.skeleton import Skeleton
+
+CARD = ModelCard(
+    name="reaching",
+    description="Reaches for a target, d’un geste.",
+    controls=(
+        Control("height", "m", "stature", 1.6, 1.9, 1.75, (1.6, 1.75, 1.9)),
+        Control("turn", "deg", "where the target is", -60.0, 60.0, 0.1, ()),
+    ),
+    skeleton=Skeleton(
+        ("hips", "chest"),
+        (-1, 0),
+        np.array([[0.0, 0.9, 0.0], [0.0, 0.25, -0.01]]),
+        (1,),
+        np.array([[0.0, 0.1, 0.0]]),
+    ),
+    cyclic=False,
+    root="travelling",
+    rate=60.0,
+    frames=100,
+    samples=92,
+    ranks=(22, 6, 24),
+    durations=(0.8, 1.9),
+    diagnostics={"truncation_rms_m": 0.005, "notes": ["one"], "explained": {"pose": 0.9}},
+    provenance={"licence": "CC0", "clips": 92},
+)
+
+
+def same_skeleton(a, b):
+    return (
+        a.same_tree(b)
+        and a.tip_joints == b.tip_joints
+        and np.array_equal(a.offsets, b.offsets)
+        and np.array_equal(a.tip_offsets, b.tip_offsets)
+    )
+
+
+def test_card_read_is_the_card_written():
+    read = card.load(card.dump(CARD))
+    assert same_skeleton(read.skeleton, CARD.skeleton)
+    assert replace(read, skeleton=CARD.skeleton) == CARD
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(ModelCard)])
+def test_card_without_one_of_its_fields_is_refused_by_name(field):
+    metadata = card.dump(CARD)
+    del metadata[f"posefield.{field}"]
+    with pytest.raises(ValueError) as refusal:
+        card.load(metadata)
+    assert str(refusal.value) == f"incomplete posefield metadata: '{field}'"
+
+
+@pytest.mark.parametrize("missing", ["names", "parents", "offsets", "tip_joints", "tip_offsets"])
+def test_card_with_half_a_skeleton_is_refused(missing):
+    metadata = card.dump(CARD)
+    joints = json.loads(metadata["posefield.skeleton"])
+    del joints[missing]
+    with pytest.raises(ValueError, match=f"incomplete posefield metadata: '{missing}'"):
+        card.load({**metadata, "posefield.skeleton": json.dumps(joints)})
+
+
+def test_control_without_a_unit_is_refused():
+    metadata = card.dump(CARD)
+    controls = json.loads(metadata["posefield.controls"])
+    del controls[0]["unit"]
+    with pytest.raises(ValueError, match=r"incomplete posefield metadata: .*unit"):
+        card.load({**metadata, "posefield.controls": json.dumps(controls)})
+
+
+@pytest.mark.parametrize("found", [0, 2, 99])
+def test_other_format_is_refused_with_both_versions(found):
+    metadata = {**card.dump(CARD), "posefield.format": json.dumps(found)}
+    with pytest.raises(ValueError) as refusal:
+        card.load(metadata)
+    assert str(refusal.value) == f"model format {found}, this version reads format 1"
+
+
+def test_other_format_is_refused_before_anything_else_is_looked_at():
+    with pytest.raises(ValueError, match="model format 2, this version reads format 1"):
+        card.load({"posefield.format": "2"})
+
+
+@pytest.mark.parametrize("metadata", [{}, {"author": "someone", "posefield": "1"}])
+def test_metadata_of_another_producer_is_refused(metadata):
+    with pytest.raises(ValueError) as refusal:
+        card.load(metadata)
+    assert str(refusal.value) == "no posefield metadata: it was not written by posefield"
+
+
+def test_entries_of_others_are_left_alone():
+    assert card.load({**card.dump(CARD), "author": "not JSON"}).name == "reaching"
+
+
+def test_equal_cards_give_equal_text_in_equal_order():
+    shuffled = replace(CARD, diagnostics=dict(reversed(list(CARD.diagnostics.items()))))
+    assert list(card.dump(shuffled).items()) == list(card.dump(CARD).items())
+    assert list(card.dump(CARD)) == sorted(card.dump(CARD))
+    assert card.dump(replace(CARD, rate=30.0)) != card.dump(CARD)
+
+
+def test_every_entry_is_json_under_the_prefix():
+    for key, value in card.dump(CARD).items():
+        assert key.startswith("posefield.")
+        json.loads(value)
+
+
+def test_bones_are_written_to_the_micrometre():
+    offsets = CARD.skeleton.offsets + 1.23456789e-5
+    written = card.load(card.dump(replace(CARD, skeleton=replace(CARD.skeleton, offsets=offsets))))
+    away = np.abs(written.skeleton.offsets - offsets).max()
+    assert 0.0 < away <= 0.5e-6
+
+
+def test_control_is_found_by_its_name():
+    assert CARD.control("turn") is CARD.controls[1]
+    assert CARD.control("speed") is None

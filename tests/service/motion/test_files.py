@@ -1,0 +1,103 @@
+"""Files are whole or not there."""
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from service.motion import files
+from service.motion.errors import FileError
+
+ROOT = Path(__file__).parents[3]
+# The disk takes 1000 bytes of a file and no more.
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+from service.motion import files
+from service.motion.errors import FileError
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+target = Path(sys.argv[1])
+try:
+    {write}
+except (FileError, OSError) as fault:
+    print(fault)
+"""
+
+
+def on_a_full_disk(write, target):
+    """Output of a process that wants to write 5000 bytes there."""
+    command = [sys.executable, "-c", FULL_DISK.format(write=write), str(target)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    return done.stdout.strip()
+
+
+def test_content_arrives_and_replaces_what_was_there(tmp_path):
+    target = tmp_path / "model.onnx"
+    files.write(b"first", target)
+    files.write(b"second", target)
+    assert target.read_bytes() == b"second"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_folders_on_the_way_are_made(tmp_path):
+    files.write(b"x", tmp_path / "a" / "b" / "clip.usda")
+    assert (tmp_path / "a" / "b" / "clip.usda").read_bytes() == b"x"
+
+
+@pytest.mark.parametrize("mask", [0o077, 0o022, 0o000])
+def test_everyone_may_read_and_the_owner_write_whatever_the_mask(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        files.write(b"x", tmp_path / "model.onnx")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "model.onnx").stat().st_mode & 0o777 == 0o644
+
+
+def test_disk_that_fills_up_leaves_the_old_file_and_nothing_else(tmp_path):
+    target = tmp_path / "model.onnx"
+    target.write_bytes(b"old")
+    said = on_a_full_disk("files.write(b'x' * 5000, target)", target)
+    assert said == f"{target}: cannot be written: File too large"
+    assert target.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_plain_write_on_the_same_disk_leaves_half_a_file(tmp_path):
+    target = tmp_path / "model.onnx"
+    target.write_bytes(b"old")
+    said = on_a_full_disk("target.write_bytes(b'x' * 5000)", target)
+    assert said == "[Errno 27] File too large"
+    assert target.read_bytes() == b"x" * 1000
+
+
+def test_place_that_cannot_be_taken_leaves_nothing_behind(tmp_path):
+    taken = tmp_path / "model.onnx"
+    (taken / "inside").mkdir(parents=True)
+    with pytest.raises(FileError) as refusal:
+        files.write(b"x", taken)
+    assert str(refusal.value) == f"{taken}: cannot be written: Is a directory"
+    assert list(tmp_path.iterdir()) == [taken]
+
+
+def test_reader_never_sees_a_part(tmp_path):
+    target = tmp_path / "model.onnx"
+    contents = [bytes([i]) * 300_000 for i in (1, 2)]
+    files.write(contents[0], target)
+    done = threading.Event()
+
+    def keep_writing():
+        for i in range(60):
+            files.write(contents[i % 2], target)
+        done.set()
+
+    writer = threading.Thread(target=keep_writing)
+    writer.start()
+    seen = set()
+    while not done.is_set():
+        seen.add(target.read_bytes())
+    writer.join()
+    assert seen <= set(contents)

@@ -1,0 +1,108 @@
+"""A tree of joints: what it refuses, and forward kinematics against plain matrices."""
+
+import numpy as np
+import pytest
+
+from service.motion import quat, skeleton
+from service.motion.skeleton import Skeleton
+
+PARENTS = (-1, 0, 1, 1, 3, 0)
+TOLERANCE = 1e-12
+
+
+def named(parents, **changes):
+    count = len(parents)
+    given = {
+        "names": tuple(f"joint{i}" for i in range(count)),
+        "parents": parents,
+        "offsets": np.zeros((count, 3)),
+        "tip_joints": (),
+        "tip_offsets": np.zeros((0, 3)),
+    }
+    return Skeleton(**{**given, **changes})
+
+
+@pytest.fixture
+def pose(rng):
+    """Rotations (7, J, 4) and translations (7, J, 3)."""
+    return quat.normalize(rng.normal(size=(7, 6, 4))), rng.normal(size=(7, 6, 3))
+
+
+def by_matrices(rotations, translations):
+    """Positions (F, J, 3) of products of homogeneous matrices."""
+    local = np.zeros((*rotations.shape[:2], 4, 4))
+    local[..., :3, :3], local[..., :3, 3] = quat.to_matrix(rotations), translations
+    local[..., 3, 3] = 1.0
+    world = local.copy()
+    for joint, parent in enumerate(PARENTS[1:], start=1):
+        world[:, joint] = world[:, parent] @ local[:, joint]
+    return world[..., :3, 3]
+
+
+def test_forward_is_the_product_of_matrices_down_the_tree(pose):
+    positions, _ = skeleton.forward(PARENTS, *pose)
+    assert np.max(np.abs(positions - by_matrices(*pose))) < TOLERANCE
+    chain = skeleton.forward((-1, 0, 1, 2, 3, 4), *pose)[0]
+    assert np.max(np.abs(chain - by_matrices(*pose))) > 0.1
+
+
+def test_orientations_are_those_that_carry_the_children(pose):
+    rotations, translations = pose
+    positions, orientations = skeleton.forward(PARENTS, rotations, translations)
+    for joint, parent in enumerate(PARENTS[1:], start=1):
+        arm = quat.rotate(orientations[:, parent], translations[:, joint])
+        assert np.max(np.abs(positions[:, parent] + arm - positions[:, joint])) < TOLERANCE
+        own = quat.rotate(orientations[:, joint], translations[:, joint])
+        assert np.max(np.abs(positions[:, parent] + own - positions[:, joint])) > 0.1
+
+
+def test_rotations_broadcast_against_bone_offsets(pose):
+    rotations, translations = pose
+    still = np.broadcast_to(translations[:1], translations.shape)
+    broadcast = skeleton.forward(PARENTS, rotations, translations[0])
+    assert np.array_equal(broadcast[0], skeleton.forward(PARENTS, rotations, still)[0])
+    assert broadcast[1].shape == (7, 6, 4)
+
+
+def test_bones_keep_their_lengths(pose):
+    rotations, translations = pose
+    positions, _ = skeleton.forward(PARENTS, rotations, translations)
+    bones = positions[:, 1:] - positions[:, list(PARENTS[1:])]
+    lengths = np.linalg.norm(translations[:, 1:], axis=-1)
+    assert np.max(np.abs(np.linalg.norm(bones, axis=-1) - lengths)) < TOLERANCE
+
+
+def test_descendants_are_the_joints_whose_way_up_passes_by():
+    expected = np.zeros((6, 6))
+    for joint in range(6):
+        above = joint
+        while above >= 0:
+            expected[above, joint] = 1.0
+            above = PARENTS[above]
+    assert np.array_equal(skeleton.descendants(PARENTS), expected)
+
+
+def test_trees_of_different_size_are_the_same_tree():
+    assert named(PARENTS).same_tree(named(PARENTS, offsets=np.ones((6, 3))))
+    assert not named(PARENTS).same_tree(named((-1, 0, 1, 1, 3, 1)))
+    assert not named(PARENTS).same_tree(named(PARENTS, names=tuple("abcdef")))
+
+
+@pytest.mark.parametrize(
+    ("parents", "changes", "message"),
+    [
+        ((), {}, "0 names, 0 parents, offsets (0, 3)"),
+        ((-1, 0), {"names": ("a",)}, "1 names, 2 parents, offsets (2, 3)"),
+        ((-1, 0), {"offsets": np.zeros((2, 2))}, "2 names, 2 parents, offsets (2, 2)"),
+        ((-1, 0), {"names": ("a", "a")}, "joint names must be unique"),
+        ((0, 0), {}, "the root comes first and every parent before its children"),
+        ((-1, -1), {}, "the root comes first and every parent before its children"),
+        ((-1, 1), {}, "the root comes first and every parent before its children"),
+        ((-1, 2, 0), {}, "the root comes first and every parent before its children"),
+        ((-1,), {"tip_joints": (0,)}, "1 tips, offsets (0, 3)"),
+    ],
+)
+def test_broken_tree_is_refused_saying_what_was_found(parents, changes, message):
+    with pytest.raises(ValueError) as refusal:
+        named(parents, **changes)
+    assert str(refusal.value) == message
