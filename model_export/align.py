@@ -118,7 +118,11 @@ def _round(traces: Floats, reference: Floats, marks: Floats, basis: WarpBasis) -
     """Log increments (N, knots) of the warps to a reference, their mean warp the identity."""
     knees, canonical = _knees(marks)
     straight = np.stack([np.interp(DENSE, own, canonical) for own in knees])
-    phases = dtw.warp(traces, reference)
+    # Time warping may carry a landmark away: it is brought back, and what lies between with it.
+    phases = [
+        np.interp(phase, np.interp(canonical, _even(FINE), phase), canonical)
+        for phase in dtw.warp(traces, reference)
+    ]
     warps = np.stack([np.interp(s, _even(FINE), p) for s, p in zip(straight, phases, strict=True)])
     weights = _weights(marks)
     fitted = [basis.fit(warp, w) for warp, w in zip(warps, weights, strict=True)]

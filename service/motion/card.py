@@ -97,13 +97,21 @@ def load(metadata: Mapping[str, str]) -> ModelCard:
     """Card of a model's metadata entries; ValueError says what is missing or too new."""
     if PREFIX + "format" not in metadata:
         raise ValueError("no posefield metadata: it was not written by posefield")
-    plain = {k.removeprefix(PREFIX): json.loads(v) for k, v in metadata.items() if PREFIX in k}
+    own = {key: text for key, text in metadata.items() if key.startswith(PREFIX)}
+    plain = {key.removeprefix(PREFIX): _parse(key, text) for key, text in own.items()}
     if plain["format"] != FORMAT:
         raise ValueError(f"model format {plain['format']}, this version reads format {FORMAT}")
     try:
         return _from_plain(plain)
     except (KeyError, TypeError) as fault:
         raise ValueError(f"incomplete posefield metadata: {fault}") from fault
+
+
+def _parse(key: str, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as fault:
+        raise ValueError(f"metadata {key} is not JSON: {fault}") from fault
 
 
 def _from_plain(plain: Mapping[str, Any]) -> ModelCard:

@@ -238,3 +238,15 @@ def test_weights_of_joints_decide_what_is_aligned(rng):
     arm = align.align(family, FRAMES, BASIS, 2, np.array([1.0, 1.0, 400.0, 1.0]))
     assert disagreement(arm.logs, second) < 0.7 * disagreement(even.logs, second)
     assert disagreement(arm.logs, first) > disagreement(even.logs, first)
+
+
+def test_landmark_is_met_by_every_clip(family, logs, rng):
+    """Shifted from where the motion itself would align, so that only the landmark can do it."""
+    marks = [BASIS.invert(log, np.array([EVENT]))[0] + rng.uniform(-0.1, 0.1) for log in logs]
+
+    def spread(clips):
+        pairs = zip(aligned(clips).logs, marks, strict=True)
+        return np.ptp([BASIS.evaluate(log, np.array([mark]))[0] for log, mark in pairs])
+
+    assert spread([replace(e, landmarks=(m,)) for e, m in zip(family, marks, strict=True)]) < 0.03
+    assert spread(family) > 0.05, "negative control: without landmarks"

@@ -124,3 +124,10 @@ def test_bones_are_written_to_the_micrometre():
 def test_control_is_found_by_its_name():
     assert CARD.control("turn") is CARD.controls[1]
     assert CARD.control("speed") is None
+
+
+def test_foreign_metadata_is_passed_over_and_broken_own_metadata_is_named():
+    entries = card.dump(CARD)
+    assert card.load({**entries, "x.posefield.note": "free text"}).name == CARD.name
+    with pytest.raises(ValueError, match=r"metadata posefield\.name is not JSON"):
+        card.load({**entries, "posefield.name": "free text"})

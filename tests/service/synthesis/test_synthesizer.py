@@ -136,20 +136,33 @@ def test_a_rate_that_is_no_finite_number_is_refused(refused, rate):
     assert field == "fps" and re.search(r"expected a (finite )?number", message)
 
 
-def test_too_many_frames_are_refused_before_they_are_made(refused, model):
-    """Far outside the samples a clip may last for minutes, or for years."""
+def lasting(model, reach):
+    """Controls that far outside, in every direction, and what the clip would last: s or None."""
     known = model.session.card.controls
-    corners = [
-        {
-            c.name: c.default + sign * 50 * (c.maximum - c.minimum)
-            for c, sign in zip(known, signs, strict=True)
-        }
-        for signs in product((-1, 1), repeat=len(known))
-    ]
-    longest = max(corners, key=lambda corner: model.pose(corner, [0.0], "warn").trust.duration)
+    for signs in product((-1, 1), repeat=len(known)):
+        signed = zip(known, signs, strict=True)
+        corner = {c.name: c.default + s * reach * (c.maximum - c.minimum) for c, s in signed}
+        try:
+            yield corner, model.pose(corner, [0.0], "warn").trust.duration
+        except OutsideSamples:
+            yield corner, None
+
+
+def test_too_many_frames_are_refused_before_they_are_made(refused, model):
+    """A little outside the samples a clip can last for many seconds."""
+    found = [pair for reach in np.linspace(1, 12, 60) for pair in lasting(model, reach)]
+    longest, seconds = max(((c, s) for c, s in found if s), key=lambda pair: pair[1])
+    assert seconds > 10.0
     field, message = refused(longest, rate=1000.0)
     assert field == "fps"
     assert re.fullmatch(r"\d{5,} frames, expected at most 10000", message)
+
+
+def test_an_absurd_duration_is_blamed_on_the_controls(model):
+    lost = [corner for corner, seconds in lasting(model, 90.0) if seconds is None]
+    assert lost
+    with pytest.raises(OutsideSamples, match=r"clip would last \S+ s; captured clips last"):
+        model.clip(lost[0], 30.0, "warn")
 
 
 @pytest.mark.parametrize(
