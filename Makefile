@@ -42,7 +42,7 @@ test: $(ENV) ## lint, types, layers and all tests (no Blender, no browser)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 
 .PHONY: interop
 interop: $(ENV) ## read our USD back through Blender and three.js, in environments of their own

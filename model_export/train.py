@@ -66,10 +66,10 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
 
     Raises TrainingError where the samples cannot carry a field.
     """
-    examples = _sorted(examples)
-    controls = np.stack([example.controls for example in examples])
     names = tuple(control.name for control in recipe.controls)
-    kriging.check(controls, names, recipe.kriging.drift, recipe.kriging.nugget == 0)
+    given = np.stack([example.controls for example in examples])
+    kriging.check(given, names, recipe.kriging.drift, recipe.kriging.nugget == 0)
+    examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")
     weights = _joint_weights(recipe, examples[0].clip.skeleton)
     moved = _move(recipe, examples, weights)
@@ -79,7 +79,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     own_tensor = tensor.build(moved.numbers, moved.chart, parents, offsets, weights)
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
-    return _fit(recipe, examples, controls, moved, own_tensor, full)
+    return _fit(recipe, examples, moved, own_tensor, full)
 
 
 def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
@@ -112,12 +112,12 @@ def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Move
 def _fit(
     recipe: Recipe,
     examples: Sequence[Example],
-    controls: Floats,
     moved: _Moved,
     own_tensor: MotionTensor,
     full: Multilinear,
 ) -> Trained:
     """Every field at its own parameters, and the stages that they feed."""
+    controls = np.stack([example.controls for example in examples])
     low, high = controls.min(axis=0), controls.max(axis=0)
     points = (2.0 * controls - low - high) / (high - low)
     offsets = np.stack([example.offsets for example in examples])

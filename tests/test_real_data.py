@@ -24,7 +24,7 @@ def made(request, real_data):
     own = recipe.read(RECIPES / f"{request.param}.toml")
     examples, notes = ingest.ingest(own, real_data)
     trained = train.train(own, examples, lambda _: None)
-    return own, examples, trained, export.export(own, trained, notes)
+    return own, trained.examples, trained, export.export(own, trained, notes)
 
 
 @pytest.fixture(scope="module")

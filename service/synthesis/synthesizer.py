@@ -47,11 +47,10 @@ class Synthesizer:
         if not 1 <= len(times) <= MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
         when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
-        self._duration(point)
-        answer = self._answer(point, when, controls, warnings)
+        duration = self._duration(point)
         for index, value in enumerate(when):
-            _within(f"times/{index}", value, 0.0, answer.trust.duration, "s")
-        return answer
+            _within(f"times/{index}", value, 0.0, duration, "s")
+        return self._answer(point, when, controls, warnings)
 
     def clip(
         self,
