@@ -64,7 +64,7 @@ def light_and_look(scene: bpy.types.Scene) -> None:
     bpy.ops.object.light_add(type="SUN", rotation=(math.radians(40), math.radians(15), 0.4))
     bpy.context.object.data.energy = 3.5
     bpy.ops.object.camera_add(
-        location=(middle + 1.2, -8.6, 2.0), rotation=(math.radians(82.5), 0, math.radians(9))
+        location=(middle + 1.45, -9.3, 2.0), rotation=(math.radians(82.5), 0, math.radians(9))
     )
     scene.camera = bpy.context.object
     scene.camera.data.lens = 58

@@ -61,12 +61,12 @@ def _matrices(each: dict) -> np.ndarray:
 
 
 def _report(rows: list[Row]) -> int:
-    print(f"{'file':<16}{'reader':<10}{'metres':>10}{'turn':>10}  result")
+    print(f"{'file':<26}{'reader':<10}{'metres':>10}{'turn':>10}  result")
     wrong = [row for row in rows if row.good == _damaged(row)]
     for row in rows:
         result = ("FAILED" if row in wrong else "ok") + " (damaged on purpose)" * _damaged(row)
         figures = f"{row.metres:>10.1e}{row.turn:>10.1e}"
-        print(f"{row.file:<16}{row.reader:<10}{figures}  {result} {row.fault}")
+        print(f"{row.file:<26}{row.reader:<10}{figures}  {result} {row.fault}")
     print(f"{len(rows) - len(wrong)} of {len(rows)} as expected")
     return bool(wrong)
 
