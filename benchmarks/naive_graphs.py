@@ -60,13 +60,7 @@ class Contents:
         net = Net()
         _, fields = model.bank.onnx(net, "controls")
         duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
-        low, high = model.bank.low, model.bank.high
-        points = net(
-            "Gemm",
-            "controls",
-            net.weights("naive_gain", np.diag(2.0 / (high - low))),
-            net.weights("naive_shift", -(high + low) / (high - low)),
-        )
+        points = model.bank.points_onnx(net, "controls")
         numbers = poses(net, points, net("Squeeze", place, net.indices(0, 2)))
         net.named("rotations", self._rotations(net, numbers))
         net.named(
@@ -76,7 +70,7 @@ class Contents:
         net.named("duration", duration)
         joints = len(self.made.parents)
         return net.model(
-            {"controls": [1, len(low)], "time": [1, "steps"]},
+            {"controls": [1, len(model.bank.low)], "time": [1, "steps"]},
             {
                 "rotations": ["steps", joints, 4],
                 "root_position": ["steps", 3],

@@ -52,8 +52,9 @@ def align(
     fine = _straight(traces, marks, FINE)
     logs = _round(fine, fine[medoid], marks, basis)
     for _ in range(rounds):
-        warped = [_at(trace, basis.invert(log, _even(FINE))) for trace, log in _pairs(traces, logs)]
-        logs = _round(fine, np.mean(_straight(warped, _shared(marks), FINE), axis=0), marks, basis)
+        pairs = zip(traces, logs, strict=True)
+        warped = [_at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs]
+        logs = _round(fine, np.mean(warped, axis=0), marks, basis)
     resampled = [
         resample(e.clip, basis.invert(log, _even(frames)))
         for e, log in zip(examples, logs, strict=True)
@@ -71,10 +72,6 @@ def _even(frames: int) -> Floats:
     return np.linspace(0.0, 1.0, frames)
 
 
-def _pairs(traces: list[Floats], logs: Floats) -> list[tuple[Floats, Floats]]:
-    return list(zip(traces, logs, strict=True))
-
-
 def _trace(clip: Clip, weights: Floats) -> Floats:
     """Joint positions (F, J * 3) around the root, seen from its heading, m."""
     positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
@@ -88,11 +85,6 @@ def _at(values: Floats, u: Floats) -> Floats:
     before = np.minimum(place.astype(np.int64), len(values) - 2)
     share = (place - before)[:, None]
     return (1.0 - share) * values[before] + share * values[before + 1]
-
-
-def _shared(marks: Floats) -> Floats:
-    """The landmarks' canonical times, for every clip."""
-    return np.repeat(marks.mean(axis=0, keepdims=True), len(marks), axis=0)
 
 
 def _knees(marks: Floats) -> tuple[Floats, Floats]:

@@ -4,10 +4,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import orjson
 import typer
 
-from service.cli import Controls, Json, encoder, numbers, wrote
+from service.cli import Controls, Json, as_json, encoder, numbers, wrote
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField
@@ -39,7 +38,7 @@ def sample(
     if not truth:
         path = write.family(output)
         typer.echo(
-            _dump({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
+            as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
         return
     encode = encoder(output)
@@ -77,11 +76,7 @@ def train_command(
     exported = export.export(own, trained, notes)
     files.write(exported.content, output)
     report("done")
-    typer.echo(_dump(_facts(exported, output)) if json else _summary(exported, output))
-
-
-def _dump(value: Any) -> str:
-    return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
+    typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
 
 
 def _facts(exported: "Exported", output: Path) -> dict[str, Any]:

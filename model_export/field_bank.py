@@ -28,6 +28,11 @@ class Constant:
 Field = Kriging | Constant
 
 
+def half_ranges(controls: Floats, low: Floats, high: Floats) -> Floats:
+    """Controls (B, d) on a scale where the range from low to high (d,) is -1 to 1."""
+    return (2.0 * controls - low - high) / (high - low)
+
+
 @dataclass(frozen=True)
 class FieldBank:
     """Fields by name, the pose's first, over controls whose sampled ranges are low to high (d,)."""
@@ -49,7 +54,16 @@ class FieldBank:
 
     def points(self, controls: Floats) -> Floats:
         """Controls (B, d) in half-ranges: the sampled range is -1 to 1."""
-        return (2.0 * controls - self.low - self.high) / (self.high - self.low)
+        return half_ranges(controls, self.low, self.high)
+
+    def points_onnx(self, net: Net, controls: str) -> str:
+        """The same in a graph."""
+        return net(
+            "Gemm",
+            controls,
+            net.weights("control_gain", np.diag(2.0 / (self.high - self.low))),
+            net.weights("control_shift", -(self.high + self.low) / (self.high - self.low)),
+        )
 
     def numpy(self, controls: Floats) -> dict[str, Floats]:
         """Values (B, m) of each field at controls (B, d)."""
@@ -58,12 +72,7 @@ class FieldBank:
 
     def onnx(self, net: Net, controls: str) -> tuple[str, dict[str, str]]:
         """Basis (B, d + F n), points first and the pose's covariances next, and the fields."""
-        points = net(
-            "Gemm",
-            controls,
-            net.weights("control_gain", np.diag(2.0 / (self.high - self.low))),
-            net.weights("control_shift", -(self.high + self.low) / (self.high - self.low)),
-        )
+        points = self.points_onnx(net, controls)
         basis = net("Concat", points, self._covariances(net, points), axis=1)
         bias = np.concatenate([_constant_part(field) for field in self.fields.values()])
         values = net("Gemm", basis, self._duals(net), net.weights("field_bias", bias))

@@ -15,7 +15,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from service.motion.errors import RecipeError
 
-SCHEMA = 1
 # Parameters that a clip query has besides the controls.
 RESERVED = frozenset({"fps", "start", "end", "time", "times", "extrapolate", "level", "format"})
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]

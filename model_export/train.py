@@ -9,7 +9,7 @@ from model_export import align, fields, hosvd, kriging, ranks, tensor, travel
 from model_export.align import Aligned
 from model_export.chart import Chart
 from model_export.decoder import Decoder
-from model_export.field_bank import FieldBank, Spread
+from model_export.field_bank import FieldBank, Spread, half_ranges
 from model_export.fields import Fitted
 from model_export.flips import Finding
 from model_export.hosvd import Multilinear
@@ -52,9 +52,13 @@ class Trained:
 
 @dataclass(frozen=True)
 class _Moved:
-    """Aligned clips as pose vectors (N, T, D); travels (N, 3) are a cycle's, and empty else."""
+    """Aligned clips as pose vectors (N, T, D), with their bone offsets (N, J, 3), m.
+
+    travels (N, 3) are a cycle's, and empty else.
+    """
 
     aligned: Aligned
+    offsets: Floats
     numbers: Floats
     chart: Chart
     travels: dict[str, Floats]
@@ -75,8 +79,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     moved = _move(recipe, examples, weights)
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
-    offsets = np.stack([example.offsets for example in examples])
-    own_tensor = tensor.build(moved.numbers, moved.chart, parents, offsets, weights)
+    own_tensor = tensor.build(moved.numbers, moved.chart, parents, moved.offsets, weights)
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
     return _fit(recipe, examples, moved, own_tensor, full)
@@ -106,7 +109,7 @@ def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Move
     parents = examples[0].clip.skeleton.parents
     numbers, chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
-    return _Moved(aligned, numbers, chart, travels, jumps + noticed)
+    return _Moved(aligned, offsets, numbers, chart, travels, jumps + noticed)
 
 
 def _fit(
@@ -119,9 +122,8 @@ def _fit(
     """Every field at its own parameters, and the stages that they feed."""
     controls = np.stack([example.controls for example in examples])
     low, high = controls.min(axis=0), controls.max(axis=0)
-    points = (2.0 * controls - low - high) / (high - low)
-    offsets = np.stack([example.offsets for example in examples])
-    proportions, bones = fields.proportions(offsets)
+    points = half_ranges(controls, low, high)
+    proportions, bones = fields.proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
     fitted = {k: fields.fit(recipe.kriging, points, values) for k, values in beside.items()}
@@ -142,7 +144,7 @@ def _fit(
     return Trained(
         model,
         tuple(examples),
-        _mean_skeleton(examples, offsets),
+        _mean_skeleton(examples, moved.offsets),
         moved.aligned,
         own_tensor,
         full,

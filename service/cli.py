@@ -79,7 +79,7 @@ def inspect(model: ModelPath, json: Json = False) -> None:
     """Say what a model file is: its controls, its skeleton, its errors, where it comes from."""
     opened = session.load(model)
     plain = {"identity": f"{model.stem}@{opened.digest}", **cards.plain_values(opened.card)}
-    typer.echo(_json(plain) if json else _summary(plain))
+    typer.echo(as_json(plain) if json else _summary(plain))
 
 
 @app.command()
@@ -137,7 +137,7 @@ def check(
 
     findings = find(file)
     if json:
-        typer.echo(_json([vars(finding) for finding in findings]))
+        typer.echo(as_json([vars(finding) for finding in findings]))
     else:
         for finding in findings:
             typer.echo(f"{finding.severity}: {finding.prim}: {finding.message} [{finding.code}]")
@@ -179,7 +179,7 @@ def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
     """What to tell of a clip that was written."""
     frames = len(answer.clip)
     if json:
-        return _json(
+        return as_json(
             {"file": str(path), "frames": frames, "rate": answer.clip.rate, **answer.trust.facts()}
         )
     return (
@@ -193,7 +193,8 @@ def _warn(warnings: Sequence[str]) -> None:
         typer.echo(f"warning: {warning}", err=True)
 
 
-def _json(value: Any) -> str:
+def as_json(value: Any) -> str:
+    """Plain values as JSON to read."""
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
 
 

@@ -8,8 +8,6 @@ from service.motion.conventions import Floats
 from service.motion.skeleton import Skeleton
 
 SPINE = ("LowerBack", "Spine", "Spine1")
-NECK = ("Neck", "Neck1", "Head")
-FINGERS = ("Thumb1", "Thumb2", "Index1", "Middle1", "Pinky1")
 SIDES = {"Left": 1.0, "Right": -1.0}
 """Sign of x on each side of the body."""
 

@@ -14,6 +14,5 @@ Floats = npt.NDArray[np.float64]
 """Every array of numbers in Python is float64; the model file states its own type."""
 
 Indices = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 UP = np.array([0.0, 1.0, 0.0])
