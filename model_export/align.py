@@ -1,10 +1,11 @@
 """Clips of different timing to one canonical time, and the warps that lead there and back.
 
 Every clip is compared with a reference by what its joints do around the root. The first reference
-is the medoid, the clip nearest to all others; further rounds take the mean of what was aligned.
+is the medoid, the clip nearest to all others; in further rounds every clip has its own, what the
+aligned others predict for it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,8 +39,17 @@ class Aligned:
     reference: int
 
 
+Predict = Callable[[Floats], Floats]
+"""Values (N, m) of all clips to what is predicted for each of them (N, m)."""
+
+
 def align(
-    examples: Sequence[Example], frames: int, basis: WarpBasis, rounds: int, joint_weights: Floats
+    examples: Sequence[Example],
+    frames: int,
+    basis: WarpBasis,
+    rounds: int,
+    joint_weights: Floats,
+    predict: Predict,
 ) -> Aligned:
     """Examples warped to one canonical time and resampled to `frames` frames.
 
@@ -53,8 +63,9 @@ def align(
     logs = _round(fine, fine[medoid], marks, basis)
     for _ in range(rounds):
         pairs = zip(traces, logs, strict=True)
-        warped = [_at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs]
-        logs = _round(fine, np.mean(warped, axis=0), marks, basis)
+        warped = np.stack([_at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs])
+        predicted = predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
+        logs = _round(fine, predicted, marks, basis)
     resampled = [
         resample(e.clip, basis.invert(log, _even(frames)))
         for e, log in zip(examples, logs, strict=True)
@@ -107,7 +118,8 @@ def _medoid(traces: Floats) -> int:
 
 
 def _round(traces: Floats, reference: Floats, marks: Floats, basis: WarpBasis) -> Floats:
-    """Log increments (N, knots) of the warps to a reference, their mean warp the identity."""
+    """Log increments (N, knots) of the warps to a reference (F, features), or one a clip (N, F,
+    features), their mean warp the identity."""
     knees, canonical = _knees(marks)
     straight = np.stack([np.interp(DENSE, own, canonical) for own in knees])
     # Time warping may carry a landmark away: it is brought back, and what lies between with it.

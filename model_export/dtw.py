@@ -12,8 +12,8 @@ STEPS = ((1, 1), (1, 2), (2, 1), (1, 3), (3, 1))
 def warp(sequences: Floats, reference: Floats) -> Floats:
     """Reference phase (N, F) in [0, 1] at each of the F frames of sequences (N, F, features).
 
-    reference (F, features) has as many frames as the sequences: resample them first, so that the
-    slope limit means the same for all. The end points are fixed. Cells that a step jumps over
+    reference (F, features), or one for each sequence (N, F, features), has as many frames as the
+    sequences: resample them first, so that the slope limit means the same for all. The end points are fixed. Cells that a step jumps over
     are paid for, so that long steps bring no gain.
     """
     costs = _distances(sequences, reference)
@@ -30,8 +30,9 @@ def total_cost(sequences: Floats, reference: Floats) -> Floats:
 def _distances(sequences: Floats, reference: Floats) -> Floats:
     """Squared distances (N, F, F) between every frame and every reference frame."""
     squares = np.sum(np.square(sequences), axis=-1)[:, :, None]
-    cross = sequences @ reference.T
-    return np.maximum(squares + np.sum(np.square(reference), axis=-1) - 2.0 * cross, 0.0)
+    cross = sequences @ np.swapaxes(reference, -1, -2)
+    own = np.sum(np.square(reference), axis=-1)[..., None, :]
+    return np.maximum(squares + own - 2.0 * cross, 0.0)
 
 
 def _accumulate(costs: Floats) -> tuple[Floats, Indices]:

@@ -35,10 +35,14 @@ def half_ranges(controls: Floats, low: Floats, high: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class FieldBank:
-    """Fields by name, the pose's first, over controls whose sampled ranges are low to high (d,)."""
+    """Fields by name, the pose's first, over controls whose sampled ranges are low to high (d,).
+
+    performers: who is told apart, in the order of their labels.
+    """
 
     low: Floats
     high: Floats
+    performers: tuple[str, ...]
     pose: Kriging
     others: dict[str, Field]
 
@@ -52,9 +56,9 @@ class FieldBank:
         """The fields that depend on the controls, in order."""
         return [field for field in self.fields.values() if isinstance(field, Kriging)]
 
-    def points(self, controls: Floats) -> Floats:
-        """Controls (B, d) in half-ranges: the sampled range is -1 to 1."""
-        return half_ranges(controls, self.low, self.high)
+    def points(self, controls: Floats, labels: Floats) -> Floats:
+        """Points (B, d + p) of controls (B, d), whose sampled range is -1 to 1, and labels."""
+        return np.hstack([half_ranges(controls, self.low, self.high), labels])
 
     def points_onnx(self, net: Net, controls: str) -> str:
         """The same in a graph."""
@@ -65,9 +69,8 @@ class FieldBank:
             net.weights("control_shift", -(self.high + self.low) / (self.high - self.low)),
         )
 
-    def numpy(self, controls: Floats) -> dict[str, Floats]:
-        """Values (B, m) of each field at controls (B, d)."""
-        points = self.points(controls)
+    def numpy(self, points: Floats) -> dict[str, Floats]:
+        """Values (B, m) of each field at points (B, d + p)."""
         return {name: field.predict(points) for name, field in self.fields.items()}
 
     def onnx(self, net: Net, controls: str) -> tuple[str, dict[str, str]]:
@@ -131,7 +134,7 @@ def _constant_part(field: Field) -> Floats:
 
 def _linear_part(field: Field, controls: int) -> Floats:
     """Weights (d, m) of the controls themselves: zero where the drift has none."""
-    if isinstance(field, Kriging) and field.hyper.drift:
+    if isinstance(field, Kriging) and max(field.hyper.drifts):
         return field.dual[len(field.samples) + 1 :]
     return np.zeros((controls, len(_constant_part(field))))
 
@@ -153,11 +156,11 @@ class Spread:
 
     def onnx(self, net: Net, basis: str) -> str:
         """The same (B,) of the bank's basis."""
-        n, d = self.pose.samples.shape
-        drift = self.pose.hyper.drift * d
+        n, d = len(self.pose.samples), len(self.pose.hyper.scales)
+        drift = max(self.pose.hyper.drifts) * d
         # The bank's basis is [points, covariances], the system's [covariances, 1, points].
         order = [*range(n + 1, n + 1 + drift), *range(n)]
-        matrix = self.pose.inverse[np.ix_(order, order)]
+        matrix = self.pose.form[np.ix_(order, order)]
         own = net(
             "Slice",
             basis,
@@ -165,11 +168,11 @@ class Spread:
             net.indices(d + n),
             net.indices(1),
         )
-        linear = 2.0 * self.pose.inverse[n, order]
+        linear = 2.0 * self.pose.form[n, order]
         product = net(
             "Gemm", own, net.weights("precision", -matrix), net.weights("precision_1", -linear)
         )
         falling = net("ReduceSum", net("Mul", product, own), net.indices(1), keepdims=0)
-        rest = 1.0 + self.pose.hyper.nugget - float(self.pose.inverse[n, n])
+        rest = 1.0 + self.pose.hyper.nugget - float(self.pose.form[n, n])
         variance = net("Relu", net("Add", falling, net.number(rest)))
         return net("Sqrt", net("Mul", variance, net.number(self.sill)))

@@ -8,6 +8,7 @@ from model_export import kriging, tune
 from model_export.decoder import Proportions
 from model_export.field_bank import Constant, Field
 from model_export.recipe import Kriging
+from model_export.samples import Samples
 from model_export.tune import Tuned
 from service.motion.conventions import Floats
 
@@ -24,23 +25,30 @@ class Fitted:
     residuals: Floats
 
 
-def tuned(settings: Kriging, points: Floats, values: Floats) -> Tuned:
-    """Parameters of the field of values (N, m) at points (N, d), by leave-one-out."""
-    guess = tune.first_guess(points, values, settings.covariance, settings.drift)
-    return tune.tune(guess, points, values, settings.nugget)
+def chosen(settings: Kriging, samples: Samples, values: Floats) -> Tuned:
+    """Field of values (N, m) of least leave-one-out error among the covariances to be tried."""
+    found = [tuned(settings, name, samples, values) for name in settings.covariances]
+    return min(found, key=lambda field: field.unexplained)
 
 
-def fit(settings: Kriging, points: Floats, values: Floats) -> Fitted:
+def tuned(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Tuned:
+    """Field of values (N, m) of least leave-one-out error among the drifts to be tried."""
+    controls = samples.points[:, : samples.controls]
+    guesses = [tune.first_guess(controls, values, covariance, d) for d in settings.drifts]
+    found = [tune.tune(guess, samples, values, settings.nugget) for guess in guesses]
+    return min(found, key=lambda field: field.unexplained)
+
+
+def fit(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Fitted:
     """Field of values (N, m): of the controls, or their mean where those do not explain them."""
     if np.ptp(values, axis=0).max() == 0.0:
         return Fitted(Constant(values[0]), 0.0, np.zeros_like(values))
-    found = tuned(settings, points, values)
+    found = tuned(settings, covariance, samples, values)
     explained = 1.0 - found.unexplained
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
     if explained <= 0.0 and settings.nugget is None:
-        from_mean = (values - values.mean(axis=0)) * len(values) / (len(values) - 1)
-        return Fitted(Constant(values.mean(axis=0)), explained, from_mean)
-    return Fitted(kriging.solve(found.hyper, points, values), explained, found.residuals)
+        return Fitted(Constant(values.mean(axis=0)), explained, samples.from_mean(values))
+    return Fitted(kriging.solve(found.hyper, samples.points, values), explained, found.residuals)
 
 
 def proportions(offsets: Floats) -> tuple[Proportions, Floats]:

@@ -12,84 +12,124 @@ from dataclasses import dataclass
 import numpy as np
 
 from model_export.covariance import COVARIANCES
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
 
 
 @dataclass(frozen=True)
 class Hyper:
-    """covariance: its name. drift: polynomial degree, 0 or 1. scales (d,): what a unit of each
-    control is worth as distance (one over the range). nugget: as a share of the sill."""
+    """covariance: its name. drifts: polynomial degrees whose predictions are averaged, of 0 and 1.
+    scales (d,): what a unit of each control is worth as distance (one over the range). nugget: as
+    a share of the sill. label: the distance between two performers who are told apart, who never
+    enter the drift."""
 
     covariance: str
-    drift: int
+    drifts: tuple[int, ...]
     scales: Floats
     nugget: float
+    label: float = 0.0
 
 
 @dataclass(frozen=True)
 class Kriging:
-    """A solved field: samples (n, d), values' dual weights (n + k, m) and inverse system."""
+    """A solved field: samples (n, d + p), values' dual weights (n + k, m), and what does not depend
+    on the values: weighing (n + k, n) and the quadratic form (n + k, n + k) of the variance.
+
+    A point is d controls and p labels, of which the performer's own is one and the others zero;
+    all are zero for a performer who was never seen.
+    """
 
     hyper: Hyper
     samples: Floats
     dual: Floats
-    inverse: Floats
+    weighing: Floats
+    form: Floats
 
     def predict(self, points: Floats) -> Floats:
-        """Values (B, m) at points (B, d)."""
+        """Values (B, m) at points (B, d + p)."""
         return self._basis(points) @ self.dual
 
     def weights(self, points: Floats) -> Floats:
         """What each sample counts for (B, n): they add up to one, and may be negative."""
-        return (self._basis(points) @ self.inverse)[:, : len(self.samples)]
+        return self._basis(points) @ self.weighing
 
     def variance(self, points: Floats) -> Floats:
         """Kriging variance (B,) of the smooth field, as a share of the sill."""
         basis = self._basis(points)
-        return 1.0 - np.sum(basis @ self.inverse * basis, axis=1)
+        return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
     def _basis(self, points: Floats) -> Floats:
         near = covariances(self.hyper, points, self.samples)
-        return np.hstack([near, drift(points, self.hyper.drift)])
+        return np.hstack([near, drift(points, len(self.hyper.scales), max(self.hyper.drifts))])
 
 
 def covariances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
-    """Covariance (A, B) between points (A, d) and (B, d)."""
-    gaps = (a[:, None] - b[None]) * hyper.scales
-    return COVARIANCES[hyper.covariance].numpy(np.sum(np.square(gaps), axis=-1))
+    """Covariance (A, B) between points (A, d + p) and (B, d + p).
+
+    Different performers are `label` apart, whoever they are: the product of their labels is 0, and
+    1 for the same one.
+    """
+    d = len(hyper.scales)
+    gaps = (a[:, None, :d] - b[None, :, :d]) * hyper.scales
+    others = 1.0 - a[:, d:] @ b[:, d:].T
+    squared = np.sum(np.square(gaps), axis=-1) + hyper.label**2 * others
+    return COVARIANCES[hyper.covariance].numpy(squared)
 
 
-def drift(points: Floats, degree: int) -> Floats:
-    """Drift functions (B, k) at points (B, d): a constant, and the controls for degree one."""
+def drift(points: Floats, controls: int, degree: int) -> Floats:
+    """Drift functions (B, k) at points (B, d + p): a constant, and the controls for degree one."""
     one = np.ones((len(points), 1))
-    return np.hstack([one, points]) if degree else one
+    return np.hstack([one, points[:, :controls]]) if degree else one
 
 
-def invert(hyper: Hyper, samples: Floats) -> Floats:
-    """Inverse (n + k, n + k) of the kriging system."""
-    f = drift(samples, hyper.drift)
+def invert(hyper: Hyper, samples: Floats, degree: int) -> Floats:
+    """Inverse (n + k, n + k) of the kriging system with a drift of that degree."""
+    f = drift(samples, len(hyper.scales), degree)
     n, k = f.shape
     system = np.zeros((n + k, n + k))
-    system[:n, :n] = covariances(hyper, samples, samples) + hyper.nugget * np.eye(n)
+    system[:n, :n] = noisy(hyper, samples)
     system[:n, n:], system[n:, :n] = f, f.T
     return np.linalg.inv(system)
 
 
+def noisy(hyper: Hyper, samples: Floats) -> Floats:
+    """Covariance (n, n) of measured samples: that of the field, and the nugget."""
+    return covariances(hyper, samples, samples) + hyper.nugget * np.eye(len(samples))
+
+
 def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
-    """Field through values (n, m) at samples (n, d); `check` the samples first."""
-    inverse = invert(hyper, samples)
-    return Kriging(hyper, samples, inverse[:, : len(samples)] @ values, inverse)
+    """Field through values (n, m) at samples (n, d + p); `check` the samples first.
 
-
-def leave_one_out(inverse: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Residuals (n, m) and variances (n,) of each sample predicted from all the others.
-
-    Closed form from the inverse of the whole system; the variance counts the nugget in.
+    With more than one drift the weights are averaged, and the variance is that of their average.
     """
-    block = inverse[: len(values), : len(values)]
-    precision = np.diagonal(block)
-    return block @ values / precision[:, None], 1.0 / precision
+    n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
+    weighing = np.zeros((n + functions, n))
+    for degree in hyper.drifts:
+        own = invert(hyper, samples, degree)[:, :n]
+        weighing[: len(own)] += own / len(hyper.drifts)
+    toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
+    form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
+    return Kriging(hyper, samples, weighing @ values, weighing, form)
+
+
+def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
+    """Matrix (n, n) from values to residuals of each sample predicted from all other groups.
+
+    groups (n,): samples that say too much of each other, such as strides of one take, are left
+    out together. Closed form from the inverse of the whole system (Dubrule 1983, for blocks).
+    """
+    matrices = [_left_out(invert(hyper, samples, d), groups) for d in hyper.drifts]
+    return np.mean(matrices, axis=0)
+
+
+def _left_out(inverse: Floats, groups: Indices) -> Floats:
+    block = inverse[: len(groups), : len(groups)]
+    residual = block / np.diagonal(block)[:, None]
+    names, sizes = np.unique(groups, return_counts=True)
+    for name in names[sizes > 1]:
+        own = np.flatnonzero(groups == name)
+        residual[own] = np.linalg.solve(block[np.ix_(own, own)], block[own])
+    return residual
 
 
 def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:
@@ -111,7 +151,7 @@ def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: 
                 f"control {name!r} has the value {column[0]:g} in all {count} samples, expected "
                 "at least two values; leave it out of the recipe"
             )
-    if np.linalg.matrix_rank(drift(samples, degree)) < 1 + len(names) * degree:
+    if np.linalg.matrix_rank(np.hstack([np.ones((count, 1)), samples])) <= len(names) * degree:
         raise TrainingError(f"controls {names}: one of them follows linearly from the others")
     if nugget_is_zero:
         _refuse_twins(samples)

@@ -43,15 +43,20 @@ class Model:
     proportions: Proportions
     travel: Travel | None
 
-    def evaluate(self, controls: Floats, time: Floats) -> Outputs:
-        """Answer to controls (B, d) in their own units and times (B, S), s."""
-        fields = self.bank.numpy(controls)
+    def evaluate(self, controls: Floats, time: Floats, labels: Floats | None = None) -> Outputs:
+        """Answer to controls (B, d) in their own units and times (B, S), s.
+
+        labels (B, p): who moves; nobody that was seen, if not said.
+        """
+        nobody = np.zeros((len(controls), len(self.bank.performers)))
+        points = self.bank.points(controls, nobody if labels is None else labels)
+        fields = self.bank.numpy(points)
         duration, place = self.timing.numpy(fields["duration"], fields["warp"], time)
         rotations, root = self.decoder.numpy(fields["pose"], place)
         if self.travel:
             rotations, root = self.travel.numpy(rotations, root, fields["travel"], place)
         offsets = self.proportions.numpy(fields["offsets"])
-        sigma = self.spread.numpy(self.bank.points(controls))
+        sigma = self.spread.numpy(points)
         return Outputs(rotations, root, offsets, duration, sigma)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:

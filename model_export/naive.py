@@ -36,7 +36,7 @@ class Naive:
         """Pose vectors (T, D) at one point (1, d): weights from the inverse of each frame's system,
         and the average of the full samples by them, as the paper describes it."""
         basis = self.basis(net, points)
-        inverse = np.stack([field.inverse[:, : len(field.samples)] for field in self.fields])
+        inverse = np.stack([field.weighing for field in self.fields])
         weights = net("MatMul", basis, net.weights("inverses", inverse))
         samples = net.weights("values", self.values.transpose(1, 0, 2))
         return net("Squeeze", net("MatMul", weights, samples), net.indices(1))
@@ -45,7 +45,7 @@ class Naive:
         """The same with weights and samples multiplied beforehand: half the numbers to read."""
         duals = np.stack(
             [
-                field.inverse[:, : len(field.samples)] @ values
+                field.weighing @ values
                 for field, values in zip(self.fields, self.values.swapaxes(0, 1), strict=True)
             ]
         )
@@ -81,6 +81,6 @@ def fit(
         found = fitter(variogram.experimental(points, left), covariance)
         nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
         scales = np.full(points.shape[1], 1.0 / found.range)
-        hyper = Hyper(covariance, 1, scales, float(nugget))
+        hyper = Hyper(covariance, (1,), scales, float(nugget))
         fields.append(kriging.solve(hyper, points, values[:, frame]))
     return Naive(tuple(fields), values)

@@ -91,6 +91,16 @@ class Motion(_Part):
     joint_weights: dict[str, Positive] = Field(
         default={}, description="importance of a joint's position in the metric; 1 if not said"
     )
+    feet: list[Text] = Field(
+        default=[], description="joints of the feet, whose sliding on the ground is measured"
+    )
+
+
+class Event(_Part):
+    """What the motion is about: where a joint is at one moment."""
+
+    joint: Text = Field(description="hand, foot or root that the motion brings somewhere")
+    at: Text = Field(default="end", description="the end, or a column of clips.landmarks")
 
 
 class Alignment(_Part):
@@ -100,18 +110,49 @@ class Alignment(_Part):
         default=6, description="free increments of a warp: few, so that it adds no jerk"
     )
     rounds: Annotated[int, Field(ge=0, le=8)] = Field(
-        default=2, description="re-alignments to the mean motion after the one to the medoid"
+        default=2, description="re-alignments after the one to the medoid"
+    )
+    reference: Literal["prediction", "mean"] = Field(
+        default="prediction",
+        description="what a clip is re-aligned to: what the others predict for it, or their mean",
     )
 
 
 class Kriging(_Part):
     """The field of the control coefficients."""
 
-    covariance: Literal["matern52", "matern32", "gaussian", "exponential", "spherical"] = "matern52"
-    drift: Annotated[int, Field(ge=0, le=1)] = Field(default=1, description="polynomial degree")
+    covariance: Literal[
+        "matern52", "matern32", "gaussian", "exponential", "spherical", "chosen"
+    ] = Field(
+        default="chosen",
+        description="how alike motions are by their distance; chosen is matern52 or gaussian, "
+        "whichever leave-one-out finds better",
+    )
+    drift: Literal[0, 1, "mean", "chosen"] = Field(
+        default="chosen",
+        description="polynomial degree; mean is the mean of what both degrees predict, and chosen "
+        "is that or degree one, whichever leave-one-out finds better",
+    )
     nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
         default=None, description="share of the sill; fitted by leave-one-out if not said"
     )
+    label: Literal["performer"] | None = Field(
+        default=None,
+        description="what tells clips apart beside their controls: it enters the distance between "
+        "them, never the drift",
+    )
+
+    @property
+    def covariances(self) -> tuple[str, ...]:
+        """The covariances that are tried."""
+        return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)
+
+    @property
+    def drifts(self) -> tuple[tuple[int, ...], ...]:
+        """What is tried of the degrees whose predictions are averaged."""
+        if self.drift == "chosen":
+            return (1,), (0, 1)
+        return ((0, 1),) if self.drift == "mean" else ((self.drift,),)
 
 
 class Size(_Part):
@@ -142,9 +183,16 @@ class Recipe(_Part):
     clips: Clips
     controls: Annotated[list[ControlColumn], Field(min_length=1)]
     motion: Motion
+    event: Event | None = None
     alignment: Alignment = Alignment()
     kriging: Kriging = Kriging()
     size: Size
+
+    @model_validator(mode="after")
+    def _label_has_a_column(self) -> "Recipe":
+        if self.kriging.label and not self.clips.performer:
+            raise ValueError("kriging.label is 'performer', but clips.performer names no column")
+        return self
 
     @field_validator("controls")
     @classmethod

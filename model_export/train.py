@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import align, fields, hosvd, kriging, ranks, tensor, travel
+from model_export import align, fields, hosvd, kriging, ranks, samples, tensor, travel
 from model_export.align import Aligned
 from model_export.chart import Chart
 from model_export.decoder import Decoder
-from model_export.field_bank import FieldBank, Spread, half_ranges
+from model_export.field_bank import FieldBank, Spread
 from model_export.fields import Fitted
 from model_export.flips import Finding
 from model_export.hosvd import Multilinear
@@ -33,7 +33,8 @@ class Trained:
     """A model with what it was made from and what was seen on the way.
 
     examples: in an order of their own, so that the model does not depend on the table's. pose: the
-    tuned pose field. missed (N,): mean squared joint distance, m², of each clip from what all
+    tuned pose field. values: what each field is laid through (N, m), the pose's as whole motions in
+    the coordinates of the sample mode. missed (N,): mean squared joint distance, m², of each clip from what all
     others predict for it. explained: for each field the share of the variation between clips that
     leave-one-out predicts from the controls; one at or below zero is answered with its mean.
     """
@@ -45,6 +46,7 @@ class Trained:
     tensor: MotionTensor
     full: Multilinear
     pose: Tuned
+    values: dict[str, Floats]
     missed: Floats
     explained: dict[str, float]
     findings: list[Finding]
@@ -72,7 +74,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     """
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
-    kriging.check(given, names, recipe.kriging.drift, recipe.kriging.nugget == 0)
+    kriging.check(given, names, max(map(max, recipe.kriging.drifts)), recipe.kriging.nugget == 0)
     examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")
     weights = _joint_weights(recipe, examples[0].clip.skeleton)
@@ -101,7 +103,8 @@ def _joint_weights(recipe: Recipe, skeleton: Skeleton) -> Floats:
 def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
     """Clips aligned and written as pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
-    aligned = align.align(examples, recipe.motion.frames, basis, settings.rounds, weights)
+    predict = _predictor(recipe, examples)
+    aligned = align.align(examples, recipe.motion.frames, basis, settings.rounds, weights, predict)
     travels = {}
     if recipe.motion.cyclic:
         aligned, travels["travel"] = travel.take_out(aligned)
@@ -110,6 +113,20 @@ def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Move
     numbers, chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
     return _Moved(aligned, offsets, numbers, chart, travels, jumps + noticed)
+
+
+def _predictor(recipe: Recipe, examples: Sequence[Example]) -> align.Predict:
+    """What the other clips predict for each, by a field of its own parameters."""
+    laid, _ = samples.lay(recipe, examples)
+
+    def predict(values: Floats) -> Floats:
+        covariance = recipe.kriging.covariances[0]
+        return values - fields.tuned(recipe.kriging, covariance, laid, values).residuals
+
+    def mean(values: Floats) -> Floats:
+        return np.broadcast_to(values.mean(axis=0), values.shape)
+
+    return mean if recipe.alignment.reference == "mean" else predict
 
 
 def _fit(
@@ -122,18 +139,20 @@ def _fit(
     """Every field at its own parameters, and the stages that they feed."""
     controls = np.stack([example.controls for example in examples])
     low, high = controls.min(axis=0), controls.max(axis=0)
-    points = half_ranges(controls, low, high)
+    laid, performers = samples.lay(recipe, examples)
     proportions, bones = fields.proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
-    fitted = {k: fields.fit(recipe.kriging, points, values) for k, values in beside.items()}
-    pose = fields.tuned(recipe.kriging, points, full.bases[2] * _spectrum(full))
+    motions = full.bases[2] * _spectrum(full)
+    pose = fields.chosen(recipe.kriging, laid, motions)
+    covariance = pose.hyper.covariance
+    fitted = {k: fields.fit(recipe.kriging, covariance, laid, v) for k, v in beside.items()}
     reduced = full.truncated(_ranks(recipe, own_tensor, full, sum(controls.shape) + 1))
-    solved = kriging.solve(pose.hyper, points, reduced.bases[2])
+    solved = kriging.solve(pose.hyper, laid.points, reduced.bases[2])
     missed = _missed(own_tensor, pose, fitted)
     others = {name: found.field for name, found in fitted.items()}
     model = Model(
-        FieldBank(low, high, solved, others),
+        FieldBank(low, high, performers, solved, others),
         Spread(solved, float(np.mean(missed / pose.variances))),
         Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
         Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, moved.chart.means),
@@ -149,6 +168,7 @@ def _fit(
         own_tensor,
         full,
         pose,
+        {"pose": motions, **beside},
         missed,
         {"pose": 1.0 - pose.unexplained, **explained},
         moved.findings,

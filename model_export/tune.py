@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 
 from model_export import kriging, variogram
 from model_export.kriging import Hyper
+from model_export.samples import Samples
 from service.motion.conventions import Floats
 
 # In half-ranges of a control. A scale at the lower bound means "linear in this control"; beyond
@@ -15,6 +16,8 @@ from service.motion.conventions import Floats
 SCALES = (0.15, 3.0)
 # As a share of the sill. Real trials differ so much that a nugget of several sills can be right.
 NUGGETS = (1e-4, 10.0)
+# From performers who move alike to performers who say nothing of each other.
+LABELS = (0.05, 4.0)
 DESCENTS = 2
 STEP = 0.7
 
@@ -29,31 +32,33 @@ class Tuned:
     """
 
     hyper: Hyper
-    inverse: Floats
     residuals: Floats
     unexplained: float
     variances: Floats
     sill: float
 
 
-def first_guess(samples: Floats, values: Floats, covariance: str, drift: int) -> Hyper:
-    """Isotropic field from the fit of the experimental variogram, within the bounds."""
-    left = variogram.residuals(samples, values, drift)
+def first_guess(samples: Floats, values: Floats, covariance: str, drifts: tuple[int, ...]) -> Hyper:
+    """Isotropic field from the fit of the experimental variogram, within the bounds.
+
+    samples (n, d): the controls alone.
+    """
+    left = variogram.residuals(samples, values, max(drifts))
     fit = variogram.fit(variogram.experimental(samples, left), covariance)
     share = fit.nugget / fit.sill if fit.sill > 0 else NUGGETS[1]
     scales = np.full(samples.shape[1], np.clip(1.0 / fit.range, *SCALES))
-    return Hyper(covariance, drift, scales, float(np.clip(share, *NUGGETS)))
+    return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGETS)))
 
 
-def fixed(hyper: Hyper, samples: Floats, values: Floats) -> Tuned:
+def fixed(hyper: Hyper, samples: Samples, values: Floats) -> Tuned:
     """Field of given parameters with its leave-one-out residuals."""
-    inverse = kriging.invert(hyper, samples)
-    residuals, variances = kriging.leave_one_out(inverse, values)
-    from_mean = (values - values.mean(axis=0)) * len(values) / (len(values) - 1)
+    left_out = kriging.leave_out(hyper, samples.points, samples.groups)
+    noisy = kriging.noisy(hyper, samples.points)
+    variances = np.sum((left_out @ noisy) * left_out, axis=1)
+    residuals, from_mean = left_out @ values, samples.from_mean(values)
     total = float(np.sum(np.square(from_mean)))
     return Tuned(
         hyper,
-        inverse,
         residuals,
         float(np.sum(np.square(residuals))) / total if total > 0 else 1.0,
         variances,
@@ -61,38 +66,46 @@ def fixed(hyper: Hyper, samples: Floats, values: Floats) -> Tuned:
     )
 
 
-def tune(guess: Hyper, samples: Floats, values: Floats, nugget: float | None) -> Tuned:
-    """Field with the scales, and the nugget where none is given, of least squared residuals.
+def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -> Tuned:
+    """Field with the scales, the label's distance where there is one, and the nugget where none
+    is given, of least squared residuals.
 
-    samples (n, d) in half-ranges, values (n, m) in a metric of their own. Nelder and Mead's
-    simplex descends from the best of the guess and a coarse grid: there are ridges between a
-    smooth field and one in which every sample stands alone.
+    values (n, m) in a metric of their own. Nelder and Mead's simplex descends from the best of the
+    guess and a coarse grid: there are ridges between a smooth field and one in which every sample
+    stands alone.
     """
-    low = np.log([SCALES[0]] * samples.shape[1] + [NUGGETS[0]])
-    high = np.log([SCALES[1]] * samples.shape[1] + [NUGGETS[1]])
+    d, labelled = samples.controls, samples.labelled
+    bounds = [SCALES] * d + [LABELS] * labelled + [NUGGETS]
+    low, high = np.log(bounds).T
 
     def read(x: Floats) -> Hyper:
-        scales, own = np.exp(x[:-1]), float(np.exp(x[-1]))
-        return replace(guess, scales=scales, nugget=own if nugget is None else nugget)
+        found = np.exp(x)
+        return replace(
+            guess,
+            scales=found[:d],
+            label=float(found[d]) if labelled else 0.0,
+            nugget=float(found[-1]) if nugget is None else nugget,
+        )
 
     # The residuals depend on the values only through their inner products.
     products = values @ values.T
 
     def loss(x: Floats) -> float:
-        inverse = kriging.invert(read(x), samples)[: len(samples), : len(samples)]
-        squares = np.sum((inverse @ products) * inverse, axis=1)
-        return float(np.sum(squares / np.diagonal(inverse) ** 2))
+        left_out = kriging.leave_out(read(x), samples.points, samples.groups)
+        return float(np.sum((left_out @ products) * left_out))
 
-    starts = [np.clip(x, low, high) for x in _starts(guess)]
+    starts = [np.clip(x, low, high) for x in _starts(guess, labelled)]
     best = min(_descend(loss, x, low, high) for x in sorted(starts, key=loss)[:DESCENTS])
     return fixed(read(np.array(best[1])), samples, values)
 
 
-def _starts(guess: Hyper) -> list[Floats]:
-    """Log scales and log nugget (d + 1,) of the variogram's guess and of an isotropic grid."""
+def _starts(guess: Hyper, labelled: bool) -> list[Floats]:
+    """Logarithms of scales, label and nugget: the variogram's guess and an isotropic grid."""
     even = np.ones_like(guess.scales)
-    grid = [np.append(s * even, n) for s in (0.2, 0.5, 1.2) for n in (0.02, 0.3, 2.0)]
-    return [np.log(x) for x in (np.append(guess.scales, guess.nugget), *grid)]
+    pairs = [(guess.scales, guess.nugget)]
+    pairs += [(s * even, n) for s in (0.2, 0.5, 1.2) for n in (0.02, 0.3, 2.0)]
+    labels = ([0.5], [2.0]) if labelled else ([],)
+    return [np.log([*scales, *label, nugget]) for scales, nugget in pairs for label in labels]
 
 
 def _descend(

@@ -1,0 +1,138 @@
+"""How far one motion lies from another: numbers of one clip, in metres, and their means."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from model_export import dtw
+from model_export.evaluate.motion import FRAMES, Motion
+from service.motion.conventions import UP, Floats
+
+# A foot within this of its lowest is on the ground, m.
+PLANTED = 0.02
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Distances over joints and frames, m: mean, root mean square, 95th and 99th percentile,
+    largest."""
+
+    mean: float
+    rms: float
+    p95: float
+    p99: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """One synthesised motion against the captured one.
+
+    relative and absolute: warp-invariant, with the root's position taken out and with it left in;
+    plain_…: at equal shares of the duration. shell: the farthest of three points around each
+    joint, root-relative and warp-invariant. effector, m: at the event. acceleration: mean size of
+    the synthesised motion's over the captured one's, at equal durations. skate and skate_captured:
+    mean speed, m/s, of feet on the ground. duration: logarithm of synthesised over captured.
+    squared: mean squared absolute distance, m².
+    """
+
+    relative: Distances
+    absolute: Distances
+    plain_relative: Distances
+    plain_absolute: Distances
+    shell: Distances
+    effector: float
+    acceleration: float
+    skate: float
+    skate_captured: float
+    duration: float
+
+    @property
+    def squared(self) -> float:
+        """Mean squared distance, m², that sigma speaks of."""
+        return self.absolute.rms**2
+
+
+def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
+    """Errors of a synthesised motion."""
+    own, true = made.points, captured.points
+    phase = dtw.warp(_around(true)[None], _around(own))[0]
+    warped = _at(own, phase)
+    return Errors(
+        _distances(_apart(_rooted(warped), _rooted(true))),
+        _distances(_apart(warped, true)),
+        _distances(_apart(_rooted(own), _rooted(true))),
+        _distances(_apart(own, true)),
+        _distances(np.linalg.norm(_rooted(warped) - _rooted(true), axis=-1)[:, :, 1:].max(axis=2)),
+        float(np.linalg.norm(made.event - captured.event)),
+        _acceleration(own) / _acceleration(true),
+        skate(made, feet),
+        skate(captured, feet),
+        float(np.log(made.duration / captured.duration)),
+    )
+
+
+def _rooted(points: Floats) -> Floats:
+    return points - points[:, :1, :1]
+
+
+def _around(points: Floats) -> Floats:
+    """What time warping looks at (FRAMES, J * 3): joints around the root."""
+    return _rooted(points)[:, :, 0].reshape(FRAMES, -1)
+
+
+def _at(points: Floats, phase: Floats) -> Floats:
+    place = phase * (FRAMES - 1)
+    before = np.minimum(place.astype(np.int64), FRAMES - 2)
+    share = (place - before)[:, None, None, None]
+    return (1.0 - share) * points[before] + share * points[before + 1]
+
+
+def _apart(a: Floats, b: Floats) -> Floats:
+    return np.linalg.norm(a[:, :, 0] - b[:, :, 0], axis=-1)
+
+
+def _distances(apart: Floats) -> Distances:
+    p95, p99 = np.percentile(apart, [95, 99])
+    rms = np.sqrt(np.mean(np.square(apart)))
+    return Distances(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
+
+
+def _acceleration(points: Floats) -> float:
+    joints = _rooted(points)[:, 1:, 0]
+    return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
+
+
+def skate(motion: Motion, feet: tuple[int, ...]) -> float:
+    """Mean horizontal speed, m/s, of feet while they are within 2 cm of their lowest.
+
+    Each motion's own heights say when that is: what the eye takes for a foot on the ground.
+    """
+    if not feet:
+        return 0.0
+    steps = np.diff(motion.joints[:, feet], axis=0) * (FRAMES - 1) / motion.duration
+    speeds = np.linalg.norm(steps * (1.0 - UP), axis=-1)
+    heights = motion.joints[:, feet] @ UP
+    down = heights < heights.min(axis=0) + PLANTED
+    planted = down[1:] & down[:-1]
+    return float(speeds[planted].mean()) if planted.any() else 0.0
+
+
+def mean(errors: Sequence[Errors]) -> Errors:
+    """Means over clips; root mean squares are pooled, the largest is the largest of all, and the
+    duration's error is a root mean square."""
+    numbers = {f.name: [getattr(e, f.name) for e in errors] for f in fields(Errors)}
+    pooled = {
+        name: _pool(values) if isinstance(values[0], Distances) else float(np.mean(values))
+        for name, values in numbers.items()
+    }
+    pooled["duration"] = float(np.sqrt(np.mean(np.square(numbers["duration"]))))
+    return Errors(**pooled)
+
+
+def _pool(parts: Sequence[Distances]) -> Distances:
+    listed = np.array([[d.mean, d.rms, d.p95, d.p99, d.largest] for d in parts])
+    average = listed.mean(axis=0)
+    rms = np.sqrt(np.mean(np.square(listed[:, 1])))
+    return Distances(*map(float, (average[0], rms, average[2], average[3], listed[:, 4].max())))

@@ -1,0 +1,153 @@
+"""What one could use instead: each predicts values at queries from values at samples.
+
+A peer is a library's own method, not our copy of it. It sees the controls in half-ranges, and is
+given everything that is kriged: reduced motions, bone offsets, duration, warp and travel.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RBFInterpolator
+from sklearn.dummy import DummyRegressor
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+from sklearn.linear_model import LinearRegression
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
+
+from model_export.samples import Samples
+from service.motion.conventions import Floats
+
+Peer = Callable[[Samples, Floats, Floats], Floats]
+"""Samples, their values (n, m) and queries (q, d + p) to values (q, m)."""
+
+SMOOTHINGS = (0.0, *np.geomspace(1e-3, 1e2, 11))
+
+
+def _controls(samples: Samples, queries: Floats) -> tuple[Floats, Floats]:
+    return samples.points[:, : samples.controls], queries[:, : samples.controls]
+
+
+def _rbf(kernel: str) -> Peer:
+    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        return RBFInterpolator(known, values, kernel=kernel, degree=1, smoothing=0.0)(asked)
+
+    return predict
+
+
+def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Thin plates with the smoothing, one of a grid, that leave-one-out finds best."""
+    known, asked = _controls(samples, queries)
+    losses = [_left_out(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
+    best = SMOOTHINGS[int(np.argmin(losses))]
+    return _thin_plate(known, values, best)(asked)
+
+
+def _thin_plate(known: Floats, values: Floats, smoothing: float) -> RBFInterpolator:
+    return RBFInterpolator(known, values, kernel="thin_plate_spline", degree=1, smoothing=smoothing)
+
+
+def _left_out(samples: Samples, known: Floats, values: Floats, smoothing: float) -> float:
+    total = 0.0
+    for group in np.unique(samples.groups):
+        out = samples.groups == group
+        found = _thin_plate(known[~out], values[~out], smoothing)(known[out])
+        total += float(np.sum(np.square(found - values[out])))
+    return total
+
+
+def gp(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Gaussian process with a length for every control and, where performers are told apart, for
+    every performer's label; lengths, amplitude and noise of greatest marginal likelihood."""
+    centre, size = values.mean(axis=0), max(float(values.std()), 1e-12)
+    lengths = np.ones(samples.points.shape[1])
+    kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(lengths, (0.1, 100.0))
+    model = GaussianProcessRegressor(kernel + WhiteKernel(0.1, (1e-5, 10.0)), random_state=0)
+    found = model.fit(samples.points, (values - centre) / size).predict(queries)
+    return centre + size * found.reshape(len(queries), -1)
+
+
+def gp_controls(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """The same of the controls alone."""
+    known, asked = _controls(samples, queries)
+    return gp(Samples(known, samples.controls, samples.groups), values, asked)
+
+
+def _regression(degree: int) -> Peer:
+    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        model = make_pipeline(PolynomialFeatures(degree), LinearRegression())
+        return model.fit(known, values).predict(asked)
+
+    return predict
+
+
+def _neighbours(count: int | None, weights: str | Callable[[Floats], Floats]) -> Peer:
+    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        model = KNeighborsRegressor(min(count or len(known), len(known)), weights=weights)
+        return model.fit(known, values).predict(asked)
+
+    return predict
+
+
+def _inverse_square(distances: Floats) -> Floats:
+    # A query at a sample is that sample's.
+    return 1.0 / np.maximum(np.square(distances), 1e-12)
+
+
+def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """The nearest example of the same performer, or of any where the performer has none."""
+    found = np.empty((len(queries), values.shape[1]))
+    for row, query in enumerate(queries):
+        same = samples.points[:, samples.controls :] @ query[samples.controls :] > 0.5
+        among = same if same.any() else np.ones(len(values), dtype=bool)
+        known = samples.points[among, : samples.controls]
+        model = KNeighborsRegressor(1).fit(known, values[among])
+        found[row] = model.predict(query[None, : samples.controls])[0]
+    return found
+
+
+def linear_coefficients(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Linear interpolation over the simplices of the samples, the nearest outside their hull."""
+    known, asked = _controls(samples, queries)
+    if samples.controls == 1:
+        order = np.argsort(known[:, 0])
+        columns = [np.interp(asked[:, 0], known[order, 0], v[order]) for v in values.T]
+        return np.stack(columns, axis=1)
+    inside = LinearNDInterpolator(known, values)(asked)
+    outside = NearestNDInterpolator(known, values)(asked)
+    return np.where(np.isnan(inside), outside, inside)
+
+
+def mean(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """The mean of all samples, whatever is asked."""
+    return DummyRegressor().fit(samples.points, values).predict(queries).reshape(len(queries), -1)
+
+
+PEERS: dict[str, tuple[Peer, str]] = {
+    "thin_plate": (_rbf("thin_plate_spline"), "scipy RBFInterpolator, thin plate, degree 1"),
+    "thin_plate_smoothed": (
+        thin_plate_smoothed,
+        "the same, smoothing tuned by leave-one-take-out for each of motion, bones, duration, warp",
+    ),
+    "linear_rbf": (_rbf("linear"), "scipy RBFInterpolator, linear kernel, degree 1"),
+    "cubic_rbf": (_rbf("cubic"), "scipy RBFInterpolator, cubic kernel, degree 1"),
+    "gp": (gp, "scikit-learn GaussianProcessRegressor, ARD RBF + white noise, label as columns"),
+    "gp_controls": (gp_controls, "the same without the performer's label"),
+    "inverse_distance": (_neighbours(None, _inverse_square), "scikit-learn, weights 1 / distance²"),
+    "k_nearest": (_neighbours(5, "distance"), "scikit-learn, 5 nearest, weights 1 / distance"),
+    "nearest": (_neighbours(1, "uniform"), "scikit-learn, nearest example"),
+    "nearest_same_performer": (nearest_same, "scikit-learn, nearest of the same performer"),
+    "linear_regression": (_regression(1), "scikit-learn LinearRegression"),
+    "quadratic_regression": (_regression(2), "scikit-learn, quadratic polynomial"),
+    "linear_coefficients": (
+        linear_coefficients,
+        "multilinear model, coefficients interpolated linearly (scipy LinearNDInterpolator; "
+        "nearest outside the hull)",
+    ),
+    "mean": (mean, "the mean motion"),
+}
+"""Peers by name, with what exactly they are."""
