@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from model_export import kriging, ranks
-from model_export.evaluate import table1_precompute
 from model_export.cost import Price
 from model_export.decoder import Decoder
+from model_export.evaluate import table1_precompute
 from model_export.evaluate.table1_family import Family
 from model_export.hosvd import Multilinear
 from model_export.kriging import Hyper, Kriging
