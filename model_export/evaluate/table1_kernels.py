@@ -17,15 +17,17 @@ compiled = numba.njit(fastmath=True)
 
 @compiled
 def basis(point: Floats, samples: Floats, scales: Floats, out: Floats) -> None:
-    """Covariances (Matérn 5/2) and linear drift (n + 1 + d,) of a point (d,)."""
-    n, d = samples.shape
+    """Covariances (Matérn 5/2) and linear drift (n + 1 + d,) of a point (d,); samples (d, n)."""
+    d, n = samples.shape
+    out[:n] = 0.0
+    for k in range(d):
+        for i in range(n):
+            gap = (point[k] - samples[k, i]) * scales[k]
+            out[i] += gap * gap
     for i in range(n):
-        squared = 0.0
-        for k in range(d):
-            gap = (point[k] - samples[i, k]) * scales[k]
-            squared += gap * gap
-        a = RATE52 * sqrt(squared)
-        out[i] = (1.0 + a + a * a / 3.0) * exp(-a)
+        out[i] = RATE52 * sqrt(out[i])
+    for i in range(n):
+        out[i] = (1.0 + out[i] + out[i] * out[i] / 3.0) * exp(-out[i])
     out[n] = 1.0
     for k in range(d):
         out[n + 1 + k] = point[k]

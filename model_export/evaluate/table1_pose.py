@@ -65,7 +65,7 @@ def ours(
     r1, r2, r3 = reduced.core.shape
     core = reduced.core.transpose(2, 1, 0).reshape(r3, r2 * r1)
     arrays = (
-        *(field.samples, field.hyper.scales, field.dual),
+        *(field.samples.T, field.hyper.scales, field.dual),
         *(core, reduced.bases[1], directions, own.mean[made.varies]),
     )
     return _bound(kernels.ours, question.points, question.places, arrays, (r3, r2 * r1, r1))
@@ -73,8 +73,8 @@ def ours(
 
 def naive(field: Naive, question: Asked) -> dict[str, Callable[[], Floats]]:
     """Functions that answer with pose vectors (Q, D), by the name of the naive method's form."""
-    samples = field.fields[0].samples
-    n, values = len(samples), field.values.transpose(1, 0, 2)
+    samples, values = field.fields[0].samples.T, field.values.transpose(1, 0, 2)
+    n = samples.shape[1]
     scales = np.stack([one.hyper.scales for one in field.fields])
     systems = np.stack([_system(one) for one in field.fields])
     factors = _factors(systems)
@@ -106,9 +106,8 @@ def _bound(
 ) -> Callable[[], Floats]:
     """Call of a kernel with all memory it needs; sizes: of what it writes besides its basis."""
     held = tuple(np.ascontiguousarray(array) for array in arrays)
-    samples, width = held[0], held[-1].shape[-1]
-    basis = len(samples) + 1 + samples.shape[1]
-    scratch = tuple(np.zeros(size) for size in (basis, *sizes))
+    (controls, samples), width = held[0].shape, held[-1].shape[-1]
+    scratch = tuple(np.zeros(size) for size in (samples + 1 + controls, *sizes))
     out = np.zeros((len(points), width))
 
     def answer() -> Floats:
