@@ -6,11 +6,13 @@ pose vectors come out of controls.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from family import Family
 
 from model_export import align, decoder
+from model_export.covariance import COVARIANCES
+from model_export.evaluate.table1_family import Family
 from model_export.naive import Naive
 from model_export.net import Net
 from service.motion import quat
@@ -55,31 +57,77 @@ class Contents:
         """Two frames' systems and samples for each time."""
         return self._graph(self._gathered)
 
-    def _graph(self, poses: Callable[[Net, str, str], str]) -> bytes:
+    def batch(self) -> bytes:
+        """For each question its own two frames' inverses and samples."""
+        return self._graph(partial(self._own, self._weighed), alone=True)
+
+    def batch_dual(self) -> bytes:
+        """The same with inverse and samples multiplied beforehand."""
+        return self._graph(partial(self._own, self._dual), alone=True)
+
+    def _graph(self, poses: Callable[[Net, str, str], str], alone: bool = False) -> bytes:
+        """Graph of one question at many times, or of many questions at a time each."""
         model = self.made.trained.model
         net = Net()
         _, fields = model.bank.onnx(net, "controls")
         duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
         points = model.bank.points_onnx(net, "controls")
-        numbers = poses(net, points, net("Squeeze", place, net.indices(0, 2)))
+        axes = net.indices(1, 2) if alone else net.indices(0, 2)
+        numbers = poses(net, points, net("Squeeze", place, axes))
         net.named("rotations", self._rotations(net, numbers))
         net.named(
             "root_position", net("Slice", numbers, net.indices(0), net.indices(3), net.indices(1))
         )
         net.named("bone_offsets", model.proportions.onnx(net, fields["offsets"]))
         net.named("duration", duration)
-        joints = len(self.made.parents)
+        joints, controls = len(self.made.parents), len(model.bank.low)
+        questions, times, answers = ("batch", 1, "batch") if alone else (1, "steps", "steps")
         return net.model(
-            {"controls": [1, len(model.bank.low)], "time": [1, "steps"]},
+            {"controls": [questions, controls], "time": [questions, times]},
             {
-                "rotations": ["steps", joints, 4],
-                "root_position": ["steps", 3],
-                "bone_offsets": [1, joints, 3],
-                "duration": [1],
+                "rotations": [answers, joints, 4],
+                "root_position": [answers, 3],
+                "bone_offsets": [questions, joints, 3],
+                "duration": [questions],
             },
             {},
             ABOUT,
         )
+
+    def _own(self, poses: Callable[[Net, str, str], str], net: Net, points: str, place: str) -> str:
+        """Pose vectors (B, D) of each question's two frames, and a line between them."""
+        row, share = self._split(net, place)
+        samples = self.field.fields[0].samples
+        d = samples.shape[1]
+        # |p - s|² as one product, as in ours: no array (B, n, d).
+        both = net("Concat", net("Mul", points, points), points, axis=1)
+        factors = net.weights(
+            "naive_factors", np.vstack([np.ones_like(samples.T), -2.0 * samples.T])
+        )
+        own = net.weights("naive_own", np.sum(np.square(samples), axis=1))
+        squared = net("Max", net("Gemm", both, factors, own), net.number(0.0))
+        drift = net(
+            "Gemm",
+            points,
+            net.weights("naive_drift", np.hstack([np.zeros((d, 1)), np.eye(d)])),
+            net.weights("naive_one", np.eye(1, d + 1)[0]),
+        )
+        frames = (row, net("Add", row, net.indices(1)))
+        found = (poses(net, self._system(net, squared, drift, frame), frame) for frame in frames)
+        return self._between(net, *found, share)
+
+    def _system(self, net: Net, squared: str, drift: str, row: str) -> str:
+        """Covariances and drift (B, 1, n + k) in the field of each question's frame."""
+        fields = self.field.fields
+        worth = net.weights("naive_worth", np.array([f.hyper.scales[:1] ** 2 for f in fields]))
+        near = net("Mul", squared, net("Gather", worth, row))
+        covariance = COVARIANCES[fields[0].hyper.covariance].onnx(net, near)
+        return net("Unsqueeze", net("Concat", covariance, drift, axis=1), net.indices(1))
+
+    def _dual(self, net: Net, basis: str, row: str) -> str:
+        duals = net.weights("duals", np.stack([field.dual for field in self.field.fields]))
+        poses = net("MatMul", basis, net("Gather", duals, row))
+        return net("Squeeze", poses, net.indices(1))
 
     def _split(self, net: Net, place: str) -> tuple[str, str]:
         """Frame below (S,) and the share of the next one (S, 1)."""
@@ -104,8 +152,11 @@ class Contents:
 
     def _at(self, net: Net, points: str, row: str) -> str:
         """Pose vectors (S, D) of rows' own systems."""
+        return self._weighed(net, net("Gather", self.field.basis(net, points), row), row)
+
+    def _weighed(self, net: Net, basis: str, row: str) -> str:
+        """Averages (S, D) of the samples of rows, by weights from the rows' inverses."""
         fields = self.field.fields
-        basis = net("Gather", self.field.basis(net, points), row)
         inverse = np.stack([field.inverse[:, : len(field.samples)] for field in fields])
         weights = net("MatMul", basis, net("Gather", net.weights("inverses", inverse), row))
         samples = net.weights("values", self.field.values.transpose(1, 0, 2))
@@ -123,19 +174,23 @@ def check(
     made: Family,
     field: Naive,
     rivals: Mapping[str, Callable[[], list[Floats]]],
-    point: Floats,
+    controls: Floats,
     times: Floats,
 ) -> None:
-    """Refuse to time a rival that answers anything else than naive kriging does."""
+    """Refuse to time a rival that answers anything else than naive kriging does.
+
+    controls (B, d) and times (B, S): the rivals' answers have B and S as one axis.
+    """
     model = made.trained.model
-    fields = model.bank.numpy(point)
+    fields = model.bank.numpy(controls)
     _, place = model.timing.numpy(fields["duration"], fields["warp"], times)
-    frames = field.numpy(model.bank.points(point))[0]
-    below = np.minimum(place[0].astype(int), len(frames) - 2)
-    share = (place[0] - below)[:, None]
-    numbers = (1.0 - share) * frames[below] + share * frames[below + 1]
+    frames = field.numpy(model.bank.points(controls))
+    below = np.minimum(place.astype(int), frames.shape[1] - 2)
+    share = (place - below)[..., None]
+    which = np.arange(len(frames))[:, None]
+    numbers = (1.0 - share) * frames[which, below] + share * frames[which, below + 1]
     means = model.decoder.means
-    halves = numbers[:, 3:].reshape(len(numbers), -1, 4)
+    halves = numbers[..., 3:].reshape(-1, len(means), 4)
     pure = quat.mul(quat.conj(means), halves)[..., 1:]
     expected = quat.mul(means, quat.exp(2.0 * pure))
     for name, rival in rivals.items():

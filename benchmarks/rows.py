@@ -1,11 +1,8 @@
-"""Rows of the benchmark's table, and fair timing."""
+"""Rows of the benchmark's table."""
 
 import json
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from statistics import median
 
 
 @dataclass(frozen=True)
@@ -26,20 +23,6 @@ class Row:
         if self.goal is None:
             return None
         return self.value <= self.goal if self.ratio is None else self.ratio >= self.goal
-
-
-def in_turn(runs: dict[str, Callable[[], object]], rounds: int, repeats: int) -> dict[str, float]:
-    """Median seconds of a call of each, timed one after the other in every round."""
-    taken: dict[str, list[float]] = {name: [] for name in runs}
-    for run in runs.values():
-        run()
-    for _ in range(rounds):
-        for name, run in runs.items():
-            start = time.perf_counter()
-            for _ in range(repeats):
-                run()
-            taken[name].append((time.perf_counter() - start) / repeats)
-    return {name: median(times) for name, times in taken.items()}
 
 
 def table(rows: list[Row]) -> str:

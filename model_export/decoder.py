@@ -57,17 +57,15 @@ class Decoder:
         motion = net("Reshape", net("MatMul", coefficients, core), net.indices(-1, r2, r1))
         poses = net("MatMul", self._time(net, place), motion)
         flat = net("Reshape", poses, net.indices(-1, r1))
-        root = net(
-            "Gemm",
-            flat,
-            net.weights("root_directions", self.directions[:, :3]),
-            net.weights("root_mean", self.mean[:3]),
-        )
+        directions = self._directions(net)
+        zero, three = net.indices(0), net.indices(3)
+        of_root = net("Slice", directions, zero, three, zero)
+        root = net("Gemm", flat, of_root, net.weights("root_mean", self.mean[:3]), transB=1)
         steps = net("Shape", place, start=0, end=2)
         root_shape = net("Concat", steps, net.indices(3), axis=0)
         joint_shape = net("Concat", steps, net.indices(len(self.means), 4), axis=0)
         return (
-            net("Reshape", self._rotations(net, flat), joint_shape),
+            net("Reshape", self._rotations(net, flat, directions), joint_shape),
             net("Reshape", root, root_shape),
         )
 
@@ -83,11 +81,21 @@ class Decoder:
         rise = net("Mul", net("Gather", steps, row), net("Sub", place, before))
         return net("Add", net("Gather", first, row), rise)
 
-    def _rotations(self, net: Net, flat: str) -> str:
+    def _directions(self, net: Net) -> str:
+        """Directions (D, r1), put together when the session loads: what is zero is not stored."""
+        varies = np.any(self.unwhiten != 0.0, axis=1)
+        stored = net.weights("directions", self.directions[:, varies].T)
+        nothing = net.weights("no_direction", np.zeros((1, len(self.directions))))
+        # Degrees of freedom that never vary take the row of zeros behind the others.
+        row = np.where(varies, np.cumsum(varies) - 1, np.count_nonzero(varies))
+        return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
+
+    def _rotations(self, net: Net, flat: str, directions: str) -> str:
         """Quaternions (B S, J, 4) of the first mode's coefficients (B S, r1)."""
+        zero, three, end = net.indices(0), net.indices(3), net.indices(len(self.mean))
         rows = net(
             "Gemm",
-            net.weights("rotation_directions", turned(self.means, self.directions[:, 3:]).T),
+            turned_onnx(net, self.means, net("Slice", directions, three, end, zero)),
             flat,
             net.weights("rotation_mean", turned(self.means, self.mean[3:])[:, None]),
             transB=1,
@@ -105,6 +113,17 @@ def turned(means: Floats, vectors: Floats) -> Floats:
     pure = np.zeros((*vectors.shape[:-1], len(means), 4))
     pure[..., 1:] = 0.5 * vectors.reshape(*vectors.shape[:-1], -1, 3)
     return quat.mul(means, pure).reshape(*vectors.shape[:-1], -1)
+
+
+def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
+    """The same in a graph, of columns of rotation vectors (3 J, r), as columns (4 J, r)."""
+    # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
+    axes = quat.mul(np.eye(4)[:, None], 0.5 * np.eye(4)[1:]).swapaxes(1, 2).reshape(4, 12)
+    rotations = net("Squeeze", net.weights("mean_rotations", means[:, :, None]), net.indices(2))
+    products = net("MatMul", rotations, net.weights("half_axes", axes))
+    matrices = net("Reshape", products, net.indices(-1, 4, 3))
+    columns = net("MatMul", matrices, net("Reshape", vectors, net.indices(len(means), 3, -1)))
+    return net("Reshape", columns, net.indices(4 * len(means), -1))
 
 
 def quaternions(net: Net, rows: str, means: Floats) -> str:

@@ -5,12 +5,13 @@ The gate asks the very session that the service will use, and compares joints in
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from model_export import cost
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -134,11 +135,13 @@ def _controls(recipe: Recipe, values: Floats) -> tuple[Control, ...]:
 
 def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str, Any]:
     """What training measured, in metres and plain shares, rounded to what is worth reading."""
-    full, kept = trained.full.core, trained.model.decoder.reduced.core
-    cut = float(np.sum(np.square(full)) - np.sum(np.square(kept)))
+    cut = {f"truncation_{k}_m": v for k, v in asdict(trained.fidelity).items() if v is not None}
+    kept, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
+    compression = asdict(cost.compression(trained.tensor, kept, controls))
     hyper = trained.pose.hyper
     return {
-        "truncation_rms_m": _round(trained.tensor.rms(np.array(max(cut, 0.0)))),
+        **{name: _round(distance) for name, distance in cut.items()},
+        "compression": {name: _round(ratio) for name, ratio in compression.items()},
         "leave_one_out_rms_m": _round(np.sqrt(trained.missed.mean())),
         "explained": {name: _round(share) for name, share in trained.explained.items()},
         "covariance": hyper.covariance,

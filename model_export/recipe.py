@@ -96,13 +96,6 @@ class Motion(_Part):
     )
 
 
-class Event(_Part):
-    """What the motion is about: where a joint is at one moment."""
-
-    joint: Text = Field(description="hand, foot or root that the motion brings somewhere")
-    at: Text = Field(default="end", description="the end, or a column of clips.landmarks")
-
-
 class Alignment(_Part):
     """Time warping."""
 
@@ -155,8 +148,20 @@ class Kriging(_Part):
         return ((0, 1),) if self.drift == "mean" else ((self.drift,),)
 
 
+class Event(_Part):
+    """What a motion is for: a joint that has to be in its place at one moment."""
+
+    joint: Text = Field(description="the joint: a hand that reaches, a foot that lands")
+    at: Text = Field(
+        description="'end' for the last frame, or the column of clips.landmarks that says when"
+    )
+
+
 class Size(_Part):
-    """How much of the tensor is kept: ranks, or the error that leaving out may cost."""
+    """How much of the tensor is kept: ranks, or the errors that leaving out may cost.
+
+    Errors are true distances between joints, by forward kinematics; all budgets given are kept.
+    """
 
     ranks: (
         Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=3, max_length=3)] | None
@@ -164,11 +169,36 @@ class Size(_Part):
     rms_budget_cm: Positive | None = Field(
         default=None, description="root-mean-square joint distance, cm"
     )
+    p99_budget_cm: Positive | None = Field(
+        default=None,
+        description="joint distance that one in a hundred exceeds, over joints, frames, clips; cm",
+    )
+    effector_budget_cm: Positive | None = Field(
+        default=None, description="root-mean-square distance of the event's joint at its event, cm"
+    )
+    cost: Literal["numbers", "operations"] = Field(
+        default="numbers",
+        description="what is least within the budgets: numbers stored, or multiply-adds per pose",
+    )
+
+    @property
+    def budgets(self) -> dict[str, float]:
+        """Budgets given, m, by what they are for: rms, p99, effector."""
+        given = {
+            "rms": self.rms_budget_cm,
+            "p99": self.p99_budget_cm,
+            "effector": self.effector_budget_cm,
+        }
+        return {name: 0.01 * budget for name, budget in given.items() if budget is not None}
 
     @model_validator(mode="after")
-    def _one_of_them(self) -> "Size":
-        if (self.ranks is None) == (self.rms_budget_cm is None):
-            raise ValueError("give either ranks or rms_budget_cm")
+    def _ranks_or_budgets(self) -> "Size":
+        keys = "rms_budget_cm, p99_budget_cm, effector_budget_cm"
+        if self.ranks is None and not self.budgets:
+            raise ValueError(f"found neither, expected either ranks or budgets ({keys})")
+        if self.ranks is not None and (self.budgets or "cost" in self.model_fields_set):
+            found = sorted(self.model_fields_set)
+            raise ValueError(f"found {found}, expected either ranks or budgets ({keys}) and a cost")
         return self
 
 
@@ -183,9 +213,9 @@ class Recipe(_Part):
     clips: Clips
     controls: Annotated[list[ControlColumn], Field(min_length=1)]
     motion: Motion
-    event: Event | None = None
     alignment: Alignment = Alignment()
     kriging: Kriging = Kriging()
+    event: Event | None = None
     size: Size
 
     @model_validator(mode="after")
@@ -202,6 +232,21 @@ class Recipe(_Part):
         if twice:
             raise ValueError(f"controls named twice: {sorted(twice)}")
         return controls
+
+    @model_validator(mode="after")
+    def _event_is_known(self) -> "Recipe":
+        if self.event is None:
+            if self.size.effector_budget_cm is not None:
+                raise ValueError(
+                    f"size.effector_budget_cm: found {self.size.effector_budget_cm:g} and no "
+                    "[event], expected event.joint and event.at to say where it counts"
+                )
+        elif self.event.at != "end" and self.event.at not in self.clips.landmarks:
+            raise ValueError(
+                f"event.at: found {self.event.at!r}, expected 'end' or a column of "
+                f"clips.landmarks {self.clips.landmarks}"
+            )
+        return self
 
 
 def read(path: Path) -> Recipe:

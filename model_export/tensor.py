@@ -61,7 +61,7 @@ def build(
     offsets (N, J, 3): bone offsets of each clip's performer, m. joint_weights (J,).
     """
     mean = numbers.mean(axis=(0, 1))
-    varies = np.ptp(numbers, axis=(0, 1)) > CONSTANT
+    varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT
     gram = _gram(numbers, own_chart, parents, offsets, joint_weights)
     root, inverse = metric.whitening(gram[np.ix_(varies, varies)])
     whiten, unwhiten = np.zeros((2, len(root), len(mean)))

@@ -5,10 +5,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import align, fields, hosvd, kriging, ranks, samples, tensor, travel
+from model_export import (
+    align,
+    cost,
+    fidelity,
+    fields,
+    hosvd,
+    kriging,
+    ranks,
+    samples,
+    tensor,
+    travel,
+)
 from model_export.align import Aligned
 from model_export.chart import Chart
 from model_export.decoder import Decoder
+from model_export.fidelity import Fidelity
 from model_export.field_bank import FieldBank, Spread
 from model_export.fields import Fitted
 from model_export.flips import Finding
@@ -34,9 +46,10 @@ class Trained:
 
     examples: in an order of their own, so that the model does not depend on the table's. pose: the
     tuned pose field. values: what each field is laid through (N, m), the pose's as whole motions in
-    the coordinates of the sample mode. missed (N,): mean squared joint distance, m², of each clip from what all
-    others predict for it. explained: for each field the share of the variation between clips that
+    the coordinates of the sample mode. missed (N,): mean squared joint distance, m², of each clip
+    from what all others predict for it. explained: for each field the share of the variation between clips that
     leave-one-out predicts from the controls; one at or below zero is answered with its mean.
+    fidelity: what the truncation costs.
     """
 
     model: Model
@@ -50,6 +63,7 @@ class Trained:
     missed: Floats
     explained: dict[str, float]
     findings: list[Finding]
+    fidelity: Fidelity
 
 
 @dataclass(frozen=True)
@@ -77,7 +91,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
     kriging.check(given, names, max(map(max, recipe.kriging.drifts)), recipe.kriging.nugget == 0)
     examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")
-    weights = _joint_weights(recipe, examples[0].clip.skeleton)
+    weights = fidelity.joint_weights(recipe, examples)
     moved = _move(recipe, examples, weights)
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
@@ -94,10 +108,6 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
         return (*example.controls, example.clip.duration, *example.clip.root_path[-1])
 
     return tuple(sorted(examples, key=key))
-
-
-def _joint_weights(recipe: Recipe, skeleton: Skeleton) -> Floats:
-    return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in skeleton.names])
 
 
 def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
@@ -147,7 +157,9 @@ def _fit(
     pose = fields.chosen(recipe.kriging, laid, motions)
     covariance = pose.hyper.covariance
     fitted = {k: fields.fit(recipe.kriging, covariance, laid, v) for k, v in beside.items()}
-    reduced = full.truncated(_ranks(recipe, own_tensor, full, sum(controls.shape) + 1))
+    judge = fidelity.judge(recipe, examples, own_tensor)
+    price = cost.PRICES[recipe.size.cost](own_tensor, controls.shape[1])
+    reduced = full.truncated(ranks.choose(recipe.size, full, price, judge))
     solved = kriging.solve(pose.hyper, laid.points, reduced.bases[2])
     missed = _missed(own_tensor, pose, fitted)
     others = {name: found.field for name, found in fitted.items()}
@@ -172,6 +184,7 @@ def _fit(
         missed,
         {"pose": 1.0 - pose.unexplained, **explained},
         moved.findings,
+        judge.of(reduced),
     )
 
 
@@ -187,24 +200,6 @@ def _missed(own_tensor: MotionTensor, pose: Tuned, fitted: dict[str, Fitted]) ->
     if "travel" in fitted:
         missed += travel.spread(fitted["travel"].residuals)
     return missed
-
-
-def _ranks(
-    recipe: Recipe, own_tensor: MotionTensor, full: Multilinear, weights: int
-) -> tuple[int, int, int]:
-    """The recipe's ranks, or the smallest within its budget.
-
-    weights: numbers stored for one more sample direction.
-    """
-    size = recipe.size
-    if size.ranks is not None:
-        return ranks.given(full.core, size.ranks)
-    assert size.rms_budget_cm is not None
-    frames, samples = own_tensor.values.shape[1:]
-    allowed = (0.01 * size.rms_budget_cm) ** 2 * own_tensor.weight * frames * samples
-    # One more direction is stored as four numbers a joint and three of the root.
-    directions = 4 * len(own_tensor.chart.means) + 3
-    return ranks.smallest(full.core, allowed, (directions, frames, weights))
 
 
 def _mean_skeleton(examples: Sequence[Example], offsets: Floats) -> Skeleton:

@@ -13,6 +13,8 @@ from service.synthesis.synthesizer import Synthesizer
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
 CLIPS = {"hdm05_grab_high": 29, "hdm05_deposit_floor": 32, "cmu_walk": 78}
+# How many times fewer numbers than the aligned tensor's the motion is stored in at 1 cm, at least.
+STORED = {"hdm05_grab_high": 15.0, "hdm05_deposit_floor": 8.5, "cmu_walk": 35.0}
 # How far from facing ahead a first pose may be, rad: a reach begins there by definition, though
 # cut to a few ranks; a walker's pelvis swings about its heading.
 FACING = {"hdm05_grab_high": 0.05, "hdm05_deposit_floor": 0.05, "cmu_walk": 0.25}
@@ -43,7 +45,9 @@ def test_a_recipe_trains_and_passes_the_gate(made):
     assert 0.0 < exported.parity < export.ALLOWED
     assert len(exported.content) < 120_000
     budget = 0.01 * own.size.rms_budget_cm
-    assert 0.5 * budget < exported.card.diagnostics["truncation_rms_m"] <= budget
+    assert 0.9 * budget < exported.card.diagnostics["truncation_rms_m"] <= budget
+    assert 0.0 < exported.card.diagnostics["truncation_effector_m"] < 3 * budget
+    assert exported.card.diagnostics["compression"]["stored"] > STORED[own.name]
     # The controls say something about every family; a field of nothing would explain nothing.
     assert trained.explained["pose"] > 0.4
 

@@ -39,6 +39,10 @@ frames = 100
 cyclic = false
 root = "travelling"
 
+[event]
+joint = "RightHand"
+at = "end"
+
 [size]
 rms_budget_cm = 0.5
 """

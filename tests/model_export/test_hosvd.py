@@ -85,6 +85,17 @@ def test_norms_of_slices_are_the_singular_values(tensor):
         assert np.max(np.abs(norms[: len(singular)] - singular)) < 1e-7
 
 
+def test_decomposition_at_given_ranks_is_the_truncated_one(tensor):
+    ranks = tuple(max(1, size - 1) for size in tensor.shape)
+    found, full = hosvd.decompose_at(tensor, ranks), hosvd.decompose(tensor)
+    expected = full.truncated(ranks)
+    assert found.core.shape == ranks
+    assert np.max(np.abs(found.core - expected.core)) < TOLERANCE
+    for basis, other in zip(found.bases, expected.bases, strict=True):
+        assert np.array_equal(basis, other)
+    assert np.max(np.abs(found.restored() - full.restored())) > 1e-3, "negative control"
+
+
 def left_out(core, ranks):
     """Squared singular values that ranks cut off, summed for each mode."""
     unfolded = (hosvd.unfold(core, mode) for mode in range(core.ndim))

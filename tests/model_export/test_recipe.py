@@ -114,12 +114,34 @@ FAULTS = {
     "ranks and a budget": (
         "rms_budget_cm = 1.0",
         "rms_budget_cm = 1.0\nranks = [3, 3, 3]",
-        ["size", "either ranks or rms_budget_cm"],
+        ["size", "found ['ranks', 'rms_budget_cm']", "either ranks or budgets"],
     ),
+    "ranks and a cost": (
+        "rms_budget_cm = 1.0",
+        'cost = "numbers"\nranks = [3, 3, 3]',
+        ["size", "found ['cost', 'ranks']", "either ranks or budgets"],
+    ),
+    "unknown cost": (
+        "rms_budget_cm = 1.0",
+        'rms_budget_cm = 1.0\ncost = "bytes"',
+        ["size.cost", "'numbers' or 'operations'", "'bytes'"],
+    ),
+    "a negative p99": ("rms_budget_cm = 1.0", "p99_budget_cm = -1.0", ["size.p99", "than 0"]),
+    "an effector budget without an event": (
+        "rms_budget_cm = 1.0",
+        "effector_budget_cm = 2.5",
+        ["size.effector_budget_cm: found 2.5 and no [event]", "expected event.joint and event.at"],
+    ),
+    "an event at no landmark": (
+        "[size]",
+        '[event]\njoint = "hand"\nat = "hit"\n[size]',
+        ["event.at: found 'hit'", "expected 'end' or a column of clips.landmarks []"],
+    ),
+    "an event without its joint": ("[size]", '[event]\nat = "end"\n[size]', ["event.joint"]),
     "neither ranks nor budget": (
         "rms_budget_cm = 1.0",
         "",
-        ["size", "either ranks or rms_budget_cm"],
+        ["size", "found neither", "either ranks or budgets (rms_budget_cm, p99_budget_cm"],
     ),
     "two ranks": ("rms_budget_cm = 1.0", "ranks = [3, 3]", ["size.ranks", "at least 3", "[3, 3]"]),
     "rank of zero": ("rms_budget_cm = 1.0", "ranks = [3, 0, 3]", ["size.ranks.1", "equal to 1"]),
@@ -146,6 +168,30 @@ def test_a_fault_is_named_with_its_key_and_what_was_expected(read, tmp_path, old
     assert caught.value.path == str(tmp_path / "recipe.toml")
     for part in said:
         assert part in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("size", "budgets"),
+    [
+        ("rms_budget_cm = 1.0", {"rms": 0.01}),
+        ("p99_budget_cm = 2.5", {"p99": 0.025}),
+        ("rms_budget_cm = 1.0\neffector_budget_cm = 2.0", {"rms": 0.01, "effector": 0.02}),
+        ("ranks = [3, 4, 5]", {}),
+    ],
+)
+def test_budgets_are_read_in_metres_in_any_combination(read, size, budgets):
+    event = '[event]\njoint = "hand"\nat = "end"\n[size]'
+    own = read(MINIMAL.replace("rms_budget_cm = 1.0", size).replace("[size]", event))
+    assert own.size.budgets == pytest.approx(budgets)
+    assert (own.size.cost, own.event.joint) == ("numbers", "hand")
+
+
+def test_an_event_may_be_at_a_landmark(read):
+    marked = MINIMAL.replace('file = "file"', 'file = "file"\nlandmarks = ["touch", "hit"]')
+    event = '[event]\njoint = "hand"\nat = "{}"\n[size]'
+    assert read(marked.replace("[size]", event.format("hit"))).event.at == "hit"
+    with pytest.raises(RecipeError, match=r"found 'hat', .*clips.landmarks \['touch', 'hit'\]"):
+        read(marked.replace("[size]", event.format("hat")))
 
 
 def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):

@@ -125,8 +125,16 @@ def decoder_stage():
     )
 
 
-def decoder():
-    own, stage = rng(), decoder_stage()
+def stiff_stage():
+    """A decoder whose joints do not turn about some of their axes, as hinges do not."""
+    stage = decoder_stage()
+    unwhiten = stage.unwhiten.copy()
+    unwhiten[[1, 6, 7, 14]] = 0.0
+    return replace(stage, unwhiten=unwhiten)
+
+
+def decoder(stage):
+    own = rng()
     coefficients = own.normal(size=(BATCH, 6))
     place = own.uniform(0.0, 19.0, (BATCH, STEPS))
     place[:, :4] = 0.0, 19.0, 7.0, 18.5
@@ -202,7 +210,8 @@ CASES = {
         for drift in (0, 1)
     },
     **{f"timing, {knots} knots": (timing, {"knots": knots}) for knots in (3, 4, 6, 12, 24)},
-    "decoder": (decoder, {}),
+    "decoder": (decoder, {"stage": decoder_stage()}),
+    "decoder with stiff axes": (decoder, {"stage": stiff_stage()}),
     "decoder at the means": (poses_at_the_means, {}),
     "proportions": (proportions, {}),
     "travel of a cycle": (travel, {}),

@@ -1,0 +1,116 @@
+"""Table 1: its errors are what it says, and it prints every baseline with its definition."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model_export import cost, fidelity
+from model_export.evaluate import table1, table1_errors, table1_family, table1_measure
+from model_export.evaluate import table1_precompute as precompute
+
+
+@pytest.fixture(scope="module")
+def made(trained):
+    return table1_family.of(trained, None, 0.0)
+
+
+@pytest.fixture(scope="module")
+def over(made):
+    return table1_errors.uniform(made, 30)
+
+
+@pytest.fixture(scope="module")
+def measured(made):
+    return table1_measure.of(made, points=30, rounds=1)
+
+
+def test_distances_are_summed_over_joints_and_frames():
+    found, expected = np.zeros((2, 4, 5, 3)), np.zeros((2, 4, 5, 3))
+    found[0] = [3.0, 4.0, 0.0]
+    assert table1_errors.between(found, expected) == pytest.approx(np.sqrt(100.0**2 / 2))
+    assert table1_errors.between(found, found) == 0.0
+
+
+def test_full_rank_has_no_error_and_fewer_ranks_have_more(over, made):
+    full = made.trained.full
+    errors = [over.truncation(full.truncated(ranks)) for ranks in ((94, 40, 46), (20, 8, 20))]
+    assert errors[0] < 1e-9 < 0.1 < errors[1]
+
+
+def test_at_the_samples_without_nugget_the_motions_are_the_clips(over, made, small_recipe):
+    """With mean bones for all, as Table 1 has them."""
+    at_samples = replace(over, points=made.samples, hyper=replace(over.hyper, nugget=0.0))
+    judge = fidelity.judge(small_recipe, made.examples, made.trained.tensor)
+    bones = np.broadcast_to(made.offsets.mean(axis=0), made.offsets.shape)
+    clips = fidelity.positions(
+        judge.own_tensor, judge.own_tensor.values, judge.parents, np.array(bones)
+    )
+    assert np.abs(at_samples.whole - clips).max() < 1e-6
+    assert np.abs(replace(over, points=made.samples).whole - clips).max() > 1e-3
+
+
+@pytest.mark.parametrize("threshold", [8.0, 3.0])
+def test_smallest_tensor_keeps_the_threshold_and_is_not_wasteful(over, made, threshold):
+    full = made.trained.full
+    found = table1_errors.smallest(over, threshold)
+    assert 0.8 * threshold < over.truncation(full.truncated(found)) <= threshold
+    for mode in range(3):
+        fewer = tuple(rank - 2 * (axis == mode) for axis, rank in enumerate(found))
+        assert over.truncation(full.truncated(fewer)) > threshold
+
+
+def test_precomputation_is_the_models_own(made):
+    reduced, field = precompute.ours(made, (12, 5, 10))
+    expected = made.trained.full.truncated((12, 5, 10))
+    assert np.abs(reduced.core - expected.core).max() < 1e-9
+    assert np.abs(field.predict(made.samples[:3]) - reduced.bases[2][:3]).max() < 0.2
+    assert len(set(field.hyper.scales)) == 1, "isotropic, by the variogram"
+
+
+def test_every_size_says_what_it_costs(measured, made):
+    named = {size.asked: size for size in measured.sizes}
+    assert set(named) == {
+        *table1_measure.THRESHOLDS,
+        *(f"the paper's {'×'.join(map(str, ranks))}" for ranks in table1_measure.PAPER_RANKS),
+    }
+    for asked, limit in table1_measure.THRESHOLDS.items():
+        size = named[asked]
+        assert size.error <= limit
+        compression = cost.compression(made.trained.tensor, size.ranks, 4)
+        assert (size.core, size.stored) == (compression.core, compression.stored)
+    assert named["500 cm"].core < named["1000 cm"].core
+    assert all(size.from_naive > 0.5 * measured.full_from_naive for size in measured.sizes)
+
+
+def test_every_baseline_is_compared_with_ours_at_the_papers_size(measured):
+    shown = next(size for size in measured.sizes if size.ranks == table1_measure.SHOWN)
+    assert {one.ours for one in measured.precompute} == {shown.precompute}
+    assert {one.ours for one in measured.pose} == {shown.pose}
+    for one in (*measured.precompute, *measured.pose):
+        assert one.ratio == one.seconds / one.ours > 0.0
+
+
+def test_text_holds_the_papers_figures_and_every_definition(measured):
+    said = table1.text(measured)
+    for figure in ("119.8 s", "2.76 ms", "22 × 6 × 24 | 267 | 106", "18 × 6 × 28 | 280 |"):
+        assert figure in said
+    for one in (*measured.precompute, *measured.pose):
+        assert one.words in said
+    assert "thresholds have no unit" in said
+    assert said.count("core alone at 500") == 2
+
+
+def test_a_goal_that_is_missed_is_called_so(measured):
+    slow = tuple(replace(one, seconds=0.5 * one.ours) for one in measured.precompute)
+    fast = tuple(replace(one, seconds=500.0 * one.ours) for one in measured.precompute)
+    assert table1.text(replace(measured, precompute=slow)).count("| 20 | **no** |") == len(slow)
+    assert table1.text(replace(measured, precompute=fast)).count("| 20 | yes |") == len(fast)
+
+
+def test_facts_are_plain(measured):
+    facts = json.loads(json.dumps(table1.facts(measured)))
+    assert facts["raw"] == [94, 40, 46]
+    assert len(facts["sizes"]) == 7
+    assert facts["pose"][0]["goal"] == 3.3

@@ -1,0 +1,80 @@
+"""What is timed is right: compiled poses are those of the model and of naive kriging."""
+
+import numpy as np
+import pytest
+
+from model_export.decoder import Decoder
+from model_export.evaluate import table1_family, table1_pose, table1_precompute
+from model_export.evaluate import table1_kernels as kernels
+
+RANKS = (12, 5, 10)
+# Sums of a hundred products in another order, in float64.
+EXACT = 1e-9
+
+
+@pytest.fixture(scope="module")
+def made(trained):
+    return table1_family.of(trained, None, 0.0)
+
+
+@pytest.fixture(scope="module")
+def question(made):
+    return table1_pose.asked(made, 40)
+
+
+@pytest.fixture(scope="module")
+def field(made):
+    fitter = table1_precompute.FITS["our own linearised grid search"]
+    return table1_precompute.naive(made, fitter)
+
+
+def test_compiled_poses_are_those_of_the_decoder(made, question):
+    reduced, own = table1_precompute.ours(made, RANKS)
+    tensor = made.trained.tensor
+    decoder = Decoder(reduced, tensor.mean, tensor.unwhiten, tensor.chart.means)
+    found = table1_pose.ours(made, reduced, own, question)()
+
+    def expected(points, places):
+        poses = decoder.reduced_poses(own.predict(points), places[:, None])[:, 0]
+        return (decoder.mean + poses @ decoder.directions)[:, made.varies]
+
+    assert np.abs(found - expected(question.points, question.places)).max() < EXACT
+    assert np.abs(found - expected(question.points, question.frames)).max() > 1e-4
+
+
+@pytest.mark.parametrize("form", table1_pose.FORMS)
+def test_compiled_naive_poses_are_those_of_naive_kriging(made, question, field, form):
+    found = table1_pose.naive(field, question)[form]()
+    frames, each = field.numpy(question.points), np.arange(len(question.points))
+    before = question.frames.astype(int)
+    share = (question.places - before)[:, None]
+    if form != "LU, between frames":
+        share = np.zeros_like(share)
+    expected = (1.0 - share) * frames[each, before] + share * frames[each, before + 1]
+    # Solved, inverted, multiplied: a system of condition 1e4.
+    assert np.abs(found - expected).max() < EXACT
+    assert np.abs(found - frames[each, before + 1]).max() > 1e-4
+
+
+def test_a_call_answers_the_same_again(made, question, field):
+    answer = table1_pose.naive(field, question)["dual, on a frame"]
+    first = answer().copy()
+    assert np.array_equal(first, answer())
+
+
+def test_solve_is_what_the_system_says(rng):
+    system, b = rng.normal(size=(9, 9)), rng.normal(size=9)
+    (columns, order, inverse), out = table1_pose._factors(system[None]), np.zeros(9)
+    kernels.solve(np.ascontiguousarray(columns[0]), order[0], inverse[0], b, out)
+    assert np.abs(system @ out - b).max() < 1e-12
+    assert len(set(order[0])) == 9 and list(order[0]) != list(range(9)), "rows change places"
+
+
+def test_timing_takes_turns_and_the_median():
+    from model_export.evaluate.table1_timing import in_turn
+
+    called = []
+    runs = {name: lambda name=name: called.append(name) for name in "ab"}
+    taken = in_turn(runs, rounds=3, repeats=2)
+    assert "".join(called) == "ab" + "aabb" * 3
+    assert set(taken) == {"a", "b"} and min(taken.values()) >= 0.0

@@ -1,0 +1,84 @@
+"""What ranks cost is what a file holds, and what a pose takes."""
+
+from dataclasses import asdict
+
+import numpy as np
+import onnx
+import pytest
+from onnx import numpy_helper
+
+from model_export import cost, export
+from model_export.cost import Price
+
+RANKS = (3, 4, 5)
+
+
+def test_price_is_of_the_core_of_each_rank_and_of_pairs():
+    assert Price((100, 10, 1)).of(*RANKS) == 60 + 300 + 40 + 5
+    assert Price((100, 10, 1), pair=2).of(*RANKS) == 60 + 300 + 40 + 5 + 24
+
+
+def test_price_of_arrays_is_that_of_their_entries():
+    price = Price((7, 5, 3), pair=2)
+    found = price.of(*np.ix_(np.arange(1, 4), np.arange(1, 5), np.arange(1, 6)))
+    assert found.shape == RANKS
+    assert all(
+        found[r1, r2, r3] == price.of(r1 + 1, r2 + 1, r3 + 1) for r1, r2, r3 in np.ndindex(RANKS)
+    )
+
+
+@pytest.fixture(scope="module")
+def held(small_recipe, trained):
+    """Numbers that the file of the small model holds, by name."""
+    content = export.export(small_recipe, trained, []).content
+    graph = onnx.load_from_string(content).graph
+    return {own.name: numpy_helper.to_array(own) for own in graph.initializer}
+
+
+def test_numbers_are_those_that_the_file_holds(held, trained):
+    ranks = trained.model.decoder.reduced.core.shape
+    motion = sum(held[name].size for name in ("core", "directions", "time_basis", "pose_weights"))
+    # Drift weights and bias stand side by side for all fields, the pose's first.
+    drift = ranks[2] * (len(held["drift_weights"]) + 1)
+    assert motion + drift == cost.numbers(trained.tensor, 4).of(*ranks)
+    assert motion + drift < sum(own.size for own in held.values()), "sigma's matrix is the largest"
+
+
+def test_compression_is_the_raw_tensor_over_what_is_stored(trained):
+    freedoms, frames, samples = trained.tensor.values.shape
+    raw = freedoms * frames * samples
+    found = cost.compression(trained.tensor, (22, 6, 24), 4)
+    bases = freedoms * 22 + frames * 6 + (samples + 5) * 24
+    assert found.core == pytest.approx(raw / (22 * 6 * 24))
+    assert found.stored == pytest.approx(raw / (22 * 6 * 24 + bases))
+    assert cost.compression(trained.tensor, (22, 6, 25), 4).stored < found.stored
+
+
+def test_papers_core_is_267_times_smaller_and_106_times_with_its_bases():
+    """Mukai & Kuriyama 2006, table 1: 92 x 100 x 92 against 22 x 6 x 24."""
+    raw, core = 92 * 100 * 92, 22 * 6 * 24
+    assert raw / core == pytest.approx(267.2, abs=0.05)
+    assert raw / Price((92, 100, 92)).of(22, 6, 24) == pytest.approx(105.8, abs=0.05)
+
+
+def test_operations_are_those_of_the_products_of_one_pose(trained):
+    joints, (_, _, samples) = len(trained.skeleton), trained.tensor.values.shape
+    r1, r2, r3 = RANKS
+    products = {
+        "kriging": (samples + 5) * r3,
+        "core": r1 * r2 * r3,
+        "line between frames": r2,
+        "time": r1 * r2,
+        "decoding": r1 * (4 * joints + 3),
+    }
+    assert cost.operations(trained.tensor, 4).of(*RANKS) == sum(products.values())
+
+
+def test_the_card_tells_the_compression_and_every_distance(small_recipe, trained):
+    told = export.export(small_recipe, trained, []).card.diagnostics
+    ranks = trained.model.decoder.reduced.core.shape
+    expected = asdict(cost.compression(trained.tensor, ranks, 4))
+    assert told["compression"] == pytest.approx(expected, rel=1e-3)
+    distances = {name: told[f"truncation_{name}_m"] for name in asdict(trained.fidelity)}
+    assert distances == pytest.approx(asdict(trained.fidelity), rel=1e-3)
+    assert distances["rms"] < distances["p99"] < distances["max"]

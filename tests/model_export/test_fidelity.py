@@ -1,0 +1,144 @@
+"""True distances of a truncation: what joints do, not what the metric says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model_export import align, cost, fidelity, ranks, train
+from model_export.recipe import Event
+from service.motion.errors import TrainingError
+
+# Rounding of the kinematics in float64, m.
+EXACT = 1e-9
+
+
+@pytest.fixture(scope="module")
+def judge(small_recipe, trained):
+    return fidelity.judge(small_recipe, trained.examples, trained.tensor)
+
+
+@pytest.fixture(scope="module")
+def reduced(trained):
+    return trained.full.truncated((12, 5, 15))
+
+
+@pytest.fixture(scope="module")
+def gaps(trained, judge, reduced):
+    """Distances (N, T, J) of that truncation, m."""
+    found = fidelity.positions(judge.own_tensor, reduced.restored(), judge.parents, judge.offsets)
+    return np.linalg.norm(found - judge.whole, axis=-1)
+
+
+def test_whole_tensor_is_the_aligned_clips(trained, judge):
+    clips = align.positions(trained.aligned, judge.parents, judge.offsets)
+    assert np.abs(judge.whole - clips).max() < EXACT
+    shuffled = align.positions(trained.aligned, judge.parents, judge.offsets[::-1])
+    assert np.abs(judge.whole - shuffled).max() > 1e-2
+
+
+def test_nothing_cut_off_costs_nothing(trained, judge, reduced):
+    assert judge.of(trained.full).max < EXACT
+    assert judge.of(reduced).max > 1e-2
+
+
+def test_distances_are_those_of_the_joints(judge, reduced, gaps):
+    found = judge.of(reduced)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(gaps**2)))
+    assert found.max == gaps.max()
+    assert np.mean(gaps > found.p99) == pytest.approx(0.01, abs=1e-4)
+    assert found.effector == pytest.approx(np.sqrt(np.mean(gaps[:, -1, hand(judge)] ** 2)))
+
+
+def hand(judge):
+    return judge.moment.joint
+
+
+def test_joint_weights_weigh_the_rms_alone(judge, reduced, gaps):
+    only = np.zeros(len(judge.weights))
+    only[hand(judge)] = 2.0
+    found = replace(judge, weights=only).of(reduced)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(gaps[..., hand(judge)] ** 2)))
+    assert found.rms > 1.1 * judge.of(reduced).rms
+    assert (found.p99, found.max) == (judge.of(reduced).p99, judge.of(reduced).max)
+
+
+def test_without_an_event_there_is_no_effector(small_recipe, trained, reduced):
+    plain = small_recipe.model_copy(update={"event": None})
+    assert fidelity.judge(plain, trained.examples, trained.tensor).of(reduced).effector is None
+
+
+def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, trained):
+    marks = np.linspace(0.2, 0.6, len(trained.examples))
+    marked = [replace(e, landmarks=(0.1, m)) for e, m in zip(trained.examples, marks, strict=True)]
+    clips = small_recipe.clips.model_copy(update={"landmarks": ["lift", "touch"]})
+    frames = {}
+    for at in ("lift", "touch", "end"):
+        event = Event(joint="LeftHand", at=at)
+        own = small_recipe.model_copy(update={"clips": clips, "event": event})
+        frames[at] = fidelity.judge(own, marked, trained.tensor).moment.frame
+    assert frames == {"lift": 4, "touch": 16, "end": 39}
+
+
+def test_a_joint_that_is_not_there_is_refused_by_name(small_recipe, trained):
+    own = small_recipe.model_copy(update={"event": Event(joint="Tail", at="end")})
+    with pytest.raises(TrainingError, match=r"event\.joint 'Tail', expected one of Hips, .*Head"):
+        fidelity.judge(own, trained.examples, trained.tensor)
+
+
+def chosen(own, trained, judge, **size):
+    """Fidelity and cost of the ranks that a size asks for."""
+    empty = {"rms_budget_cm": None, "p99_budget_cm": None, "effector_budget_cm": None}
+    asked = own.size.model_copy(update={**empty, **size})
+    price = cost.PRICES[asked.cost](trained.tensor, 4)
+    found = ranks.choose(asked, trained.full, price, judge)
+    return judge.of(trained.full.truncated(found)), price.of(*found), found
+
+
+@pytest.mark.parametrize("name", ["rms", "p99", "effector"])
+def test_a_budget_is_kept_by_true_distances_and_not_wasted(small_recipe, trained, judge, name):
+    looser = {"rms": 1.5, "p99": 4.0, "effector": 2.0}
+    found, price, _ = chosen(small_recipe, trained, judge, **{f"{name}_budget_cm": looser[name]})
+    assert 0.85 * looser[name] < 100 * getattr(found, name) <= looser[name]
+    half = {f"{name}_budget_cm": 0.5 * looser[name]}
+    assert chosen(small_recipe, trained, judge, **half)[1] > 1.3 * price
+
+
+def test_all_budgets_given_are_kept(small_recipe, trained, judge):
+    rms = {"rms_budget_cm": 1.5}
+    alone, cheap, _ = chosen(small_recipe, trained, judge, **rms)
+    tight = {**rms, "effector_budget_cm": 50 * alone.effector}
+    found, price, _ = chosen(small_recipe, trained, judge, **tight)
+    assert found.rms <= 0.015 and found.effector <= 0.5 * alone.effector < alone.effector
+    assert price > cheap
+
+
+def test_cost_decides_which_ranks_are_the_cheapest(small_recipe, trained, judge):
+    numbers, operations = (price(trained.tensor, 4) for price in cost.PRICES.values())
+    fronts = [ranks.front(trained.full.core, price) for price in (numbers, operations)]
+    pairs = []
+    for error in np.geomspace(1e-4, 0.1, 12) * np.sum(trained.full.core**2):
+        stored, done = (front[front.near(error, -1, len(front.errors))] for front in fronts)
+        assert numbers.of(*stored) <= numbers.of(*done)
+        assert operations.of(*done) <= operations.of(*stored)
+        pairs.append(stored != done)
+    assert any(pairs)
+    found = chosen(small_recipe, trained, judge, rms_budget_cm=1.0, cost="operations")
+    assert found[1] == operations.of(*found[2])
+
+
+def test_predicted_error_is_the_true_one(small_recipe, trained, judge):
+    """The metric's own figure is some percent off: it counts skin, and is first-order."""
+    kept = trained.model.decoder.reduced
+    predicted = trained.tensor.rms(np.sum(trained.full.core**2) - np.sum(kept.core**2))
+    assert trained.fidelity == judge.of(kept)
+    assert abs(trained.fidelity.rms / (0.01 * small_recipe.size.rms_budget_cm) - 1.0) < 0.05
+    assert abs(predicted / trained.fidelity.rms - 1.0) > 0.005
+
+
+def test_a_recipe_that_gives_ranks_is_told_what_they_cost(small_recipe, examples):
+    size = small_recipe.size.model_copy(update={"ranks": [9, 4, 9], "rms_budget_cm": None})
+    own = small_recipe.model_copy(update={"size": size})
+    trained = train.train(own, examples[::2], lambda _: None)
+    assert trained.model.decoder.reduced.core.shape == (9, 4, 9)
+    assert 0.005 < trained.fidelity.rms < trained.fidelity.p99 < trained.fidelity.max
