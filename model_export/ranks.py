@@ -15,15 +15,16 @@ def smallest(core: Floats, allowed: float, per_rank: tuple[int, int, int]) -> tu
     the core itself.
     """
     errors = hosvd.squared_errors(core)
-    sizes = _sizes(core.shape, per_rank)
+    stored = sizes(core.shape, per_rank)
     # A relative rounding error of the sum must not forbid full ranks.
     fits = errors <= allowed + 1e-12 * float(np.sum(np.square(core)))
-    best = int(np.argmin(np.where(fits, sizes, np.inf)))
+    best = int(np.argmin(np.where(fits, stored, np.inf)))
     r1, r2, r3 = (int(index) + 1 for index in np.unravel_index(best, core.shape))
     return r1, r2, r3
 
 
-def _sizes(shape: tuple[int, ...], per_rank: tuple[int, int, int]) -> Floats:
+def sizes(shape: tuple[int, ...], per_rank: tuple[int, int, int]) -> Floats:
+    """Numbers stored for every triple of ranks; per_rank: for one more of each, core aside."""
     r1, r2, r3 = (np.arange(1.0, size + 1) for size in shape)
     own = r1[:, None, None] * r2[:, None] * r3
     return own + per_rank[0] * r1[:, None, None] + per_rank[1] * r2[:, None] + per_rank[2] * r3

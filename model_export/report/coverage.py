@@ -1,0 +1,123 @@
+"""Where in the control space there are samples."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from model_export.report import picture, plain
+from model_export.report.page import Section, Table
+from model_export.train import Trained
+from service.motion.card import Control
+from service.motion.conventions import Floats
+
+BINS = 16
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """values (N, d): controls of the clips. missed (N,): how well the others predict each, m."""
+
+    controls: tuple[Control, ...]
+    values: Floats
+    missed: Floats
+
+    def facts(self) -> dict[str, Any]:
+        """Of each control what was sampled, and the widest range in which nothing was."""
+        return {
+            "controls": [
+                {
+                    "name": control.name,
+                    "unit": control.unit,
+                    "minimum": plain.number(control.minimum),
+                    "maximum": plain.number(control.maximum),
+                    "distinct": len(np.unique(own)),
+                    "values": plain.numbers(control.values),
+                    "widest_gap": plain.numbers(_gap(own)),
+                }
+                for control, own in zip(self.controls, self.values.T, strict=True)
+            ],
+            "correlation": plain.numbers(self._correlation()),
+        }
+
+    def _correlation(self) -> Floats:
+        return np.atleast_2d(np.corrcoef(self.values.T))
+
+    def section(self) -> Section:
+        """Every pair of controls, and a word on those that only have a few values."""
+        few = [control for control in self.controls if control.values]
+        words = [
+            "A field knows nothing where it has no samples: corners that are empty here are "
+            "extrapolated to, whatever the ranges of the single controls say."
+        ]
+        words += [
+            f"{control.name} has only {len(control.values)} distinct values "
+            f"({', '.join(f'{value:g}' for value in control.values)}): between them nothing was "
+            "seen, and a control of few values may be a label in disguise."
+            for control in few
+        ]
+        rows = tuple(
+            self._row(control, own)
+            for control, own in zip(self.controls, self.values.T, strict=True)
+        )
+        heading = ("control", "unit", "from", "to", "distinct values", "widest gap")
+        names = ", ".join(control.name for control in self.controls)
+        drawn = picture.draw(
+            "coverage",
+            max(3.0, min(9.0, 2.1 * len(self.controls))),
+            self._paint,
+            f"Pair plot of {names} over {len(self.values)} clips.",
+            "Below the diagonal the clips, darker where the others predict them worse; on it how "
+            "often each value was sampled; above it the correlation.",
+        )
+        return Section(
+            "coverage", "Coverage of the controls", tuple(words), (Table(heading, rows),), (drawn,)
+        )
+
+    @staticmethod
+    def _row(control: Control, own: Floats) -> tuple[str, ...]:
+        low, high = _gap(own)
+        ends = f"{control.minimum:.4g}", f"{control.maximum:.4g}"
+        gap = f"{low:.4g} to {high:.4g}"
+        return (control.name, control.unit, *ends, str(len(np.unique(own))), gap)
+
+    def _paint(self, figure: Figure) -> None:
+        count = len(self.controls)
+        axes = figure.subplots(count, count, squeeze=False)
+        strength = self._correlation()
+        for (row, column), ax in np.ndenumerate(axes):
+            if row == column:
+                ax.hist(self.values[:, row], bins=BINS, color=picture.BLUE)
+                ax.grid(visible=False, axis="x")
+            elif row > column:
+                seen = ax.scatter(
+                    self.values[:, column],
+                    self.values[:, row],
+                    c=100 * self.missed,
+                    s=16,
+                    cmap="viridis_r",
+                )
+            else:
+                ax.text(0.5, 0.5, f"{strength[row, column]:+.2f}", ha="center", va="center")
+                ax.set_axis_off()
+            if row == count - 1:
+                ax.set_xlabel(f"{self.controls[column].name} ({self.controls[column].unit})")
+            if column == 0:
+                name = f"{self.controls[row].name} ({self.controls[row].unit})"
+                ax.set_ylabel(name if row else "clips")
+        if count > 1:
+            figure.colorbar(seen, ax=axes, label="missed by (cm)", shrink=0.6, aspect=30)
+
+
+def _gap(values: Floats) -> tuple[float, float]:
+    """Ends of the widest range in which no value lies."""
+    distinct = np.unique(values)
+    at = int(np.argmax(np.diff(distinct)))
+    return float(distinct[at]), float(distinct[at + 1])
+
+
+def of(trained: Trained, controls: tuple[Control, ...]) -> Coverage:
+    """Coverage of a trained model's controls."""
+    values = np.stack([example.controls for example in trained.examples])
+    return Coverage(controls, values, np.sqrt(trained.missed))

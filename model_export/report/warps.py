@@ -1,0 +1,95 @@
+"""How clips were stretched in time to meet each other."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from model_export.report import left_out, picture, plain
+from model_export.report.page import Section, Table
+from model_export.train import Trained
+from model_export.warp import DENSE
+from service.motion.conventions import Floats
+
+NAMED = 3
+
+
+@dataclass(frozen=True)
+class Warps:
+    """maps (N, 501): canonical time of each clip's own times. labels and durations, s, of each."""
+
+    maps: Floats
+    labels: tuple[str, ...]
+    durations: Floats
+
+    @property
+    def stretches(self) -> Floats:
+        """How many times slower or faster (N,) than its mean pace each clip is somewhere made."""
+        slopes = np.diff(self.maps, axis=1) / np.diff(DENSE)
+        return np.maximum(slopes.max(axis=1), 1.0 / slopes.min(axis=1))
+
+    @property
+    def _order(self) -> list[int]:
+        return [int(i) for i in np.argsort(-self.stretches, kind="stable")]
+
+    def facts(self) -> dict[str, Any]:
+        """The largest stretch of every clip, the worst first."""
+        return {
+            "clips": [
+                {
+                    "clip": self.labels[i],
+                    "duration_s": plain.number(self.durations[i]),
+                    "largest_stretch": plain.number(self.stretches[i]),
+                }
+                for i in self._order
+            ]
+        }
+
+    def section(self) -> Section:
+        """Every clip's map, and the ones that are stretched most."""
+        worst = self._order[:NAMED]
+        said = (
+            f"Durations are {self.durations.min():.2f} to {self.durations.max():.2f} s. Every "
+            f"clip's time runs evenly to a common one but for these maps; the largest stretch, "
+            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}."
+        )
+        rows = [
+            (self.labels[i], f"{self.durations[i]:.2f}", f"{self.stretches[i]:.2f}") for i in worst
+        ]
+        drawn = picture.draw(
+            "warps",
+            3.5,
+            self._paint,
+            f"Time maps of {len(self.maps)} clips; stretched most: {self.labels[worst[0]]}.",
+            "Left: from each clip's own time to canonical time; a straight diagonal is no warp. "
+            "Right: how much the pace of each clip was changed where it was changed most, sorted.",
+        )
+        table = Table(("stretched most", "duration (s)", "times"), tuple(rows))
+        return Section("warps", "Alignment in time", (said,), (table,), (drawn,))
+
+    def _paint(self, figure: Figure) -> None:
+        left, right = figure.subplots(1, 2)
+        order = self._order
+        worst = order[:NAMED]
+        for i in order[NAMED:]:
+            left.plot(DENSE, self.maps[i], color=picture.FAINT, linewidth=0.8)
+        left.plot([0, 1], [0, 1], color=picture.INK, linewidth=0.8, linestyle="--")
+        for i, style in zip(worst, ("-", "--", ":"), strict=False):
+            left.plot(DENSE, self.maps[i], style, color=picture.ORANGE, label=self.labels[i])
+        left.legend(loc="upper left", fontsize=7.5)
+        left.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")
+        colours = [picture.ORANGE if rank < NAMED else picture.BLUE for rank in range(len(order))]
+        right.bar(np.arange(len(order)), self.stretches[order], width=0.72, color=colours)
+        right.set(ylabel="largest stretch (times)", title="clips", ylim=(1.0, None))
+        right.set_xticks([])
+
+
+def of(trained: Trained) -> Warps:
+    """Warps of a trained model's clips."""
+    aligned = trained.aligned
+    return Warps(
+        trained.model.timing.basis.evaluate(aligned.logs, DENSE),
+        tuple(left_out.label(example) for example in trained.examples),
+        aligned.durations,
+    )
