@@ -52,13 +52,14 @@ class About:
 
     def section(self) -> Section:
         """Provenance, notes and times."""
-        notes = self.exported.card.diagnostics["notes"]
-        said = tuple(f"Note: {note}" for note in notes) or (
-            "No joint had to be cleaned or watched",
-        )
         steps = [(step.name, f"{step.seconds:.2f}") for step in self.steps]
         times = Table(("step", "seconds"), (*steps, ("together", f"{self.seconds:.2f}")))
-        return Section("about", "Where it comes from", said, (self._provenance(), times))
+        tables = (self._provenance(), self._notes(), times)
+        return Section("about", "Where it comes from", (), tables)
+
+    def _notes(self) -> Table:
+        notes = self.exported.card.diagnostics["notes"] or ["nothing that had to be assumed"]
+        return Table(("noticed on the way",), tuple((note,) for note in notes))
 
     def _provenance(self) -> Table:
         told = self.exported.card.provenance

@@ -84,6 +84,7 @@ class Calibration:
         right.axvline(1.0, color=picture.INK, linewidth=0.9)
         right.set(xlabel="actual / predicted", ylabel="clips", title="ratio")
         right.grid(visible=False, axis="x")
+        right.yaxis.get_major_locator().set_params(integer=True)
 
 
 def _rank_correlation(a: Floats, b: Floats) -> float:

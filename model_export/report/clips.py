@@ -94,7 +94,7 @@ class Clips:
         ax.grid(visible=False, axis="x")
         ax.set(ylabel="missed by (cm)", xlim=(-0.7, len(at) - 0.3))
         if len(at) <= WRITTEN:
-            ax.set_xticks(at, self.performers, rotation=90, fontsize=min(8.5, 700 / len(at)))
+            ax.set_xticks(at, self.performers, rotation=90, fontsize=min(8.5, 640 / len(at)))
         else:
             ax.set_xticks([])
 

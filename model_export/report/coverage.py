@@ -17,11 +17,25 @@ BINS = 16
 
 @dataclass(frozen=True)
 class Coverage:
-    """values (N, d): controls of the clips. missed (N,): how well the others predict each, m."""
+    """values (N, d): controls of the clips. missed (N,): how well the others predict each, m.
+
+    performers (N,): empty names where the recipe does not say who moved.
+    """
 
     controls: tuple[Control, ...]
     values: Floats
     missed: Floats
+    performers: tuple[str, ...]
+
+    def labels(self) -> tuple[str, ...]:
+        """Controls with one value for each of several performers: they say who moved."""
+        whose = np.unique(self.performers, return_inverse=True)[1]
+        several = 1 < len(set(self.performers)) < len(self.performers)
+        return tuple(
+            control.name
+            for control, own in zip(self.controls, self.values.T, strict=True)
+            if several and all(np.ptp(own[whose == one]) == 0.0 for one in set(whose))
+        )
 
     def facts(self) -> dict[str, Any]:
         """Of each control what was sampled, and the widest range in which nothing was."""
@@ -38,6 +52,7 @@ class Coverage:
                 }
                 for control, own in zip(self.controls, self.values.T, strict=True)
             ],
+            "one_value_a_performer": list(self.labels()),
             "correlation": plain.numbers(self._correlation()),
         }
 
@@ -46,17 +61,11 @@ class Coverage:
 
     def section(self) -> Section:
         """Every pair of controls, and a word on those that only have a few values."""
-        few = [control for control in self.controls if control.values]
-        words = [
+        words = (
             "A field knows nothing where it has no samples: corners that are empty here are "
-            "extrapolated to, whatever the ranges of the single controls say."
-        ]
-        words += [
-            f"{control.name} has only {len(control.values)} distinct values "
-            f"({', '.join(f'{value:g}' for value in control.values)}): between them nothing was "
-            "seen, and a control of few values may be a label in disguise."
-            for control in few
-        ]
+            "extrapolated to, whatever the ranges of the single controls say.",
+            *self._warnings(),
+        )
         rows = tuple(
             self._row(control, own)
             for control, own in zip(self.controls, self.values.T, strict=True)
@@ -72,8 +81,22 @@ class Coverage:
             "often each value was sampled; above it the correlation.",
         )
         return Section(
-            "coverage", "Coverage of the controls", tuple(words), (Table(heading, rows),), (drawn,)
+            "coverage", "Coverage of the controls", words, (Table(heading, rows),), (drawn,)
         )
+
+    def _warnings(self) -> list[str]:
+        few = [
+            f"{control.name} has only {len(control.values)} distinct values "
+            f"({', '.join(f'{value:g}' for value in control.values)}): nothing was seen between "
+            "them."
+            for control in self.controls
+            if control.values
+        ]
+        return few + [
+            f"{name} has one value for each performer, and so tells who moved: leaving one clip "
+            "out is too kind to such a model, and a new performer is predicted less well."
+            for name in self.labels()
+        ]
 
     @staticmethod
     def _row(control: Control, own: Floats) -> tuple[str, ...]:
@@ -90,6 +113,7 @@ class Coverage:
             if row == column:
                 ax.hist(self.values[:, row], bins=BINS, color=picture.BLUE)
                 ax.grid(visible=False, axis="x")
+                ax.yaxis.get_major_locator().set_params(integer=True)
             elif row > column:
                 seen = ax.scatter(
                     self.values[:, column],
@@ -99,7 +123,8 @@ class Coverage:
                     cmap="viridis_r",
                 )
             else:
-                ax.text(0.5, 0.5, f"{strength[row, column]:+.2f}", ha="center", va="center")
+                said = f"correlation\n{strength[row, column]:+.2f}"
+                ax.text(0.5, 0.5, said, ha="center", va="center", color=picture.GREY)
                 ax.set_axis_off()
             if row == count - 1:
                 ax.set_xlabel(f"{self.controls[column].name} ({self.controls[column].unit})")
@@ -120,4 +145,5 @@ def _gap(values: Floats) -> tuple[float, float]:
 def of(trained: Trained, controls: tuple[Control, ...]) -> Coverage:
     """Coverage of a trained model's controls."""
     values = np.stack([example.controls for example in trained.examples])
-    return Coverage(controls, values, np.sqrt(trained.missed))
+    performers = tuple(example.row.performer for example in trained.examples)
+    return Coverage(controls, values, np.sqrt(trained.missed), performers)

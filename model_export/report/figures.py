@@ -20,7 +20,7 @@ from model_export.train import Trained
 from service.motion.conventions import UP, Floats
 
 FRAMES = 6
-# Between two figures, and above and below them, m.
+# Between two figures, m.
 MARGIN = 0.25
 NAMED_JOINTS = 3
 
@@ -132,7 +132,7 @@ class _Stage:
     def size(self) -> tuple[float, float]:
         """Width and height of what is drawn, m."""
         top = max(float(self.truth[..., 1].max()), float(self.guess[..., 1].max()))
-        return self.step * FRAMES, top - self.floor + 2 * MARGIN
+        return self.step * FRAMES, top - self.floor + 0.5 * MARGIN
 
     def paint(self, figure: Figure) -> None:
         """Captured bodies dark, predicted ones orange, on the ground."""
@@ -156,7 +156,7 @@ class _Stage:
         ax.spines[:].set_visible(False)
         shown = {"captured": picture.INK, "predicted": picture.ORANGE}
         handles = [Line2D([], [], color=colour, label=name) for name, colour in shown.items()]
-        ax.legend(handles=handles, loc="upper left", ncols=2)
+        figure.legend(handles=handles, loc="outside upper left", ncols=2)
 
 
 def _side(truth: Floats, guess: Floats) -> Floats:
@@ -186,12 +186,13 @@ class Figures:
     def section(self) -> Section:
         """A picture a clip."""
         words = (
-            "The clips that the others predict worst, and last one of the middle. Percentages are "
-            "of canonical time; what travels over the ground is drawn about the captured root, "
-            "seen from the side that shows most of the motion.",
-            "A body that stands elsewhere or begins on the other foot is a behaviour that the "
-            "controls do not name: a further control, or a family of its own, would help more "
-            "than anything done to this one.",
+            "The clips that the others predict worst, and last one of the middle. Both bodies have "
+            "the performer's own bones. Percentages are of canonical time; each moment is drawn "
+            "about the captured root, from the side that shows most of the motion.",
+            "Where a body steps with the other foot or reaches in another way, that is a behaviour "
+            "which the controls do not name: a control for it, or a family of its own, helps more "
+            "than finer tuning. Distances here are between joints as drawn; those above are in the "
+            "metric of training, which counts large turns somewhat higher.",
         )
         pictures = tuple(pair.picture() for pair in (*self.worst, self.typical))
         return Section("figures", "The worst clips, drawn", words, pictures=pictures)

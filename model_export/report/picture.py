@@ -9,14 +9,14 @@ from matplotlib import style
 from matplotlib.figure import Figure
 
 # Dark enough for white paper, and told apart by those who see red and green alike.
-INK, FAINT, BLUE, ORANGE = "#24313f", "#b9c2cc", "#2b6ca3", "#d9660a"
+INK, GREY, FAINT, BLUE, ORANGE = "#24313f", "#7b8794", "#b9c2cc", "#2b6ca3", "#d9660a"
 WIDTH = 10.0
 # Pixels an inch of what has too many points to be drawn as lines.
 DOTS = 170
 
 _LOOK = {
     "axes.axisbelow": True,
-    "axes.edgecolor": "#7b8794",
+    "axes.edgecolor": GREY,
     "axes.grid": True,
     "axes.labelcolor": INK,
     "axes.spines.right": False,
@@ -24,7 +24,9 @@ _LOOK = {
     "axes.titlelocation": "left",
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
+    "figure.constrained_layout.w_pad": 0.08,
     "figure.dpi": 100,
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
     "font.size": 9,
     "grid.color": "#e6eaee",
     "grid.linewidth": 0.7,

@@ -82,9 +82,10 @@ class Sizes:
         all_in, core_only = self.ratios(self.chosen)
         said = (
             f"The chosen ranks {self.chosen} cost {error:.2f} cm (root mean square over joints, "
-            f"frames and clips, exact) and store {int(self.stored[self._at]):,} numbers in place "
-            f"of the tensor's {self.errors.size:,}: {all_in:.1f} to one with bases and kriging "
-            f"weights, {core_only:.1f} to one for the core alone."
+            f"frames and clips, exact in the metric of training) and store "
+            f"{int(self.stored[self._at]):,} numbers in place of the tensor's "
+            f"{self.errors.size:,}: {all_in:.1f} to one with bases and kriging weights, "
+            f"{core_only:.1f} to one for the core alone."
         )
         return Section(
             "sizes",
@@ -117,8 +118,8 @@ class Sizes:
             " × ".join(map(str, kept)),
             f"{100 * self.errors[at]:.2f}",
             f"{int(self.stored[at]):,}",
-            f"{all_in:.1f}",
-            f"{core_only:.1f}",
+            _ratio(all_in),
+            _ratio(core_only),
         )
 
     def _paint(self, figure: Figure) -> None:
@@ -148,6 +149,10 @@ class Sizes:
         title = f"ranks, with {r2} of frames"
         ax.set(xlabel="rank of degrees of freedom", ylabel="rank of samples", title=title)
         figure.colorbar(image, ax=ax, label="error (cm)")
+
+
+def _ratio(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"
 
 
 def of(trained: Trained) -> Sizes:

@@ -13,8 +13,8 @@ from model_export.train import Trained
 from service.motion.conventions import Floats
 
 MODES = ("degrees of freedom", "frames", "samples")
-# Smaller than this is rounding, and has no place on a logarithmic axis, m.
-SMALLEST = 1e-8
+# A micrometre is nothing that anyone sees, and a logarithmic axis should end somewhere, m.
+SMALLEST = 1e-6
 
 
 @dataclass(frozen=True)

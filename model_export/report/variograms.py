@@ -20,7 +20,6 @@ from service.motion.conventions import Floats
 ALONG = np.sqrt(0.5)
 # A curve through fewer lags than this would be drawn at will.
 FEWEST_LAGS = 3
-COLUMNS = 3
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,12 @@ class Variograms:
     nugget: float
     sill: float
 
+    @property
+    def _grid(self) -> tuple[int, int]:
+        """Rows and columns of panels."""
+        columns = 2 if len(self.directions) in (2, 4) else 3
+        return -(-len(self.directions) // columns), columns
+
     def facts(self) -> dict[str, Any]:
         """The pose field's parameters and every direction."""
         return {
@@ -73,7 +78,7 @@ class Variograms:
 
     def section(self) -> Section:
         """One panel a control and one for all."""
-        rows = -(-len(self.directions) // COLUMNS)
+        rows, _ = self._grid
         names = ", ".join(direction.name for direction in self.directions[:-1])
         words = (
             "Half the mean squared distance between two motions, after the drift is taken off, "
@@ -81,7 +86,8 @@ class Variograms:
             "control does not explain the motions; one that starts high, that equal controls are "
             "met by unequal motions.",
             f"The field in use was tuned by leave-one-out: {self.covariance}, nugget "
-            f"{self.nugget:.3g} of the sill.",
+            f"{self.nugget:.3g} of the sill. Its curve has the height that leave-one-out found, "
+            "which counts in how far prediction has to reach.",
         )
         caption = (
             "Pairs of clips (grey), their means by distance (blue, larger for more pairs) with a "
@@ -93,8 +99,7 @@ class Variograms:
         return Section("variograms", "Variograms", words, pictures=(drawn,))
 
     def _paint(self, figure: Figure) -> None:
-        rows = -(-len(self.directions) // COLUMNS)
-        axes = figure.subplots(rows, COLUMNS, sharey=True, squeeze=False)
+        axes = figure.subplots(*self._grid, sharey=True, squeeze=False)
         for ax in axes.ravel()[len(self.directions) :]:
             ax.remove()
         for ax, direction in zip(axes.ravel(), self.directions, strict=False):
@@ -107,7 +112,7 @@ class Variograms:
     def _panel(self, ax: Axes, direction: Direction) -> None:
         # Thousands of points are one picture within the picture.
         (cloud,) = ax.plot(direction.distances, 1e4 * direction.semivariances, ".", markersize=4)
-        cloud.set(color=picture.FAINT, alpha=0.5, rasterized=True, markeredgewidth=0)
+        cloud.set(color=picture.GREY, alpha=0.45, rasterized=True, markeredgewidth=0)
         mean, far = direction.mean, direction.distances.max(initial=0.1)
         at = np.linspace(0.0, far, 100)
         field = self.sill * (self.nugget + self._rise(at * direction.scale))

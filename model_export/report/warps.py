@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from model_export.report import left_out, picture, plain
 from model_export.report.page import Section, Table
 from model_export.train import Trained
-from model_export.warp import DENSE
+from model_export.warp import DENSE, FLOOR
 from service.motion.conventions import Floats
 
 NAMED = 3
@@ -52,7 +52,9 @@ class Warps:
         said = (
             f"Durations are {self.durations.min():.2f} to {self.durations.max():.2f} s. Every "
             f"clip's time runs evenly to a common one but for these maps; the largest stretch, "
-            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}."
+            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}. No pace may fall "
+            f"much below {FLOOR:g} of the mean: a clip near {1.0 / FLOOR:.1f} times has met that "
+            "bound, most often where it begins or ends in another phase than the others."
         )
         rows = [
             (self.labels[i], f"{self.durations[i]:.2f}", f"{self.stretches[i]:.2f}") for i in worst
