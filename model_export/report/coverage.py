@@ -110,27 +110,21 @@ class Coverage:
         axes = figure.subplots(count, count, squeeze=False)
         strength = self._correlation()
         for (row, column), ax in np.ndenumerate(axes):
-            if row == column:
-                ax.hist(self.values[:, row], bins=BINS, color=picture.BLUE)
-                ax.grid(visible=False, axis="x")
-                ax.yaxis.get_major_locator().set_params(integer=True)
-            elif row > column:
-                seen = ax.scatter(
-                    self.values[:, column],
-                    self.values[:, row],
-                    c=100 * self.missed,
-                    s=16,
-                    cmap="viridis_r",
-                )
-            else:
+            if row < column:
                 said = f"correlation\n{strength[row, column]:+.2f}"
                 ax.text(0.5, 0.5, said, ha="center", va="center", color=picture.GREY)
                 ax.set_axis_off()
-            if row == count - 1:
-                ax.set_xlabel(f"{self.controls[column].name} ({self.controls[column].unit})")
-            if column == 0:
-                name = f"{self.controls[row].name} ({self.controls[row].unit})"
-                ax.set_ylabel(name if row else "clips")
+            elif row > column:
+                x, y = self.values[:, [column, row]].T
+                seen = ax.scatter(x, y, c=100 * self.missed, s=16, cmap="viridis_r")
+            else:
+                ax.hist(self.values[:, row], bins=BINS, color=picture.BLUE)
+                ax.grid(visible=False, axis="x")
+                ax.yaxis.get_major_locator().set_params(integer=True)
+        titles = [f"{control.name} ({control.unit})" for control in self.controls]
+        for at, title in enumerate(titles):
+            axes[-1, at].set_xlabel(title)
+            axes[at, 0].set_ylabel(title if at else "clips")
         if count > 1:
             figure.colorbar(seen, ax=axes, label="missed by (cm)", shrink=0.6, aspect=30)
 

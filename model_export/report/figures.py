@@ -7,21 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from model_export.report import left_out, picture, plain
+from model_export.report import left_out, picture, plain, stage
 from model_export.report.left_out import Body
 from model_export.report.page import Section
 from model_export.report.picture import Picture
 from model_export.train import Trained
-from service.motion.conventions import UP, Floats
+from service.motion.conventions import Floats
 
-FRAMES = 6
-# Between two figures, m.
-MARGIN = 0.25
 NAMED_JOINTS = 3
 
 
@@ -92,81 +85,9 @@ class Compared:
             f"{100 * nearest.differs:.1f} cm otherwise."
         )
         alt = f"Stick figures of {self.label}: captured, and as the other clips predict it."
-        stage = _Stage.of(self)
-        height = min(3.4, picture.WIDTH * stage.size[1] / stage.size[0] + 0.5)
-        return picture.draw(f"figure-{self.index}", height, stage.paint, alt, caption)
-
-
-@dataclass(frozen=True)
-class _Stage:
-    """Segments of both bodies (F, B, 2, 2) where they are drawn; size of the whole, m."""
-
-    truth: Floats
-    guess: Floats
-    times: Floats
-    floor: float
-    step: float
-
-    @classmethod
-    def of(cls, pair: Compared) -> "_Stage":
-        """Bodies seen from the side from which most of the motion is seen."""
-        frames = np.rint(np.linspace(0, len(pair.truth.joints) - 1, FRAMES)).astype(np.int64)
-        side = _side(pair.truth.joints, pair.guess.joints)
-        view = np.stack([side, UP], axis=1)
-        root = pair.truth.joints[frames, :1] * (1.0 - UP)
-        flat = [
-            (np.concatenate([body.joints, body.tips], axis=1)[frames] - root) @ view
-            for body in (pair.truth, pair.guess)
-        ]
-        left = min(float(points[..., 0].min()) for points in flat)
-        right = max(float(points[..., 0].max()) for points in flat)
-        step = right - left + MARGIN
-        at = np.zeros((FRAMES, 1, 2))
-        at[:, 0, 0] = step * np.arange(FRAMES) - left + 0.5 * MARGIN
-        bones = np.array(pair.bones)
-        truth, guess = ((points + at)[:, bones] for points in flat)
-        times = frames / (len(pair.truth.joints) - 1)
-        return cls(truth, guess, times, float(min(0.0, truth[..., 1].min())), step)
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and height of what is drawn, m."""
-        top = max(float(self.truth[..., 1].max()), float(self.guess[..., 1].max()))
-        return self.step * FRAMES, top - self.floor + 0.5 * MARGIN
-
-    def paint(self, figure: Figure) -> None:
-        """Captured bodies dark, predicted ones orange, on the ground."""
-        ax: Axes = figure.subplots()
-        width, height = self.size
-        ax.axhline(0.0, color=picture.FAINT, linewidth=1.0)
-        for bodies, colour, wide in (
-            (self.guess, picture.ORANGE, 1.3),
-            (self.truth, picture.INK, 1.6),
-        ):
-            ax.add_collection(
-                LineCollection(list(bodies.reshape(-1, 2, 2)), colors=colour, linewidths=wide)
-            )
-        ax.set(xlim=(0.0, width), ylim=(self.floor - 0.06, self.floor + height), aspect="equal")
-        ax.set_xticks(
-            self.step * (np.arange(FRAMES) + 0.5), [f"{100 * time:.0f} %" for time in self.times]
-        )
-        ax.grid(visible=False)
-        ax.tick_params(length=0)
-        ax.yaxis.set_visible(False)
-        ax.spines[:].set_visible(False)
-        shown = {"captured": picture.INK, "predicted": picture.ORANGE}
-        handles = [Line2D([], [], color=colour, label=name) for name, colour in shown.items()]
-        figure.legend(handles=handles, loc="outside upper left", ncols=2)
-
-
-def _side(truth: Floats, guess: Floats) -> Floats:
-    """Horizontal direction (3,) across the view, along which bodies move and differ most."""
-    moved = truth - truth.mean(axis=0)
-    ways = np.concatenate([moved, truth - guess]).reshape(-1, 3) * (1.0 - UP)
-    _, vectors = np.linalg.eigh(ways.T @ ways)
-    across = vectors[:, -1]
-    # Who faces ahead faces to the right, or in a view from the front, has the left on the right.
-    return across if across[2] + 1e-3 * across[0] >= 0 else -across
+        scene = stage.of(self.truth, self.guess, self.bones)
+        height = min(3.4, picture.WIDTH * scene.size[1] / scene.size[0] + 0.5)
+        return picture.draw(f"figure-{self.index}", height, scene.paint, alt, caption)
 
 
 @dataclass(frozen=True)
@@ -192,7 +113,8 @@ class Figures:
             "Where a body steps with the other foot or reaches in another way, that is a behaviour "
             "which the controls do not name: a control for it, or a family of its own, helps more "
             "than finer tuning. Distances here are between joints as drawn; those above are in the "
-            "metric of training, which counts large turns somewhat higher.",
+            "metric of training, which counts large turns somewhat higher and, for a cycle, adds "
+            "its travel.",
         )
         pictures = tuple(pair.picture() for pair in (*self.worst, self.typical))
         return Section("figures", "The worst clips, drawn", words, pictures=pictures)

@@ -51,10 +51,10 @@ class Warps:
         worst = self._order[:NAMED]
         said = (
             f"Durations are {self.durations.min():.2f} to {self.durations.max():.2f} s. Every "
-            f"clip's time runs evenly to a common one but for these maps; the largest stretch, "
-            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}. No pace may fall "
-            f"much below {FLOOR:g} of the mean: a clip near {1.0 / FLOOR:.1f} times has met that "
-            "bound, most often where it begins or ends in another phase than the others."
+            "clip's time runs evenly to a common one but for these maps; the largest stretch, "
+            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}. Alignment lets "
+            f"no part pass at less than about {FLOOR:g} of the clip's mean pace: a clip near "
+            f"{1.0 / FLOOR:.1f} times has met that bound."
         )
         rows = [
             (self.labels[i], f"{self.durations[i]:.2f}", f"{self.stretches[i]:.2f}") for i in worst
