@@ -42,11 +42,27 @@ class Clips:
         """Root mean square over all clips, m."""
         return float(np.sqrt(np.mean(np.square(self.missed))))
 
+    @property
+    def by_performer(self) -> dict[str, tuple[int, float]]:
+        """How many clips each performer has, and their root mean square, m; worst first."""
+        own = {
+            name: np.array(
+                [m for m, p in zip(self.missed, self.performers, strict=True) if p == name]
+            )
+            for name in sorted(set(self.performers) - {""})
+        }
+        means = {name: (len(m), float(np.sqrt(np.mean(m**2)))) for name, m in own.items()}
+        return dict(sorted(means.items(), key=lambda item: -item[1][1]))
+
     def facts(self) -> dict[str, Any]:
         """Every clip, the worst first."""
         named = zip(self.files, self.performers, self.missed, self.controls, strict=True)
         return {
             "rms_m": plain.number(self.mean),
+            "performers": [
+                {"performer": name, "clips": count, "rms_m": plain.number(mean)}
+                for name, (count, mean) in self.by_performer.items()
+            ],
             "clips": [
                 {
                     "clip": file,
@@ -74,9 +90,17 @@ class Clips:
             "Orange clips are drawn below; the dashed line is the root mean square."
         )
         drawn = picture.draw("clips", 3.0, self._paint, alt, caption)
-        return Section("clips", "Every clip left out", (said,), (self._table(),), (drawn,))
+        return Section("clips", "Every clip left out", (said,), self._tables(), (drawn,))
 
-    def _table(self) -> Table:
+    def _tables(self) -> tuple[Table, ...]:
+        rows = tuple(
+            (name, str(count), f"{100 * mean:.2f}")
+            for name, (count, mean) in self.by_performer.items()
+        )
+        own = Table(("performer", "clips", "cm"), rows)
+        return (self._named(), own) if rows else (self._named(),)
+
+    def _named(self) -> Table:
         rows = [
             (file, performer, f"{100 * missed:.2f}", *(f"{value:.4g}" for value in given))
             for file, performer, missed, given in zip(

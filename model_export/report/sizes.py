@@ -144,7 +144,7 @@ class Sizes:
         if levels:
             lines = ax.contour(*at, shown, levels, colors=picture.INK, linewidths=0.7)
             ax.clabel(lines, fmt="%g cm", fontsize=8)
-        ax.plot(r1, r3, "o", color=picture.ORANGE)
+        ax.plot(r1, r3, "o", color=picture.ORANGE, clip_on=False)
         ax.grid(visible=False)
         title = f"ranks, with {r2} of frames"
         ax.set(xlabel="rank of degrees of freedom", ylabel="rank of samples", title=title)

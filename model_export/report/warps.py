@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from model_export.report import left_out, picture, plain
@@ -13,6 +14,10 @@ from model_export.warp import DENSE, FLOOR
 from service.motion.conventions import Floats
 
 NAMED = 3
+# Of the largest stretch that there can be; the increments that it bounds are smoothed.
+NEAR = 0.85
+# First and last share of a clip, where a stretch means that it was cut at another phase.
+ENDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -24,10 +29,25 @@ class Warps:
     durations: Floats
 
     @property
-    def stretches(self) -> Floats:
-        """How many times slower or faster (N,) than its mean pace each clip is somewhere made."""
+    def _factors(self) -> Floats:
+        """How many times slower or faster (N, 500) than its mean pace each clip is made."""
         slopes = np.diff(self.maps, axis=1) / np.diff(DENSE)
-        return np.maximum(slopes.max(axis=1), 1.0 / slopes.min(axis=1))
+        return np.maximum(slopes, 1.0 / slopes)
+
+    @property
+    def stretches(self) -> Floats:
+        """The largest stretch (N,) of each clip, of its pace or the inverse."""
+        return self._factors.max(axis=1)
+
+    @property
+    def places(self) -> Floats:
+        """Where in each clip (N,) that is, as a share of its time."""
+        return DENSE[np.argmax(self._factors, axis=1)]
+
+    @property
+    def bound(self) -> npt.NDArray[np.bool_]:
+        """Which clips (N,) have all but met the bound that alignment sets."""
+        return self.stretches > NEAR / FLOOR
 
     @property
     def _order(self) -> list[int]:
@@ -41,6 +61,8 @@ class Warps:
                     "clip": self.labels[i],
                     "duration_s": plain.number(self.durations[i]),
                     "largest_stretch": plain.number(self.stretches[i]),
+                    "at_share": plain.number(self.places[i]),
+                    "at_the_bound": bool(self.bound[i]),
                 }
                 for i in self._order
             ]
@@ -52,13 +74,17 @@ class Warps:
         said = (
             f"Durations are {self.durations.min():.2f} to {self.durations.max():.2f} s. Every "
             "clip's time runs evenly to a common one but for these maps; the largest stretch, "
-            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}. Alignment lets "
-            f"no part pass at less than about {FLOOR:g} of the clip's mean pace: a clip near "
-            f"{1.0 / FLOOR:.1f} times has met that bound."
+            f"{self.stretches[worst[0]]:.2f} times, is in {self.labels[worst[0]]}."
         )
-        rows = [
-            (self.labels[i], f"{self.durations[i]:.2f}", f"{self.stretches[i]:.2f}") for i in worst
-        ]
+        rows = tuple(
+            (
+                self.labels[i],
+                f"{self.durations[i]:.2f}",
+                f"{self.stretches[i]:.2f}",
+                f"{100 * self.places[i]:.0f} %",
+            )
+            for i in worst
+        )
         drawn = picture.draw(
             "warps",
             3.5,
@@ -67,8 +93,20 @@ class Warps:
             "Left: from each clip's own time to canonical time; a straight diagonal is no warp. "
             "Right: how much the pace of each clip was changed where it was changed most, sorted.",
         )
-        table = Table(("stretched most", "duration (s)", "times"), tuple(rows))
-        return Section("warps", "Alignment in time", (said,), (table,), (drawn,))
+        table = Table(("stretched most", "duration (s)", "times", "at"), rows)
+        return Section("warps", "Alignment in time", (said, self._bounded()), (table,), (drawn,))
+
+    def _bounded(self) -> str:
+        met = int(self.bound.sum())
+        rule = f"Alignment lets no part pass at less than about {FLOOR:g} of the clip's mean pace"
+        if not met:
+            return f"{rule}: no clip comes near that."
+        ends = int(np.sum(self.bound & (np.abs(self.places - 0.5) > 0.5 - ENDS)))
+        return (
+            f"{rule}: {met} of {len(self.maps)} clips have met that bound, {ends} of them in the "
+            "first or last tenth. There it mostly means that a clip was cut at another phase "
+            "than the others; further in, that it pauses where they do not."
+        )
 
     def _paint(self, figure: Figure) -> None:
         left, right = figure.subplots(1, 2)

@@ -66,6 +66,14 @@ def test_every_clip_is_there_the_worst_first(facts, trained):
     assert facts["figures"]["worst"][0]["clip"] == left_out.label(worst)
 
 
+def test_performers_add_up_to_all_clips(trained, controls):
+    found = clips.of(trained, controls)
+    counts, means = np.array(list(found.by_performer.values())).T
+    assert counts.sum() == len(trained.missed) and np.all(np.diff(means) <= 0.0)
+    assert counts @ means**2 == pytest.approx(trained.missed.sum())
+    assert counts @ means**2 != pytest.approx(len(counts) * trained.missed.mean())
+
+
 def test_spectra_add_up_to_the_tensor(trained):
     total = trained.tensor.rms(np.sum(np.square(trained.tensor.values))) ** 2
     for carried in spectra.of(trained).carried:
@@ -164,6 +172,10 @@ def test_the_largest_stretch_is_that_of_the_slope_or_its_inverse():
     maps = np.stack([np.interp(DENSE, knees, [0.0, middle, 1.0]) for middle in (0.5, 0.25, 0.9)])
     found = Warps(maps, ("even", "slow first", "fast first"), np.ones(3))
     assert found.stretches == pytest.approx([1.0, 2.0, 5.0])
+    assert found.places[1] == 0.0 and found.places[2] == pytest.approx(0.5)
+    assert found.bound.tolist() == [False, False, False]
+    steep = np.interp(DENSE, knees, [0.0, 0.95, 1.0])[None]
+    assert Warps(steep, ("steep",), np.ones(1)).bound.tolist() == [True]
     named = [clip["clip"] for clip in found.facts()["clips"]]
     assert named == ["fast first", "slow first", "even"]
 
