@@ -103,7 +103,7 @@ class Warps:
             return f"{rule}: no clip comes near that."
         ends = int(np.sum(self.bound & (np.abs(self.places - 0.5) > 0.5 - ENDS)))
         return (
-            f"{rule}: {met} of {len(self.maps)} clips have met that bound, {ends} of them in the "
+            f"{rule}: {met} of {len(self.maps)} clips met that bound, {ends} of them in the "
             "first or last tenth. There it mostly means that a clip was cut at another phase "
             "than the others; further in, that it pauses where they do not."
         )
@@ -117,7 +117,7 @@ class Warps:
         left.plot([0, 1], [0, 1], color=picture.INK, linewidth=0.8, linestyle="--")
         for i, style in zip(worst, ("-", "--", ":"), strict=False):
             left.plot(DENSE, self.maps[i], style, color=picture.ORANGE, label=self.labels[i])
-        left.legend(loc="upper left", fontsize=7.5)
+        left.legend(loc="lower right", fontsize=7.5)
         left.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")
         colours = [picture.ORANGE if rank < NAMED else picture.BLUE for rank in range(len(order))]
         right.bar(np.arange(len(order)), self.stretches[order], width=0.72, color=colours)
