@@ -1,6 +1,7 @@
 """The training job's commands: `sample` and `train`."""
 
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from service.motion.errors import InvalidField
 
 if TYPE_CHECKING:
     from model_export.export import Exported
+    from model_export.train import Trained
 
 
 def commands(app: typer.Typer) -> None:
@@ -55,6 +57,10 @@ def train_command(
     data: Annotated[
         Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="the .html file to write on the training, with a .json beside it"),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Train a recipe's model and write it as one .onnx file."""
@@ -63,20 +69,50 @@ def train_command(
 
     if output.suffix != ".onnx":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
-    started = time.perf_counter()
-
-    def report(step: str) -> None:
-        typer.echo(f"{time.perf_counter() - started:6.1f} s  {step}", err=True)
-
-    report(f"reading {recipe_file}")
+    if report and report.suffix != ".html":
+        raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
+    progress = _Progress()
+    progress(f"reading {recipe_file}")
     own = recipe.read(recipe_file)
     examples, notes = ingest.ingest(own, data or recipe_file.parent)
-    trained = train.train(own, examples, report)
-    report("writing the graph and comparing it with the reference")
+    trained = train.train(own, examples, progress)
+    progress("writing the graph and comparing it with the reference")
     exported = export.export(own, trained, notes)
     files.write(exported.content, output)
-    report("done")
+    if report:
+        progress("drawing the report")
+        _write_report(trained, exported, progress, report)
+    progress("done")
     typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
+
+
+class _Progress:
+    """Says each step as it begins, and remembers when that was."""
+
+    def __init__(self) -> None:
+        self._begun: list[tuple[str, float]] = []
+
+    def __call__(self, step: str) -> None:
+        self._begun.append((step, time.perf_counter()))
+        typer.echo(f"{self._begun[-1][1] - self._begun[0][1]:6.1f} s  {step}", err=True)
+
+    @property
+    def finished(self) -> list[tuple[str, float]]:
+        """Steps that another has followed, and how long each took, s."""
+        return [(step, end - start) for (step, start), (_, end) in pairwise(self._begun)]
+
+
+def _write_report(
+    trained: "Trained", exported: "Exported", progress: _Progress, path: Path
+) -> None:
+    # Nobody who wants no pictures waits for matplotlib, or needs it.
+    from model_export.report import render
+    from model_export.report.about import Step
+
+    steps = [Step(name, seconds) for name, seconds in progress.finished]
+    rendered = render.render(trained, exported, steps)
+    files.write(rendered.html, path)
+    files.write(rendered.json, path.with_suffix(".json"))
 
 
 def _facts(exported: "Exported", output: Path) -> dict[str, Any]:

@@ -216,6 +216,42 @@ def test_a_model_is_an_onnx_file(refused, train_words, tmp_path):
     assert said == "output: 'quick.bin', expected a name that ends in .onnx"
 
 
+def test_train_writes_a_report_where_one_is_asked_for(posefield, train_words, tmp_path):
+    words = (*train_words, "-o", tmp_path / "quick.onnx")
+    page = tmp_path / "told" / "quick.html"
+    code, _, err = posefield(*words, "--report", page)
+    assert code == 0
+    told = json.loads(page.with_suffix(".json").read_text())
+    assert [p.name for p in sorted(page.parent.iterdir())] == ["quick.html", "quick.json"]
+    steps = [line.split(" s  ")[1] for line in err.splitlines()]
+    assert [step["step"] for step in told["about"]["steps"]] == steps[:-2]
+    assert steps[-2:] == ["drawing the report", "done"]
+    assert told["about"]["bytes"] == (tmp_path / "quick.onnx").stat().st_size
+    assert page.read_text().startswith("<!DOCTYPE html>")
+
+
+def test_a_report_changes_nothing_in_the_model(posefield, train_words, tmp_path):
+    told, quiet = tmp_path / "told.onnx", tmp_path / "quiet.onnx"
+    assert posefield(*train_words, "-o", told, "--report", tmp_path / "told.html")[0] == 0
+    assert posefield(*train_words, "-o", quiet)[0] == 0
+    assert told.read_bytes() == quiet.read_bytes()
+
+
+def test_a_report_is_a_html_file(refused, train_words, tmp_path):
+    words = (*train_words, "-o", tmp_path / "quick.onnx", "--report", tmp_path / "quick.pdf")
+    assert refused(2, *words) == "report: 'quick.pdf', expected a name that ends in .html"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_that_cannot_be_written_leaves_no_half_of_it(posefield, train_words, tmp_path):
+    page = tmp_path / "told" / "quick.html"
+    page.mkdir(parents=True)
+    words = (*train_words, "-o", tmp_path / "quick.onnx", "--report", page)
+    said = refused_after_progress(posefield, 3, *words)
+    assert said.startswith(f"{page}: cannot be written: ")
+    assert [p.name for p in page.parent.iterdir()] == ["quick.html"]
+
+
 def test_inspect_answers_as_json(posefield, model_path):
     code, out, _ = posefield("inspect", model_path, "--json")
     assert code == 0

@@ -1,0 +1,1 @@
+"""The training report: one page with pictures, and its numbers as JSON."""

@@ -1,0 +1,85 @@
+"""What is drawn as predicted is what the other clips predict."""
+
+import numpy as np
+import pytest
+
+from model_export import align, kriging
+from model_export.report import figures, left_out
+
+# Two ways to one solution of the same equations differ by rounding, m.
+ROUNDING = 1e-8
+# A change that would be seen in a drawing, m.
+SEEN = 1e-3
+
+
+def slices(trained):
+    """Whole motions as rows (N, D' T) of the tensor, truncated nowhere."""
+    return trained.tensor.values.transpose(2, 0, 1).reshape(len(trained.examples), -1)
+
+
+def predicted(trained, kept, clip):
+    """Slice (D', T) at a clip's controls by kriging from the kept clips, nothing tuned anew."""
+    samples = trained.model.bank.pose.samples
+    field = kriging.solve(trained.pose.hyper, samples[kept], slices(trained)[kept])
+    return field.predict(samples[[clip]]).reshape(trained.tensor.values.shape[:2])
+
+
+@pytest.fixture(scope="module", params=["worst", "first", "last"])
+def clip(request, trained):
+    return {"worst": int(np.argmax(trained.missed)), "first": 0, "last": len(trained.missed) - 1}[
+        request.param
+    ]
+
+
+def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
+    everyone = np.arange(len(trained.examples))
+    found = left_out.motion(trained, clip)
+    alone = predicted(trained, everyone[everyone != clip], clip)
+    assert np.abs(found - alone).max() < ROUNDING
+    # Negative control: with the clip itself the prediction is another.
+    assert np.abs(found - predicted(trained, everyone, clip)).max() > SEEN
+    # Negative control: so it is where one more clip is missing.
+    fewer = everyone[(everyone != clip) & (everyone != (clip + 1) % len(everyone))]
+    assert np.abs(found - predicted(trained, fewer, clip)).max() > 100 * ROUNDING
+
+
+def test_its_distance_from_the_capture_is_what_training_measured(trained, clip):
+    gap = trained.tensor.values[:, :, clip] - left_out.motion(trained, clip)
+    frames = gap.shape[1]
+    assert np.sum(gap**2) / (trained.tensor.weight * frames) == pytest.approx(trained.missed[clip])
+
+
+def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
+    offsets = np.stack([example.offsets for example in trained.examples])
+    expected = align.positions(trained.aligned, trained.skeleton.parents, offsets)[clip]
+    body = left_out.body(trained, clip, trained.tensor.values[:, :, clip])
+    assert np.abs(body.joints - expected).max() < ROUNDING
+    guess = left_out.body(trained, clip, left_out.motion(trained, clip))
+    assert np.abs(guess.joints - expected).max() > SEEN
+
+
+def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
+    own = trained.examples[clip].clip.skeleton
+    body = left_out.body(trained, clip, left_out.motion(trained, clip))
+    bones = np.linalg.norm(body.tips - body.joints[:, list(own.tip_joints)], axis=-1)
+    assert np.abs(bones - np.linalg.norm(own.tip_offsets, axis=-1)).max() < ROUNDING
+
+
+def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained, clip):
+    """To first order they are one: a fifth is what poses this far apart make of it."""
+    pair = figures.compare(trained, clip)
+    assert pair.apart == pytest.approx(np.sqrt(trained.missed[clip]), rel=0.2)
+    other = figures.compare(trained, int(np.argmin(trained.missed)))
+    assert other.apart != pytest.approx(np.sqrt(trained.missed.max()), rel=0.2)
+
+
+def test_the_nearest_clip_is_the_nearest(trained, clip):
+    pair = figures.compare(trained, clip)
+    points = left_out.points(trained)
+    distances = np.linalg.norm(points - points[clip], axis=1)
+    distances[clip] = np.inf
+    assert pair.nearest.distance == distances.min()
+    other = int(np.argmin(distances))
+    gap = np.sum(np.square(slices(trained)[clip] - slices(trained)[other]))
+    shared = trained.tensor.weight * trained.tensor.values.shape[1]
+    assert pair.nearest.differs == pytest.approx(np.sqrt(gap / shared))

@@ -1,0 +1,23 @@
+"""A report of a family that lacks what others have: performers, pairs enough, a second control."""
+
+import json
+
+import numpy as np
+import pytest
+from minimal import recipe_with, small_clip, write_clips
+
+from model_export import export, ingest, train
+from model_export.report import render
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path, cyclic):
+    clips = [small_clip(0.3 * np.sin(i), 21 + i % 3) for i in range(8)]
+    recipe = recipe_with(motion={"cyclic": cyclic})
+    examples, notes = ingest.ingest(recipe, write_clips(tmp_path, clips))
+    trained = train.train(recipe, examples, lambda _: None)
+    rendered = render.render(trained, export.export(recipe, trained, notes), [])
+    facts = json.loads(rendered.json)
+    assert ("travel" in facts["fields"]) == cyclic
+    assert facts["coverage"]["one_value_a_performer"] == []
+    assert [clip["performer"] for clip in facts["clips"]["clips"]] == [""] * 8
