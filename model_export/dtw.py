@@ -13,8 +13,8 @@ def warp(sequences: Floats, reference: Floats) -> Floats:
     """Reference phase (N, F) in [0, 1] at each of the F frames of sequences (N, F, features).
 
     reference (F, features), or one for each sequence (N, F, features), has as many frames as the
-    sequences: resample them first, so that the slope limit means the same for all. The end points are fixed. Cells that a step jumps over
-    are paid for, so that long steps bring no gain.
+    sequences: resample them first, so that the slope limit means the same for all. The end points
+    are fixed. Cells that a step jumps over are paid for, so that long steps bring no gain.
     """
     costs = _distances(sequences, reference)
     best, choices = _accumulate(costs)

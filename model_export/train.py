@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from model_export import (
     align,
@@ -45,10 +46,11 @@ class Trained:
     """A model with what it was made from and what was seen on the way.
 
     examples: in an order of their own, so that the model does not depend on the table's. pose: the
-    tuned pose field. values: what each field is laid through (N, m), the pose's as whole motions in
+    tuned pose field. values: what each field is laid through (N, m), the pose's whole motions in
     the coordinates of the sample mode. missed (N,): mean squared joint distance, m², of each clip
-    from what all others predict for it. explained: for each field the share of the variation between clips that
-    leave-one-out predicts from the controls; one at or below zero is answered with its mean.
+    from what all others predict for it. explained: for each field the share of the variation
+    between clips that leave-one-out predicts from the controls; one at or below zero is answered
+    with its mean.
     fidelity: what the truncation costs.
     """
 
@@ -86,6 +88,13 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
 
     Raises TrainingError where the samples cannot carry a field.
     """
+    # Matrices this small gain nothing from more threads, and a sum's order would hang on how many
+    # the machine has: one thread makes the same bytes everywhere.
+    with threadpool_limits(1):
+        return _train(recipe, examples, report)
+
+
+def _train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Trained:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
     kriging.check(given, names, max(map(max, recipe.kriging.drifts)), recipe.kriging.nugget == 0)

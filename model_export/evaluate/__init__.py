@@ -1,1 +1,1 @@
-"""How far a model's motions lie from captured ones it has not seen, beside what else one could do."""
+"""How far a model's motions lie from captured ones that it has not seen, beside its peers'."""

@@ -1,7 +1,7 @@
 """How far one motion lies from another: numbers of one clip, in metres, and their means."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -122,13 +122,25 @@ def skate(motion: Motion, feet: tuple[int, ...]) -> float:
 def mean(errors: Sequence[Errors]) -> Errors:
     """Means over clips; root mean squares are pooled, the largest is the largest of all, and the
     duration's error is a root mean square."""
-    numbers = {f.name: [getattr(e, f.name) for e in errors] for f in fields(Errors)}
-    pooled = {
-        name: _pool(values) if isinstance(values[0], Distances) else float(np.mean(values))
-        for name, values in numbers.items()
-    }
-    pooled["duration"] = float(np.sqrt(np.mean(np.square(numbers["duration"]))))
-    return Errors(**pooled)
+
+    def pooled(name: str) -> Distances:
+        return _pool([getattr(error, name) for error in errors])
+
+    def average(name: str) -> float:
+        return float(np.mean([getattr(error, name) for error in errors]))
+
+    return Errors(
+        relative=pooled("relative"),
+        absolute=pooled("absolute"),
+        plain_relative=pooled("plain_relative"),
+        plain_absolute=pooled("plain_absolute"),
+        shell=pooled("shell"),
+        effector=average("effector"),
+        acceleration=average("acceleration"),
+        skate=average("skate"),
+        skate_captured=average("skate_captured"),
+        duration=float(np.sqrt(np.mean(np.square([error.duration for error in errors])))),
+    )
 
 
 def _pool(parts: Sequence[Distances]) -> Distances:

@@ -100,9 +100,7 @@ def _numbers(trained: Trained, coefficients: Floats) -> Floats:
     return trained.tensor.mean + table @ trained.tensor.unwhiten.T
 
 
-def _naive(
-    trained: Trained, laid: Samples, beside: dict[str, Floats], points: Floats
-) -> _Values:
+def _naive(trained: Trained, laid: Samples, beside: dict[str, Floats], points: Floats) -> _Values:
     """Kriging of every frame by itself; all else the same way, as one frame."""
     known, asked = laid.points[:, : laid.controls], points[:, : laid.controls]
     vectors = _numbers(trained, beside["pose"])

@@ -5,6 +5,7 @@ given everything that is kriged: reduced motions, bone offsets, duration, warp a
 """
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RBFInterpolator
@@ -29,7 +30,10 @@ def _controls(samples: Samples, queries: Floats) -> tuple[Floats, Floats]:
     return samples.points[:, : samples.controls], queries[:, : samples.controls]
 
 
-def _rbf(kernel: str) -> Peer:
+Kernel = Literal["thin_plate_spline", "linear", "cubic"]
+
+
+def _rbf(kernel: Kernel) -> Peer:
     def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
         known, asked = _controls(samples, queries)
         return RBFInterpolator(known, values, kernel=kernel, degree=1, smoothing=0.0)(asked)
