@@ -33,8 +33,8 @@ def html(description: str, results: Sequence[Result]) -> bytes:
         ("duration error", f"{100 * first.mean.duration:.1f} %"),
         ("sigma ratio (1 is right)", f"{summary.sigma_ratio(results[0]):.2f}"),
     ]
-    title = f"{results[0].family}: evaluation"
-    return page.html(title, description, figures, [*sections, _methods(results[0])]).encode()
+    body = [*sections, _methods(results[0])]
+    return page.html("evaluation", results[0].family, description, figures, body).encode()
 
 
 def _section(result: Result) -> Section:
@@ -135,9 +135,9 @@ def _paint_calibration(result: Result, figure: Figure) -> None:
     actual = 100 * np.sqrt([error.squared for error in result.errors[OURS]])
     sigma = 100 * result.sigma
     ax.plot(sigma, actual, ".", color=picture.BLUE, rasterized=len(actual) > WORST**3)
-    far = 1.05 * max(sigma.max(), actual.max())
+    far = 1.1 * float(sigma.max())
     ax.plot([0, far], [0, far], color=picture.GREY, linewidth=0.8)
-    ax.set(xlabel="sigma (cm)", ylabel="actual (cm)", title="sigma", xlim=(0, far), ylim=(0, far))
+    ax.set(xlabel="sigma (cm)", ylabel="actual (cm)", title="sigma", xlim=(0, far))
 
 
 def _spread(result: Result) -> Section:
