@@ -52,7 +52,7 @@ def main() -> None:
     try:
         app()
     except ModuleNotFoundError as fault:
-        typer.echo(f"posefield: needs {fault.name}: install posefield[train]", err=True)
+        typer.echo(f"posefield: needs {fault.name}: install posefield[train,evaluate]", err=True)
         sys.exit(2)
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)

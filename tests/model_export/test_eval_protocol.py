@@ -1,0 +1,320 @@
+"""What is held out has no say, and what is reported is what was measured."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from minimal import plain_recipe, small_clip, write_clips
+
+from model_export import ingest
+from model_export.evaluate import errors, folds, methods, motion, protocol, render, summary
+from model_export.evaluate.methods import Asked
+from model_export.recipe import Recipe
+from model_export.train import train
+from service import cli
+from service.motion.errors import TrainingError
+
+CLIPS = 12
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Small motions of two performers, who swing their arms unlike each other."""
+    rng = np.random.Generator(np.random.PCG64(3))
+    clips = [
+        small_clip(0.4 * np.sin(0.5 * i) + 0.5 * (i % 2) + 0.02 * rng.standard_normal(), 21 + i)
+        for i in range(CLIPS)
+    ]
+    path = write_clips(tmp_path_factory.mktemp("eval") / "small", clips)
+    rows = [f"{i}.bvh,{i},{'ab'[i % 2]}" for i in range(CLIPS)]
+    (path / "clips.csv").write_text("\n".join(["file,v,who", *rows]) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def recipe():
+    plain = plain_recipe()
+    plain["clips"]["performer"] = "who"
+    plain["kriging"] = {"label": "performer"}
+    plain["event"] = {"joint": "LeftHand", "at": "end"}
+    plain["motion"]["feet"] = ["LeftHand"]
+    return Recipe.model_validate(plain)
+
+
+@pytest.fixture(scope="module")
+def family(recipe, folder):
+    return ingest.ingest(recipe, folder)[0]
+
+
+@pytest.fixture(scope="module")
+def results(recipe, family):
+    said = []
+    found = [
+        protocol.run(recipe, family, name, lambda done, parts: said.append((done, parts)))
+        for name in ("clip", "performer")
+    ]
+    return found, said
+
+
+def test_every_clip_is_held_out_once_with_all_of_its_take(family):
+    same = [
+        replace(e, row=replace(e.row, place=family[i // 3].row.place)) for i, e in enumerate(family)
+    ]
+    for examples, parts in ((family, CLIPS), (same, CLIPS // 3)):
+        own = folds.clips(examples)
+        assert sorted(i for fold in own for i in fold.held) == list(range(CLIPS))
+        assert len(own) == parts
+        for fold in own:
+            rest, held = fold.split(examples)
+            assert not {e.row.place for e in rest} & {e.row.place for e in held}
+
+
+def test_many_takes_are_dealt_into_parts_of_whole_takes(family):
+    def take(i):
+        return replace(family[0].row, place=family[0].row.place.with_name(f"{i // 2:03}.bvh"))
+
+    many = [replace(family[0], row=take(i)) for i in range(2 * folds.MANY + 6)]
+    own = folds.clips(many)
+    assert len(own) == folds.PARTS
+    assert sorted(i for fold in own for i in fold.held) == list(range(len(many)))
+    assert all(set(fold.held) == {i ^ 1 for i in fold.held} for fold in own)
+
+
+def test_performers_are_held_out_whole(family):
+    assert [set(fold.held) for fold in folds.performers(family)] == [
+        set(range(0, CLIPS, 2)),
+        set(range(1, CLIPS, 2)),
+    ]
+
+
+def answers(recipe, family, held):
+    """Everyone's joints for one clip that is held out."""
+    rest = [example for i, example in enumerate(family) if i != held]
+    trained = train(recipe, rest, lambda _: None)
+    example = family[held]
+    found = methods.answers(recipe, trained, Asked(example.controls[None], [example.row.performer]))
+    return {name: motions[0].points for name, motions in found.motions.items()}
+
+
+def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, results):
+    """The protocol's errors are those of a model that never saw the clip."""
+    held = 4
+    by_hand = answers(recipe, family, held)
+    event = motion.Event(recipe_joint(family), 1.0)
+    true = motion.of_clip(family[held].clip, event)
+    feet = (recipe_joint(family),)
+    for name, points in by_hand.items():
+        own = motion.Motion(points, 1.0, None)
+        expected = errors.compare(own, true, feet).relative.mean
+        assert results[0][0].errors[name][held].relative.mean == pytest.approx(expected, abs=1e-9)
+    # Negative control: a model that saw it comes nearer.
+    trained = train(recipe, family, lambda _: None)
+    asked = Asked(family[held].controls[None], [family[held].row.performer])
+    seen = methods.answers(recipe, trained, asked).motions["thin_plate"][0]
+    told = errors.compare(seen, true, feet).relative.mean
+    assert told < 0.5 * results[0][0].errors["thin_plate"][held].relative.mean
+
+
+def recipe_joint(family):
+    return family[0].clip.skeleton.names.index("LeftHand")
+
+
+def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
+    trained = train(recipe, family, lambda _: None)
+    ordered = trained.examples
+    asked = Asked(np.stack([e.controls for e in ordered]), [e.row.performer for e in ordered])
+    found = methods.answers(recipe, trained, asked).motions["thin_plate"]
+    event = motion.Event(recipe_joint(family), 1.0)
+    captured = [motion.of_clip(example.clip, event) for example in ordered]
+    for own, true in zip(found, captured, strict=True):
+        assert own.duration == pytest.approx(true.duration)
+
+    def farthest(motions):
+        pairs = zip(motions, captured, strict=True)
+        return max(errors.compare(own, true, ()).plain_absolute.mean for own, true in pairs)
+
+    # What is lost is resampling to 20 frames and back.
+    assert farthest(found) < 0.005
+    assert farthest(found[1:] + found[:1]) > 0.015
+
+
+def test_all_methods_are_asked_the_same_clips(results):
+    (clips, performers), _ = results
+    assert set(clips.errors) == {"posefield", "naive", *methods.PEERS}
+    assert all(len(found) == CLIPS for r in (clips, performers) for found in r.errors.values())
+    assert clips.protocol == "leave_one_clip_out"
+    assert performers.protocol == "leave_one_performer_out"
+    assert len(clips.sigma) == CLIPS
+
+
+def test_an_unknown_performer_is_trusted_less(results):
+    (clips, performers), _ = results
+    assert performers.sigma.mean() > clips.sigma.mean()
+
+
+def test_progress_is_told(results):
+    _, said = results
+    assert said == [*((i + 1, CLIPS) for i in range(CLIPS)), (1, 2), (2, 2)]
+
+
+def test_without_labels_rows_that_would_repeat_others_are_left_out(recipe, family):
+    plain = recipe.model_copy(update={"kriging": recipe.kriging.model_copy(update={"label": None})})
+    trained = train(plain, family, lambda _: None)
+    found = methods.answers(plain, trained, Asked(family[0].controls[None], [""])).motions
+    assert not set(methods.LABELLED) & set(found)
+    assert {"gp", "nearest"} <= set(found)
+
+
+def test_what_cannot_be_trained_is_named(recipe, family):
+    few = family[:4]
+    with pytest.raises(TrainingError, match=r"held out: 2 samples, expected at least 3"):
+        protocol.run(recipe, few, "performer", lambda done, parts: None)
+
+
+def test_a_recipe_says_what_can_be_asked(recipe, family):
+    assert protocol.protocols(recipe, family) == ["clip", "performer"]
+    alone = [replace(e, row=replace(e.row, performer="a")) for e in family]
+    assert protocol.protocols(recipe, alone) == ["clip"]
+    known = recipe.model_copy(update={"truth": "reaching"})
+    assert protocol.protocols(known, alone) == ["truth", "clip"]
+
+
+def test_facts_are_what_was_measured(results):
+    result = results[0][0]
+    facts = summary.facts(result)
+    assert (facts["family"], facts["protocol"], facts["clips"]) == (
+        "tiny",
+        "leave_one_clip_out",
+        CLIPS,
+    )
+    for name, own in facts["methods"].items():
+        relative = [100 * error.relative.mean for error in result.errors[name]]
+        assert own["relative_cm"] == pytest.approx(np.mean(relative), rel=1e-5)
+        expected = np.std(relative, ddof=1) / np.sqrt(CLIPS)
+        assert own["standard_error_cm"] == pytest.approx(expected, rel=1e-5)
+    ours = [error.squared for error in result.errors["posefield"]]
+    assert facts["sigma_ratio"] == pytest.approx(np.mean(ours / result.sigma**2), rel=1e-5)
+    assert facts["methods"]["mean"]["difference_cm"] == pytest.approx(
+        facts["methods"]["mean"]["relative_cm"] - facts["methods"]["posefield"]["relative_cm"],
+        abs=1e-4,
+    )
+    json.dumps(facts, allow_nan=False)
+
+
+def test_the_table_has_a_row_for_every_method(results):
+    lines = summary.table(results[0][0]).splitlines()
+    assert len({len(line) for line in lines[2:]}) == 1
+    rows = [line.split("|")[1].strip() for line in lines[4:]]
+    assert rows == list(results[0][0].errors)
+
+
+def test_the_page_is_the_same_twice_and_loads_nothing(results):
+    html = render.html("small motions", results[0])
+    assert html == render.html("small motions", results[0])
+    text = html.decode()
+    for name in methods.DEFINITIONS:
+        assert name in text
+    assert 'src="' not in text and "@import" not in text
+    assert text.count("<svg") == 3 * len(results[0])
+
+
+@pytest.fixture(scope="module")
+def truth_result(small_recipe, examples):
+    from model_export.evaluate import truth
+
+    return protocol.against_truth(small_recipe, examples[::2], truth.points(6), lambda a, b: None)
+
+
+def test_truth_is_asked_where_bodies_can_be_and_is_reproducible():
+    from model_export.evaluate import truth
+    from model_export.sample import controls
+
+    points = truth.points(200)
+    assert np.array_equal(points[:10], truth.points(10))
+    for point in points:
+        controls.parse(list(point))
+    low, high = np.array([r[:2] for r in controls.RANGES.values()]).T
+    spread = (points - low) / (high - low)
+    assert (spread.std(axis=0) > 0.2).all()
+
+
+def test_the_truth_is_nearer_to_a_model_than_to_the_mean(truth_result):
+    means = {one.name: one.mean.relative.mean for one in summary.of(truth_result)}
+    assert means["posefield"] < 0.5 * means["mean"]
+    assert means["posefield"] < means["nearest"]
+
+
+def run(monkeypatch, *words):
+    """Exit code of the command line."""
+    monkeypatch.setattr(sys, "argv", ["posefield", *map(str, words)])
+    try:
+        cli.main()
+    except SystemExit as done:
+        return done.code
+    return 0
+
+
+def test_the_command_writes_what_it_prints(tmp_path, folder, monkeypatch, capsys):
+    path, found, page = (tmp_path / name for name in ("tiny.toml", "found.json", "found.html"))
+    path.write_text(TOML)
+    words = ("evaluate", path, "--data", folder, "--protocol", "performer")
+    assert run(monkeypatch, *words, "--json", found, "--report", page) == 0
+    facts = json.loads(found.read_text())
+    assert facts["protocol"] == "leave_one_performer_out" and facts["others"] == []
+    assert "| thin_plate_smoothed" in capsys.readouterr().out
+    assert page.read_text().startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--protocol", "truth"), "tiny can only: clip, performer"),
+        (("--report", "page.txt"), "expected a name that ends in .html"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_first(tmp_path, folder, monkeypatch, capsys, words, said):
+    path = tmp_path / "tiny.toml"
+    path.write_text(TOML)
+    assert run(monkeypatch, "evaluate", path, "--data", folder, *words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_recipe_or_the_table_must_be_asked_for(monkeypatch, capsys):
+    assert run(monkeypatch, "evaluate") == 2
+    assert "expected a recipe, or --table1" in capsys.readouterr().err
+
+
+TOML = """
+schema = 1
+name = "tiny"
+description = "Small motions"
+licence = "CC0-1.0"
+
+[source]
+metres_per_unit = 1.0
+up = "y"
+
+[clips]
+table = "clips.csv"
+file = "file"
+performer = "who"
+
+[[controls]]
+name = "speed"
+column = "v"
+unit = "m/s"
+description = "Mean speed"
+
+[motion]
+frames = 20
+cyclic = false
+root = "travelling"
+
+[kriging]
+label = "performer"
+
+[size]
+rms_budget_cm = 1.0
+"""
