@@ -118,17 +118,29 @@ def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
     groups (n,): samples that say too much of each other, such as strides of one take, are left
     out together. Closed form from the inverse of the whole system (Dubrule 1983, for blocks).
     """
-    matrices = [_left_out(invert(hyper, samples, d), groups) for d in hyper.drifts]
-    return np.mean(matrices, axis=0)
+    inverse = np.linalg.inv(noisy(hyper, samples))
+    functions = [drift(samples, len(hyper.scales), degree) for degree in hyper.drifts]
+    return np.mean([_left_out(_without(inverse, f), groups) for f in functions], axis=0)
 
 
-def _left_out(inverse: Floats, groups: Indices) -> Floats:
-    block = inverse[: len(groups), : len(groups)]
+def _without(inverse: Floats, functions: Floats) -> Floats:
+    """Block (n, n) of the whole system's inverse, from that of the covariances (n, n).
+
+    functions (n, k): of the drift. One inverse serves the drifts of all degrees.
+    """
+    weighed = inverse @ functions
+    return inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
+
+
+def _left_out(block: Floats, groups: Indices) -> Floats:
     residual = block / np.diagonal(block)[:, None]
-    names, sizes = np.unique(groups, return_counts=True)
-    for name in names[sizes > 1]:
-        own = np.flatnonzero(groups == name)
-        residual[own] = np.linalg.solve(block[np.ix_(own, own)], block[own])
+    _, names, sizes = np.unique(groups, return_inverse=True, return_counts=True)
+    order = np.argsort(names, kind="stable")
+    for size in np.unique(sizes[sizes > 1]):
+        # Groups of one size, a row each.
+        own = order[sizes[names[order]] == size].reshape(-1, size)
+        among = block[own[:, :, None], own[:, None, :]]
+        residual[own] = np.linalg.solve(among, block[own])
     return residual
 
 

@@ -20,6 +20,8 @@ NUGGETS = (1e-4, 10.0)
 LABELS = (0.05, 4.0)
 DESCENTS = 2
 STEP = 0.7
+# A simplex this small in the logarithms, of losses this alike, is at its end.
+CLOSE, EVEN, MOST = 1e-2, 1e-5, 400
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,11 @@ def _descend(
         start,
         method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)),
-        options={"initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0, "maxfev": 400},
+        options={
+            "initial_simplex": simplex,
+            "xatol": CLOSE,
+            "fatol": EVEN * loss(start),
+            "maxfev": MOST,
+        },
     )
     return float(found.fun), [float(value) for value in found.x]
