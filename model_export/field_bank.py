@@ -117,8 +117,8 @@ class FieldBank:
         return COVARIANCES[name].onnx(net, net("Max", squared, net.number(1e-12)))
 
     def _apart(self, net: Net, own: str, size: int) -> str:
-        """What of the squared distances does not hang on the controls (B or 1, F n): the samples'
-        own part (F n), and how far apart performers are in each field but from their own samples.
+        """What of the squared distances does not hang on the controls (B or 1, F n): `own` (F n),
+        and label² (1 - q·e) of each field for labels q of who moves and e of a sample.
         """
         p, n, fields = len(self.performers), len(self.pose.samples), len(self.kriged)
         labels = np.square([field.hyper.label for field in self.kriged])
@@ -127,9 +127,10 @@ class FieldBank:
         states = net.weights("states", np.array([0.0, 1.0]))
         same = net("OneHot", whose, net.indices(p), states, axis=0)
         nearer = self._columns(net, net("Mul", apart, same), p, size)
-        everyone = net("Reshape", net("Expand", apart, net.indices(fields, 1, n)), net.indices(size))
+        everyone = net("Expand", apart, net.indices(fields, 1, n))
+        farthest = net("Add", own, net("Reshape", everyone, net.indices(size)))
         performer = net.weights("performer", np.zeros((1, p)))
-        return net("Gemm", performer, nearer, net("Add", own, everyone), alpha=-1.0)
+        return net("Gemm", performer, nearer, farthest, alpha=-1.0)
 
     @staticmethod
     def _columns(net: Net, stacked: str, d: int, size: int) -> str:
