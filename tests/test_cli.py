@@ -19,6 +19,7 @@ from service.synthesis import library
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
+TALL = ("--performer", "tall")
 FORMATS = ("usda", "usdc", "usdz", "json", "bvh")
 
 
@@ -330,6 +331,37 @@ def test_words_that_the_command_does_not_know_end_with_code_2(posefield, model_p
     for words in (("pose", model_path, "--speed", "1"), ("dance",), ("clip", model_path), clamped):
         code, out, err = posefield(*words)
         assert (code, out) == (2, "") and "Usage" in err
+
+
+def test_a_performer_is_asked_for_by_name(posefield, labelled_path, tmp_path):
+    asked = [posefield("pose", labelled_path, *CONTROLS, *words)[1] for words in (TALL, ())]
+    assert [json.loads(said)["trust"]["performer"] for said in asked] == ["tall", None]
+    tall, nobody = (np.array(json.loads(said)["rotations"]) for said in asked)
+    # Numbers of JSON are those of float32.
+    assert np.abs(tall - nobody).max() > 1e-4
+    path = tmp_path / "clip.json"
+    code, out, _ = posefield("clip", labelled_path, *CONTROLS, *TALL, "-o", path, "--json")
+    assert (code, json.loads(out)["performer"]) == (0, "tall")
+    trust = json.loads(path.read_text())["trust"]
+    assert trust == json.loads(asked[0])["trust"]
+
+
+def test_an_unknown_performer_is_refused_with_code_2(refused, labelled_path, model_path, tmp_path):
+    path = tmp_path / "clip.json"
+    words = (*CONTROLS, "--performer", "ada")
+    said = "performer: 'ada', expected one of middle, short, tall"
+    assert refused(2, "pose", labelled_path, *words) == said
+    assert refused(2, "clip", labelled_path, *words, "-o", path) == said
+    assert not path.exists()
+    none = "performer: 'ada', expected none: this model knows none"
+    assert refused(2, "pose", model_path, *words) == none
+
+
+def test_inspect_lists_the_performers_there_are(posefield, labelled_path, model_path):
+    assert "\nperformers: middle, short, tall\n" in posefield("inspect", labelled_path)[1]
+    assert "\nperformers: " not in posefield("inspect", model_path)[1]
+    plain = json.loads(posefield("inspect", labelled_path, "--json")[1])
+    assert plain["performers"] == ["middle", "short", "tall"]
 
 
 # --- clip -----------------------------------------------------------------------------------------

@@ -53,6 +53,24 @@ def test_each_control_outside_the_samples_gives_a_warning(ask, controls, loaded)
     assert pose["trust"]["warnings"] == [json.loads(line) for line in lines]
 
 
+def test_every_performer_of_the_card_can_be_asked_for(ask, controls):
+    names = ask("GET", "/v1/models/reach").json()["performers"]
+    assert names == ["middle", "short", "tall"]
+    asked = [url(f"{CLIP}.json", controls, performer=name) for name in names]
+    answers = [ask("GET", each).json() for each in (*asked, url(f"{CLIP}.json", controls))]
+    assert [answer["trust"]["performer"] for answer in answers] == [*names, None]
+    for i, one in enumerate(answers):
+        assert all(one["rotations"] != other["rotations"] for other in answers[:i])
+
+
+def test_nobody_in_a_body_is_nobody_in_a_query(ask, controls):
+    path, body = "/v1/models/reach/pose", {"controls": controls, "times": [0.5]}
+    silent = ask("GET", url(path, controls, time=0.5)).content
+    assert ask("POST", path, json=body).content == silent
+    assert ask("POST", path, json={**body, "performer": None}).content == silent
+    assert ask("POST", path, json={**body, "performer": "tall"}).content != silent
+
+
 def test_the_duration_itself_is_a_time_of_the_clip(ask, controls):
     pose = url("/v1/models/reach/pose", controls)
     last = ask("GET", f"{pose}&time=0").json()["trust"]["duration"]

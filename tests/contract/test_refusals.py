@@ -5,6 +5,11 @@ from urllib.parse import urlencode
 
 import jsonschema
 import pytest
+from asking import asker
+
+from service.synthesis import library
+from service.web.app import create_app
+from service.web.settings import Settings
 
 CLIP = "/v1/models/reach/clip.json"
 POSE = "/v1/models/reach/pose"
@@ -51,6 +56,9 @@ WRONG_PARAMETERS = [
     ({"extrapolate": "other"}, 400, "bad-parameter", "extrapolate", "expected one of"),
     ({"turn": "1e3", "extrapolate": "refuse"}, 422, "outside-samples", "controls", "turn = 1000"),
     ({"turn": ["1", "2"]}, 400, "bad-parameter", "turn", "expected once"),
+    ({"performer": "Tall"}, 422, "invalid-field", "performer", "expected one of middle, short, t"),
+    ({"performer": ""}, 422, "invalid-field", "performer", "'', expected one of middle, short, t"),
+    ({"performer": ["tall", "tall"]}, 400, "bad-parameter", "performer", "expected once"),
     ({"fps": ["30", "30"]}, 400, "bad-parameter", "fps", "expected once"),
 ]
 
@@ -110,6 +118,9 @@ WRONG_BODIES = [
     (b'{"controls": {}, "fps": "30"}', 400, "bad-body", "/fps"),
     (b'{"controls": {}, "extrapolate": "other"}', 400, "bad-body", "/extrapolate"),
     (b'{"controls": {}}', 422, "invalid-field", "/controls/stature"),
+    (b'{"controls": {}, "performer": 1}', 400, "bad-body", "/performer"),
+    (b'{"controls": {}, "performer": "Tall"}', 422, "invalid-field", "/performer"),
+    (b'{"controls": {}, "performer": "tall"}', 422, "invalid-field", "/controls/stature"),
 ]
 
 
@@ -117,6 +128,16 @@ WRONG_BODIES = [
 def test_a_wrong_body_is_pointed_at(content, status, kind, pointer, refuse):
     problem = refuse(status, kind, "POST", CLIP, content=content, headers=JSON)
     assert [error["pointer"] for error in problem["errors"]] == [pointer]
+
+
+def test_a_model_that_knows_no_performers_refuses_every_name(model_path, controls):
+    ask = asker(create_app(library.load([model_path]), Settings()))
+    asked = urlencode({**controls, "time": 0, "performer": "tall"})
+    answer = ask("GET", f"/v1/models/reaching/pose?{asked}")
+    assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
+    assert answer.json()["errors"][0]["parameter"] == "performer"
+    assert "'tall', expected none: this model knows none" in answer.json()["detail"]
+    assert ask("GET", "/v1/models/reaching").json()["performers"] == []
 
 
 def test_a_wrong_time_in_a_body_is_pointed_at(refuse, controls):

@@ -12,25 +12,28 @@ from service.web.query import ClipQuestion, PoseQuestion
 
 
 def test_a_query_and_a_body_are_one_pose_question():
-    expected = PoseQuestion({"turn": 20.0, "stature": 1.7}, [0.0, 0.5], "refuse")
+    expected = PoseQuestion({"turn": 20.0, "stature": 1.7}, [0.0, 0.5], "refuse", "12")
     pairs = [("turn", "20"), ("time", "0"), ("stature", "1.7"), ("time", "0.5")]
-    assert query.pose_of_pairs([*pairs, ("extrapolate", "refuse")]) == expected
+    # A name may look like a number.
+    rest = [("extrapolate", "refuse"), ("performer", "12")]
+    assert query.pose_of_pairs([*pairs, *rest]) == expected
     body = (
-        b'{"controls": {"turn": 20, "stature": 1.7}, "times": [0, 5e-1], "extrapolate": "refuse"}'
+        b'{"controls": {"turn": 20, "stature": 1.7}, "times": [0, 5e-1], '
+        b'"extrapolate": "refuse", "performer": "12"}'
     )
     assert query.pose_of_body(body) == expected
 
 
 def test_a_query_and_a_body_are_one_clip_question():
-    expected = ClipQuestion({"turn": -2.0}, 60.0, 0.1, 0.9, "warn")
-    pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9")]
+    expected = ClipQuestion({"turn": -2.0}, 60.0, 0.1, 0.9, "warn", "ada")
+    pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9"), ("performer", "ada")]
     assert query.clip_of_pairs(pairs) == expected
-    body = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9}'
+    body = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9, "performer": "ada"}'
     assert query.clip_of_body(body) == expected
 
 
 def test_what_is_left_out_has_one_default():
-    expected = ClipQuestion({}, 30.0, 0.0, None, "warn")
+    expected = ClipQuestion({}, 30.0, 0.0, None, "warn", None)
     assert query.clip_of_pairs([]) == expected
     assert query.clip_of_body(b'{"controls": {}}') == expected
     assert query.clip_of_body(b'{"controls": {}, "end": null}') == expected

@@ -1,0 +1,277 @@
+"""Who moves, as the graph takes it: an optional input, and the same answer as the reference's."""
+
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+from numpy.random import PCG64, Generator
+from running import outputs
+
+from model_export import export, kriging
+from model_export.covariance import COVARIANCES
+from model_export.field_bank import Constant, FieldBank, Spread
+from model_export.kriging import Hyper
+from model_export.model import Outputs
+from service.motion import card
+from service.motion.errors import ExportRefused, ModelError
+from service.synthesis import session
+from service.synthesis.session import OUTPUTS
+
+SAMPLES, CONTROLS, BATCH = 25, 3, 40
+LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
+NAMES = ("ada", "bob", "cyd", "dee")
+
+
+def rng():
+    return Generator(PCG64(7))
+
+
+def mixed(performers, batch=BATCH):
+    """Labels (B, p) of everybody in turn, nobody among them."""
+    return np.eye(performers + 1, performers)[np.arange(batch) % (performers + 1)]
+
+
+def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=()):
+    """Fields pose, offsets and duration, in each of which performers are another distance apart."""
+    own = rng()
+    points = own.uniform(-1.0, 1.0, (SAMPLES, CONTROLS))
+    # Every sample is somebody's, and no performer has as many as another.
+    whose = np.sqrt(np.arange(SAMPLES) / SAMPLES) * len(names)
+    samples = np.hstack([points, np.eye(len(names))[whose.astype(int)]])
+    fields = {}
+    for name, size, label in (("pose", 6, 0.6), ("offsets", 2, 2.5), ("duration", 1, 0.1)):
+        scales, nugget = own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3)
+        hyper = Hyper(covariance, drifts, scales, nugget, label)
+        values = own.normal(size=(SAMPLES, size))
+        solved = kriging.solve(hyper, samples, values)
+        fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
+    return FieldBank(LOW, HIGH, names, fields.pop("pose"), fields)
+
+
+def asked():
+    """Controls all over, of which the first eight are those of samples, as the graph sees them."""
+    points = rng().uniform(-1.2, 1.2, (BATCH, CONTROLS))
+    points[:8] = labelled_bank().pose.samples[:8, :CONTROLS]
+    controls = 0.5 * (points * (HIGH - LOW) + HIGH + LOW)
+    return controls.astype(np.float32).astype(np.float64)
+
+
+def graph_of(bank):
+    """Function of controls, and of labels where they are given, that runs the fields and sigma."""
+
+    def build(net, controls, *_):
+        basis, fields = bank.onnx(net, controls)
+        return *fields.values(), Spread(bank.pose, 0.04).onnx(net, basis)
+
+    return lambda controls, **labels: outputs(build, (2, 2, 2, 1), controls=controls, **labels)
+
+
+def reference_of(bank, controls, labels):
+    points = bank.points(controls, labels)
+    return [*bank.numpy(points).values(), Spread(bank.pose, 0.04).numpy(points)]
+
+
+def apart(found, expected):
+    return max(np.abs(a - b).max() for a, b in zip(found, expected, strict=True))
+
+
+CASES = {
+    **{
+        f"{name}, drifts {drifts}": {"covariance": name, "drifts": drifts}
+        for name in COVARIANCES
+        for drifts in ((0,), (1,), (0, 1))
+    },
+    "one performer": {"names": ("ada",)},
+    "a constant field": {"constant": ("offsets",)},
+}
+
+
+@pytest.mark.parametrize("given", CASES.values(), ids=CASES)
+def test_the_graph_tells_performers_apart_as_the_reference_does(given):
+    bank, controls = labelled_bank(**given), asked()
+    labels = mixed(len(bank.performers))
+    found = graph_of(bank)(controls, performer=labels)
+    # At a sample the distance is a root of what rounding leaves, where these have their kink.
+    allowed = 5e-3 if given.get("covariance") in ("exponential", "spherical") else 2e-4
+    assert apart(found, reference_of(bank, controls, labels)) < allowed
+    # Negative controls: everybody taken for the next, and nobody told apart.
+    others = np.roll(labels, 1, axis=0)
+    assert apart(found, reference_of(bank, controls, others)) > 4 * allowed
+    assert apart(found, reference_of(bank, controls, 0 * labels)) > 4 * allowed
+
+
+def test_who_is_not_said_is_nobody_that_was_seen():
+    bank, controls = labelled_bank(), asked()
+    nobody = np.zeros((BATCH, len(NAMES)))
+    silent = graph_of(bank)(controls)
+    assert apart(silent, graph_of(bank)(controls, performer=nobody)) == 0.0
+    assert apart(silent, reference_of(bank, controls, nobody)) < 2e-4
+    assert apart(silent, graph_of(bank)(controls, performer=mixed(len(NAMES)))) > 0.1
+
+
+def test_one_row_of_labels_is_for_the_whole_batch():
+    run, controls, bob = graph_of(labelled_bank()), asked(), np.eye(4)[[1]]
+    whole = run(controls, performer=bob)
+    assert apart(whole, run(controls, performer=np.repeat(bob, BATCH, axis=0))) < 1e-6
+    assert apart(whole, run(controls, performer=np.eye(4)[[2]])) > 0.1
+
+
+def test_a_batch_of_several_performers_is_each_of_them_alone():
+    run, controls, labels = graph_of(labelled_bank()), asked(), mixed(len(NAMES))
+    whole = run(controls, performer=labels)
+    for row in range(0, BATCH, 7):
+        alone = run(controls[row : row + 1], performer=labels[row : row + 1])
+        # Float32 sums a batch in another order than a row.
+        assert apart([value[row : row + 1] for value in whole], alone) < 2e-5
+    assert apart([value[:1] for value in whole], [value[1:2] for value in whole]) > 0.1
+
+
+def test_performers_of_no_distance_are_not_told_apart():
+    bank = labelled_bank()
+    pose = kriging.solve(replace(bank.pose.hyper, label=0.0), bank.pose.samples, np.eye(SAMPLES))
+    run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)))
+    assert apart(run(asked()), run(asked(), performer=mixed(len(NAMES)))) < 1e-6
+
+
+# --- a whole model --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def opened(labelled_path):
+    return session.load(labelled_path)
+
+
+@pytest.fixture(scope="module")
+def question(labelled, opened):
+    """Controls, times and labels of everybody all over the model, as the graph sees them."""
+    own, low, high = rng(), labelled.model.bank.low, labelled.model.bank.high
+    points = own.uniform(low, high, (BATCH, len(low)))
+    times = own.uniform(0.0, 1.0, (BATCH, 7))
+    return *(a.astype(np.float32).astype(float) for a in (points, times)), mixed(3)
+
+
+def test_every_output_of_a_labelled_model_agrees_with_the_reference(labelled, opened, question):
+    points, times, labels = question
+    found = Outputs(*opened.run(points, times, *OUTPUTS, labels=labels))
+    expected = labelled.model.evaluate(points, times, labels)
+    parents = opened.card.skeleton.parents
+
+    def away(answer):
+        return np.abs(answer.positions(parents) - found.positions(parents)).max()
+
+    assert away(expected) < export.ALLOWED
+    assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-3
+    assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
+    assert away(labelled.model.evaluate(points, times)) > 10 * export.ALLOWED
+    # Of somebody who was seen more is known, as a rule, than of anybody.
+    nobody = Outputs(*opened.run(points, times, *OUTPUTS))
+    seen = labels.any(axis=1)
+    assert np.mean(found.sigma[seen] < nobody.sigma[seen]) > 0.8
+    assert np.array_equal(found.sigma[~seen], nobody.sigma[~seen])
+
+
+def test_the_gate_asks_for_performers(labelled, labelled_path, opened):
+    content = labelled_path.read_bytes()
+    assert 0.0 < export.gate(labelled.model, content, opened.card) < export.ALLOWED
+    bank = labelled.model.bank
+    # Two performers change places: nobody would notice who asks for controls alone.
+    samples = bank.pose.samples.copy()
+    samples[:, [4, 5]] = samples[:, [5, 4]]
+    swapped = replace(bank, pose=replace(bank.pose, samples=samples))
+    points, times, _ = question_of_nobody(opened)
+    model = replace(labelled.model, bank=swapped)
+    before, after = (m.evaluate(points, times).rotations for m in (labelled.model, model))
+    assert np.array_equal(before, after)
+    with pytest.raises(ExportRefused, match=r"at (middle|short), \{'stature': "):
+        export.gate(model, content, opened.card)
+
+
+def question_of_nobody(opened):
+    points = np.array([[control.default for control in opened.card.controls]])
+    return points, np.linspace(0.0, 1.0, 5)[None], None
+
+
+def test_the_card_names_the_performers_of_the_table(labelled_path, model_path):
+    assert session.load(labelled_path).card.performers == ("middle", "short", "tall")
+    assert session.load(model_path).card.performers == ()
+
+
+def test_the_port_is_optional_and_only_there_where_it_is_needed(labelled_path, model_path):
+    def ports(path):
+        runtime = session.load(path).runtime
+        optional = runtime.get_overridable_initializers()
+        return [p.name for p in runtime.get_inputs()], [(p.name, p.shape) for p in optional]
+
+    both = ["controls", "time"]
+    assert ports(labelled_path) == (both, [("performer", ["batch_or_one", 3])])
+    assert ports(model_path) == (both, [])
+    plain = onnx.load(model_path).graph
+    assert "OneHot" not in {node.op_type for node in plain.node}
+
+
+def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_path, capfd):
+    options = onnxruntime.SessionOptions()
+    # One level above the remark that an input with a default cannot be folded.
+    options.log_severity_level = 3
+    runtime = onnxruntime.InferenceSession(
+        labelled_path, options, providers=["CPUExecutionProvider"]
+    )
+    middle = [control.default for control in session.load(labelled_path).card.controls]
+    for batch in (1, 5, 300):
+        feed = {
+            "controls": np.tile(np.array(middle, "f4"), (batch, 1)),
+            "time": np.zeros((batch, 4), "f4"),
+        }
+        given = {**feed, "performer": np.zeros((batch, 3), "f4")}
+        assert apart(runtime.run(None, feed), runtime.run(None, given)) == 0.0
+    assert capfd.readouterr().err == ""
+
+
+def test_the_labels_have_an_axis_of_their_own(labelled_path, question):
+    """Were it the batch's, onnxruntime would plan one buffer for one row and for many."""
+    points, times, _ = question
+    graph = onnx.load(labelled_path)
+    assert session.open_bytes(graph.SerializeToString(), "own").run(points, times, *OUTPUTS)
+    (port,) = (port for port in graph.graph.input if port.name == "performer")
+    port.type.tensor_type.shape.dim[0].dim_param = "batch"
+    with pytest.raises(Exception, match="Shape mismatch attempting to re-use buffer"):
+        session.open_bytes(graph.SerializeToString(), "shared").run(points, times, *OUTPUTS)
+
+
+def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, labelled_path):
+    again = export.export(labelled_recipe, labelled, []).content
+    assert again == labelled_path.read_bytes()
+    others = ("anna", *labelled.model.bank.performers[1:])
+    renamed = replace(labelled.model, bank=replace(labelled.model.bank, performers=others))
+    assert export.export(labelled_recipe, replace(labelled, model=renamed), []).content != again
+
+
+def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled):
+    weights = {w.name: w for w in onnx.load(labelled_path).graph.initializer}
+    whose = onnx.numpy_helper.to_array(weights["whose"])
+    assert whose.dtype == np.int64
+    names = [labelled.model.bank.performers[i] for i in whose]
+    assert names == [example.row.performer for example in labelled.examples]
+
+
+# --- files that do not fit ------------------------------------------------------------------------
+
+
+def refusal(graph):
+    with pytest.raises(ModelError) as caught:
+        session.open_bytes(graph.SerializeToString(), "damaged")
+    return caught.value.message
+
+
+@pytest.mark.parametrize("names", [(), ("ada",), ("ada", "bob", "cyd", "dee")])
+def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_path, opened, names):
+    graph = onnx.load(labelled_path)
+    entries = card.dump(replace(opened.card, performers=names))
+    del graph.metadata_props[:]
+    onnx.helper.set_model_props(graph, entries)
+    width = {"performer": [len(names)]} if names else {}
+    assert refusal(graph) == (
+        f"optional inputs (name: width) {{'performer': [3]}}, expected {width}"
+    )

@@ -1,0 +1,93 @@
+"""A performer is asked for by name; who is not known is refused with those who are."""
+
+import numpy as np
+import pytest
+
+from service.encode import ENCODERS, poses
+from service.motion.errors import InvalidField
+from service.synthesis import library
+
+POINT = {"stature": 1.75, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+NAMES = ("middle", "short", "tall")
+# The graph answers in float32, and sums a batch in another order than one row.
+FLOAT32 = 1e-5
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return library.load([labelled_path]).models["labelled"]
+
+
+@pytest.fixture(scope="module")
+def plain(model_path):
+    return library.load([model_path]).models["reaching"]
+
+
+def differ(a, b):
+    return max(
+        np.abs(a.rotations - b.rotations).max(), np.abs(a.bone_offsets - b.bone_offsets).max()
+    )
+
+
+def test_performers_move_each_in_their_own_way(model):
+    found = [model.pose(POINT, [0.5], "warn", name) for name in (*NAMES, None)]
+    for i, one in enumerate(found):
+        for other in found[:i]:
+            assert differ(one, other) > 10 * FLOAT32
+        assert one.trust.performer == (*NAMES, None)[i]
+
+
+def test_the_answer_for_a_name_is_that_of_its_label(model):
+    point = np.array([[POINT[c.name] for c in model.session.card.controls]])
+    for name, label in zip(NAMES, np.eye(3), strict=True):
+        answer = model.pose(POINT, [0.5], "warn", name)
+        rotations = [
+            model.session.run(point, np.array([[0.5]]), "rotations", labels=labels)[0][0, 0]
+            for labels in (label[None], np.roll(label, 1)[None])
+        ]
+        assert np.array_equal(answer.rotations[0], rotations[0])
+        assert not np.array_equal(answer.rotations[0], rotations[1])
+
+
+def test_nobody_is_asked_for_unless_somebody_is(model):
+    silent, nobody = model.pose(POINT, [0.5], "warn"), model.pose(POINT, [0.5], "warn", None)
+    assert differ(silent, nobody) == 0.0
+    assert silent.trust == nobody.trust
+    assert silent.trust.performer is None
+
+
+def test_a_clip_is_the_poses_of_its_performer(model):
+    clip = model.clip(POINT, 30.0, "warn", performer="tall")
+    pose, other = (model.pose(POINT, [0.5], "warn", name) for name in ("tall", "short"))
+    assert clip.trust == pose.trust
+    assert clip.trust.duration != other.trust.duration
+    assert np.abs(clip.clip.rotations[15] - pose.rotations[0]).max() < FLOAT32
+    assert np.abs(clip.clip.rotations[15] - other.rotations[0]).max() > 10 * FLOAT32
+
+
+@pytest.mark.parametrize("name", ["Tall", "", " tall", "nobody", "tall, short"])
+def test_an_unknown_performer_is_refused_with_those_there_are(model, name):
+    for ask in (
+        lambda: model.pose(POINT, [0.0], "warn", name),
+        lambda: model.clip(POINT, 30.0, "warn", performer=name),
+    ):
+        with pytest.raises(InvalidField) as caught:
+            ask()
+        assert caught.value.field == "performer"
+        assert caught.value.message == f"{name!r}, expected one of middle, short, tall"
+
+
+def test_a_model_that_knows_nobody_refuses_every_name(plain):
+    with pytest.raises(InvalidField) as caught:
+        plain.pose(POINT, [0.0], "warn", "tall")
+    assert caught.value.field == "performer"
+    assert caught.value.message == "'tall', expected none: this model knows none"
+    assert plain.pose(POINT, [0.0], "warn").trust.performer is None
+
+
+def test_json_says_who_was_asked_for_and_usd_where_it_was_somebody(model):
+    for name, said in (("tall", b'"performer":"tall"'), (None, b'"performer":null')):
+        assert said in poses.json(model.pose(POINT, [0.0], "warn", name))
+        clip = model.clip(POINT, 30.0, "warn", performer=name)
+        assert said in ENCODERS["json"].encode(clip)
+        assert (b'string performer = "tall"' in ENCODERS["usda"].encode(clip)) == bool(name)
