@@ -118,7 +118,7 @@ def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
     groups (n,): samples that say too much of each other, such as strides of one take, are left
     out together. Closed form from the inverse of the whole system (Dubrule 1983, for blocks).
     """
-    inverse: Floats = np.linalg.inv(noisy(hyper, samples))
+    inverse = np.asarray(np.linalg.inv(noisy(hyper, samples)), dtype=np.float64)
     functions = [drift(samples, len(hyper.scales), degree) for degree in hyper.drifts]
     residuals = [_left_out(_without(inverse, f), groups) for f in functions]
     return np.mean(np.stack(residuals), axis=0)
