@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_export import export, ingest, recipe, train
+from model_export import export, ingest, recipe, samples, train
 from service.motion import quat
 from service.motion.conventions import UP
 from service.synthesis import session
@@ -79,7 +79,9 @@ def test_samples_are_met_better_than_by_the_mean_motion(made):
     own, examples, trained, _ = made
     aligned, model = trained.aligned, trained.model
     frames = np.tile(np.arange(float(own.motion.frames)), (len(examples), 1))
-    fields = model.bank.numpy(np.stack([example.controls for example in examples]))
+    labels = samples.labels([e.row.performer for e in examples], model.bank.performers)
+    controls = np.stack([example.controls for example in examples])
+    fields = model.bank.numpy(model.bank.points(controls, labels))
     rotations, root = model.decoder.numpy(fields["pose"], frames)
     mean = model.decoder.numpy(np.zeros_like(fields["pose"]), frames)[1]
     error, of_mean = (np.sqrt(np.mean((r - aligned.root_path) ** 2)) for r in (root, mean))

@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_export import align, dtw, ingest
+from model_export import align, dtw, fields, ingest
+from model_export.field_bank import half_ranges
 from model_export.ingest import Example
+from model_export.recipe import Kriging
+from model_export.samples import Samples
 from model_export.table import Row
 from model_export.warp import DENSE, WarpBasis
 from service.motion import clip, quat
@@ -61,8 +64,21 @@ def family(logs, rng):
     ]
 
 
-def aligned(family, rounds=2, basis=BASIS):
-    return align.align(family, FRAMES, basis, rounds, WEIGHTS)
+def to_the_mean(values):
+    """The reference of all clips alike."""
+    return np.broadcast_to(values.mean(axis=0), values.shape)
+
+
+def to_the_prediction(family):
+    """What the others predict for each by a field over its size, as training has it."""
+    sizes = np.array([e.controls for e in family])
+    laid = Samples(half_ranges(sizes, sizes.min(axis=0), sizes.max(axis=0)), 1, np.arange(CLIPS))
+    settings = Kriging(drift=1, covariance="matern52")
+    return lambda v: v - fields.tuned(settings, "matern52", laid, v).residuals
+
+
+def aligned(family, rounds=2, basis=BASIS, weights=WEIGHTS, predict=to_the_mean):
+    return align.align(family, FRAMES, basis, rounds, weights, predict)
 
 
 def disagreement(found, true):
@@ -235,7 +251,7 @@ def test_weights_of_joints_decide_what_is_aligned(rng):
     ]
     even = aligned(family)
     # Where the arm is follows from the chest alone.
-    arm = align.align(family, FRAMES, BASIS, 2, np.array([1.0, 1.0, 400.0, 1.0]))
+    arm = aligned(family, weights=np.array([1.0, 1.0, 400.0, 1.0]))
     assert disagreement(arm.logs, second) < 0.7 * disagreement(even.logs, second)
     assert disagreement(arm.logs, first) > disagreement(even.logs, first)
 

@@ -66,8 +66,8 @@ def test_the_least_recipe_is_read_and_the_rest_has_its_defaults(read):
     assert (least.name, least.source.metres_per_unit, least.motion.frames) == ("tiny", 0.01, 20)
     assert least.controls[0].unit == "m/s"
     assert (least.kriging.covariance, least.kriging.drift, least.kriging.nugget) == (
-        "matern52",
-        1,
+        "chosen",
+        "chosen",
         None,
     )
     assert (least.alignment.knots, least.size.ranks, least.source.root_offset) == (6, None, None)
@@ -151,7 +151,11 @@ FAULTS = {
     "name with a blank": ('"tiny"', '"tiny one"', ["name", "pattern", "'tiny one'"]),
     "another version": ("schema = 1", "schema = 2", ["schema", "should be 1", "found 2"]),
     "negative nugget": ("[size]", "[kriging]\nnugget = -0.1\n[size]", ["kriging.nugget", "-0.1"]),
-    "degree two": ("[size]", "[kriging]\ndrift = 2\n[size]", ["kriging.drift", "equal to 1"]),
+    "degree two": (
+        "[size]",
+        "[kriging]\ndrift = 2\n[size]",
+        ["kriging.drift", "0, 1, 'mean' or 'chosen'", "found 2"],
+    ),
     "weight of zero": (
         "[size]",
         "[motion.joint_weights]\nHead = 0.0\n[size]",

@@ -53,7 +53,9 @@ def positions(parents, rotations, root, offsets):
 
 def at_samples(trained, examples):
     """Fields at the samples' own controls."""
-    return trained.model.bank.numpy(np.stack([example.controls for example in examples]))
+    bank = trained.model.bank
+    controls = np.stack([example.controls for example in examples])
+    return bank.numpy(bank.points(controls, np.zeros((len(controls), len(bank.performers)))))
 
 
 def miss(trained, examples):
