@@ -21,7 +21,6 @@ from service.motion import card
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import ExportRefused
-from service.motion.skeleton import Skeleton
 from service.synthesis import session
 from service.synthesis.session import OUTPUTS, Session
 
@@ -55,39 +54,64 @@ def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
 
 
 def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
-    """Largest joint distance, m, between file and reference over random controls and times.
+    """Largest joint distance, m, between file and reference over random questions.
 
     Raises ExportRefused where it exceeds what is allowed, and says by how much and where.
     """
     opened = session.open_bytes(content, f"{own_card.name}.onnx")
     rng = np.random.Generator(np.random.PCG64(10_000))
-    low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
     worst = 0.0
     for _ in range(POINTS // BATCH):
-        points = rng.uniform(low, high, (BATCH, len(low)))
-        durations = model.evaluate(points, np.zeros((BATCH, 1))).duration
-        times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
-        gaps = _gaps(model, opened, own_card.skeleton, points, times)
+        asked = _draw(rng, model, own_card)
+        gaps = _gaps(model, opened, asked)
         at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         worst = max(worst, float(gaps[at]))
         if worst > ALLOWED:
-            asked = dict(zip((c.name for c in own_card.controls), points[at[0]], strict=True))
             raise ExportRefused(
                 f"the graph puts {own_card.skeleton.names[at[2]]} {100 * worst:.4f} cm from where "
-                f"the reference does, expected at most {100 * ALLOWED:g} cm; at {asked}, "
-                f"{times[at[0], 0]:.3f} s. Fewer controls, or a larger nugget, condition it better"
+                f"the reference does, expected at most {100 * ALLOWED:g} cm; at "
+                f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
+                "condition it better"
             )
     return worst
 
 
-def _gaps(
-    model: Model, opened: Session, skeleton: Skeleton, points: Floats, times: Floats
-) -> Floats:
-    """Distances (B, S, J) between the joints of graph and reference, m."""
-    # The graph sees the question in float32; so must the reference, or the question differs.
-    points, times = (a.astype(np.float32).astype(np.float64) for a in (points, times))
-    expected = model.evaluate(points, times).positions(skeleton.parents)
-    found = Outputs(*opened.run(points, times, *OUTPUTS)).positions(skeleton.parents)
+@dataclass(frozen=True)
+class _Asked:
+    """Questions of the gate: points (B, d) in the controls' units, times (B, 1), s, labels (B, p).
+
+    All are numbers of float32: the graph sees no others, and so must the reference.
+    """
+
+    points: Floats
+    times: Floats
+    labels: Floats
+
+    def said(self, own_card: ModelCard, row: int) -> str:
+        """One of the questions in words."""
+        names = (control.name for control in own_card.controls)
+        point = dict(zip(names, self.points[row].tolist(), strict=True))
+        own = np.flatnonzero(self.labels[row])
+        who = f"{own_card.performers[own[0]]}, " if len(own) else ""
+        return f"{who}{point}, {self.times[row, 0]:.3f} s"
+
+
+def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard) -> _Asked:
+    """Random controls, performers (nobody as often as each of them) and times of their clips."""
+    low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
+    points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
+    performers = len(own_card.performers)
+    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, BATCH)]
+    durations = model.evaluate(points, np.zeros((BATCH, 1)), labels).duration
+    times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
+    return _Asked(points, times.astype(np.float32).astype(np.float64), labels)
+
+
+def _gaps(model: Model, opened: Session, asked: _Asked) -> Floats:
+    """Distances (B, 1, J) between the joints of graph and reference, m."""
+    question, parents = (asked.points, asked.times), opened.card.skeleton.parents
+    expected = model.evaluate(*question, asked.labels).positions(parents)
+    found = Outputs(*opened.run(*question, *OUTPUTS, labels=asked.labels)).positions(parents)
     return np.asarray(np.linalg.norm(found - expected, axis=-1))
 
 
@@ -110,6 +134,7 @@ def _card(
         samples=len(examples),
         ranks=trained.model.decoder.reduced.core.shape,
         durations=(float(durations.min()), float(durations.max())),
+        performers=trained.model.bank.performers,
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
     )

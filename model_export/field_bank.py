@@ -74,7 +74,11 @@ class FieldBank:
         return {name: field.predict(points) for name, field in self.fields.items()}
 
     def onnx(self, net: Net, controls: str) -> tuple[str, dict[str, str]]:
-        """Basis (B, d + F n), points first and the pose's covariances next, and the fields."""
+        """Basis (B, d + F n), points first and the pose's covariances next, and the fields.
+
+        Where performers are told apart, `performer` (B or 1, p) says who moves by their labels. It
+        is a constant that a caller may feed another value for: zeros, and so nobody that was seen.
+        """
         points = self.points_onnx(net, controls)
         basis = net("Concat", points, self._covariances(net, points), axis=1)
         bias = np.concatenate([_constant_part(field) for field in self.fields.values()])
@@ -89,10 +93,10 @@ class FieldBank:
         Squared distances come from one product with [p², p]: no array (B, n, d) is ever made. Its
         factors follow from samples and scales when the session loads, and are not stored.
         """
-        d, n = self.pose.samples.shape[1], len(self.pose.samples)
+        d, n = len(self.low), len(self.pose.samples)
         scales = np.stack([field.hyper.scales for field in self.kriged])
         worth = net.weights("squared_scales", np.square(scales)[:, :, None])
-        samples = net.weights("samples", self.pose.samples.T[None])
+        samples = net.weights("samples", self.pose.samples[:, :d].T[None])
         cross = net("Mul", net("Mul", worth, samples), net.number(-2.0))
         squares = net("Mul", net("Mul", samples, samples), worth)
         own = net("ReduceSum", squares, net.indices(1), keepdims=0)
@@ -104,10 +108,29 @@ class FieldBank:
             axis=0,
         )
         both = net("Concat", net("Mul", points, points), points, axis=1)
-        squared = net("Gemm", both, factors, net("Reshape", own, net.indices(size)))
+        constant = net("Reshape", own, net.indices(size))
+        if self.performers:
+            constant = self._apart(net, constant, size)
+        squared = net("Gemm", both, factors, constant)
         name = self.pose.hyper.covariance
         # A distance of zero comes out a rounding error below it, where a root has no value.
         return COVARIANCES[name].onnx(net, net("Max", squared, net.number(1e-12)))
+
+    def _apart(self, net: Net, own: str, size: int) -> str:
+        """What of the squared distances does not hang on the controls (B or 1, F n): `own` (F n),
+        and label² (1 - q·e) of each field for labels q of who moves and e of a sample.
+        """
+        p, n, fields = len(self.performers), len(self.pose.samples), len(self.kriged)
+        labels = np.square([field.hyper.label for field in self.kriged])
+        apart = net.weights("squared_labels", labels[:, None, None])
+        whose = net.weights("whose", np.argmax(self.pose.samples[:, len(self.low) :], axis=1))
+        states = net.weights("states", np.array([0.0, 1.0]))
+        same = net("OneHot", whose, net.indices(p), states, axis=0)
+        nearer = self._columns(net, net("Mul", apart, same), p, size)
+        everyone = net("Expand", apart, net.indices(fields, 1, n))
+        farthest = net("Add", own, net("Reshape", everyone, net.indices(size)))
+        performer = net.weights("performer", np.zeros((1, p)))
+        return net("Gemm", performer, nearer, farthest, alpha=-1.0)
 
     @staticmethod
     def _columns(net: Net, stacked: str, d: int, size: int) -> str:

@@ -74,6 +74,9 @@ class Model:
         net.named("sigma", self.spread.onnx(net, basis))
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
+        if self.bank.performers:
+            # Its default is one row: a name for both would promise the runtime what is not so.
+            inputs["performer"] = ["batch_or_one", len(self.bank.performers)]
         outputs: Shapes = {
             "rotations": ["batch", "steps", joints, 4],
             "root_position": ["batch", "steps", 3],

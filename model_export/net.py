@@ -59,7 +59,10 @@ class Net:
         metadata: dict[str, str],
         about: dict[str, str],
     ) -> bytes:
-        """The finished file; inputs and outputs map a name to its shape, all float32."""
+        """The finished file; inputs and outputs map a name to its shape, all float32.
+
+        An input with the name of a constant is optional: the constant is its default.
+        """
         graph = helper.make_graph(
             self._nodes,
             "posefield",

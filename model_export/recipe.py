@@ -16,7 +16,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from service.motion.errors import RecipeError
 
 # Parameters that a clip query has besides the controls.
-RESERVED = frozenset({"fps", "start", "end", "time", "times", "extrapolate", "level", "format"})
+RESERVED = frozenset(
+    {"fps", "start", "end", "time", "times", "extrapolate", "performer", "level", "format"}
+)
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Text = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

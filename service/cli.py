@@ -40,6 +40,9 @@ Controls = Annotated[
 Extrapolate = Annotated[
     Policy, typer.Option(help="what to do with controls outside what was sampled")
 ]
+Performer = Annotated[
+    str | None, typer.Option(help="who moves, by name; somebody never seen if not said")
+]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
 
@@ -88,9 +91,11 @@ def pose(
     control: Controls = None,
     time: Annotated[list[float] | None, typer.Option(help="seconds from the start")] = None,
     extrapolate: Extrapolate = "warn",
+    performer: Performer = None,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
-    answer = open_model(model).pose(numbers(control or []), time or [0.0], extrapolate)
+    synthesizer = open_model(model)
+    answer = synthesizer.pose(numbers(control or []), time or [0.0], extrapolate, performer)
     _warn(answer.trust.warnings)
     typer.echo(poses.json(answer).decode())
 
@@ -104,12 +109,13 @@ def clip(
     start: Annotated[float, typer.Option(help="seconds")] = 0.0,
     end: Annotated[float | None, typer.Option(help="seconds; the whole clip if not said")] = None,
     extrapolate: Extrapolate = "warn",
+    performer: Performer = None,
     json: Json = False,
 ) -> None:
     """Write a clip as usda, usdc, usdz, json or bvh."""
     encode = encoder(output)
     synthesizer = open_model(model)
-    answer = synthesizer.clip(numbers(control or []), fps, extrapolate, start, end)
+    answer = synthesizer.clip(numbers(control or []), fps, extrapolate, start, end, performer)
     files.write(encode(answer), output)
     _warn(answer.trust.warnings)
     typer.echo(wrote(output, answer, json))
@@ -214,6 +220,7 @@ def _summary(plain: dict[str, Any]) -> str:
             f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"
             for c in plain["controls"]
         ),
+        *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),
     ]

@@ -61,6 +61,30 @@ def model_path(
 
 
 @pytest.fixture(scope="session")
+def labelled_recipe(small_recipe: Recipe) -> Recipe:
+    """The small recipe with its three performers told apart, and little to choose from."""
+    told = {"label": "performer", "covariance": "matern52", "drift": 1}
+    kriging = small_recipe.kriging.model_copy(update=told)
+    return small_recipe.model_copy(update={"kriging": kriging})
+
+
+@pytest.fixture(scope="session")
+def labelled(labelled_recipe: Recipe, examples: list[Example]) -> Trained:
+    """A small model of the procedural family that knows its performers."""
+    return train.train(labelled_recipe, examples, lambda _: None)
+
+
+@pytest.fixture(scope="session")
+def labelled_path(
+    labelled_recipe: Recipe, labelled: Trained, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """The model that knows its performers as a file, labelled.onnx."""
+    path = tmp_path_factory.mktemp("models") / "labelled.onnx"
+    path.write_bytes(export.export(labelled_recipe, labelled, []).content)
+    return path
+
+
+@pytest.fixture(scope="session")
 def real_data() -> Path:
     """Folder of the real motion capture: POSEFIELD_DATA, or shared/data beside the checkout."""
     beside = Path(__file__).parents[2] / "shared" / "data"

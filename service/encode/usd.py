@@ -85,7 +85,9 @@ def _header(made: Any, answer: ClipAnswer) -> None:
 
 
 def _facts(trust: Trust) -> dict[str, Any]:
-    return trust.facts() | {"warnings": Vt.StringArray(list(trust.warnings))}
+    facts = trust.facts() | {"warnings": Vt.StringArray(list(trust.warnings))}
+    # USD has no value that stands for none.
+    return {name: fact for name, fact in facts.items() if fact is not None}
 
 
 def _character(made: Any, clip: Clip, rig: Rig) -> None:

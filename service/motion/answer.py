@@ -14,7 +14,8 @@ class Trust:
     model: name@contenthash. controls: the values that were asked for, in the model's units.
     duration: natural length of the whole clip at these controls, s. sigma: how far a captured
     clip at these controls would lie from this one, as a root-mean-square over joints and frames,
-    m. warnings: one sentence for each control outside what was sampled.
+    m. warnings: one sentence for each control outside what was sampled. performer: who was asked
+    for; none for somebody who was never seen.
     """
 
     model: str
@@ -22,12 +23,14 @@ class Trust:
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    performer: str | None = None
 
     def facts(self) -> dict[str, Any]:
         """The same as plain values, for formats that carry free metadata."""
         return {
             "model": self.model,
             "controls": self.controls,
+            "performer": self.performer,
             "duration": self.duration,
             "sigma": self.sigma,
             "warnings": list(self.warnings),

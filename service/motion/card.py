@@ -40,8 +40,9 @@ class ModelCard:
 
     cyclic: the last pose leads into the first. root: whether the root travels or stays in place.
     rate: frames a second of the captured clips. frames, samples: T and N of the motion tensor.
-    durations: shortest and longest captured clip, s. diagnostics: what training measured.
-    provenance: recipe, hashes of the data, versions, licence.
+    durations: shortest and longest captured clip, s. performers: who can be asked for by name, in
+    the order of the graph's labels; empty where performers are not told apart. diagnostics: what
+    training measured. provenance: recipe, hashes of the data, versions, licence.
     """
 
     name: str
@@ -55,6 +56,7 @@ class ModelCard:
     samples: int
     ranks: tuple[int, int, int]
     durations: tuple[float, float]
+    performers: tuple[str, ...]
     diagnostics: Mapping[str, Any]
     provenance: Mapping[str, Any]
 
@@ -77,6 +79,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "controls": [{**vars(c), "values": list(c.values)} for c in card.controls],
         "ranks": list(card.ranks),
         "durations": list(card.durations),
+        "performers": list(card.performers),
         "diagnostics": dict(card.diagnostics),
         "provenance": dict(card.provenance),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
@@ -128,6 +131,8 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         ),
         ranks=tuple(plain["ranks"]),
         durations=tuple(plain["durations"]),
+        # Files of before performers were told apart do not have them.
+        performers=tuple(plain.get("performers", ())),
         diagnostics=plain["diagnostics"],
         provenance=plain["provenance"],
     )

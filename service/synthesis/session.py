@@ -14,6 +14,7 @@ from service.motion.conventions import Floats
 from service.motion.errors import ModelError
 
 INPUTS = {"controls": 2, "time": 2}
+PERFORMER = "performer"
 OUTPUTS = {"rotations": 4, "root_position": 3, "bone_offsets": 3, "duration": 1, "sigma": 1}
 
 
@@ -25,9 +26,16 @@ class Session:
     digest: str
     runtime: Any
 
-    def run(self, controls: Floats, time: Floats, *outputs: str) -> list[Floats]:
-        """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for."""
+    def run(
+        self, controls: Floats, time: Floats, *outputs: str, labels: Floats | None = None
+    ) -> list[Floats]:
+        """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for.
+
+        labels (B or 1, p): who moves, of the card's performers; nobody that was seen, if not said.
+        """
         feed = {"controls": controls.astype(np.float32), "time": time.astype(np.float32)}
+        if labels is not None and self.card.performers:
+            feed[PERFORMER] = labels.astype(np.float32)
         answers: list[Floats] = self.runtime.run(list(outputs), feed)
         return answers
 
@@ -73,6 +81,17 @@ def _check_ports(session: Session, source: str) -> None:
     found = {p.name: len(p.shape) for p in session.runtime.get_outputs()}
     if found != OUTPUTS:
         raise ModelError(source, f"outputs (name: axes) {found}, expected {OUTPUTS}")
+    _check_performers(session, source)
+
+
+def _check_performers(session: Session, source: str) -> None:
+    """The graph takes as many labels as the card has names."""
+    performers = len(session.card.performers)
+    # onnxruntime lists inputs that have a default apart from the others.
+    found = {p.name: p.shape[1:] for p in session.runtime.get_overridable_initializers()}
+    expected = {PERFORMER: [performers]} if performers else {}
+    if found != expected:
+        raise ModelError(source, f"optional inputs (name: width) {found}, expected {expected}")
 
 
 def _check_answer(session: Session, source: str) -> None:

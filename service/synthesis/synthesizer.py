@@ -24,6 +24,18 @@ MOST_POSES = 10_000
 
 
 @dataclass(frozen=True)
+class _Question:
+    """What has passed the door: controls and performer as they were given, and as the graph takes
+    them, point (1, d) and labels (1, p); a warning for each control outside its sampled range."""
+
+    controls: dict[str, float]
+    performer: str | None
+    point: Floats
+    labels: Floats
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Synthesizer:
     """A named model that answers with poses and clips."""
 
@@ -36,21 +48,26 @@ class Synthesizer:
         return f"{self.name}@{self.session.digest}"
 
     def pose(
-        self, controls: Mapping[str, float], times: Sequence[float], extrapolate: Policy
+        self,
+        controls: Mapping[str, float],
+        times: Sequence[float],
+        extrapolate: Policy,
+        performer: str | None = None,
     ) -> PoseAnswer:
-        """Poses at times (S,), s from the start of the clip.
+        """Poses at times (S,), s from the start of the clip, as a performer of the card moves, or
+        somebody who was never seen.
 
-        Raises InvalidField for a control or time that cannot be used, OutsideSamples where
-        `extrapolate` is "refuse" and a control lies outside its sampled range.
+        Raises InvalidField for a control, time or performer that cannot be used, OutsideSamples
+        where `extrapolate` is "refuse" and a control lies outside its sampled range.
         """
-        point, warnings = self._door(controls, extrapolate)
+        question = self._door(controls, extrapolate, performer)
         if not 1 <= len(times) <= MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
         when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
-        duration = self._duration(point)
+        duration = self._duration(question)
         for index, value in enumerate(when):
             _within(f"times/{index}", value, 0.0, duration, "s")
-        return self._answer(point, when, controls, warnings)
+        return self._answer(question, when)
 
     def clip(
         self,
@@ -59,14 +76,15 @@ class Synthesizer:
         extrapolate: Policy,
         start: float = 0.0,
         end: float | None = None,
+        performer: str | None = None,
     ) -> ClipAnswer:
         """Clip at `rate` frames a second from `start` to `end`, s; by default the whole of it.
 
         Frame i is the pose at start + i / rate. Raises as `pose` does.
         """
-        point, warnings = self._door(controls, extrapolate)
+        question = self._door(controls, extrapolate, performer)
         _within("fps", _number("fps", rate), *RATES, "frames a second")
-        duration = self._duration(point)
+        duration = self._duration(question)
         last = duration if end is None else _number("end", end)
         _within("end", last, 0.0, duration, "s")
         _within("start", _number("start", start), 0.0, last, "s")
@@ -75,7 +93,7 @@ class Synthesizer:
         if frames > MOST_POSES:
             raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")
         when = np.minimum(start + np.arange(frames) / rate, duration)
-        answer = self._answer(point, when, controls, warnings)
+        answer = self._answer(question, when)
         clip = assemble(
             self.session.card.skeleton,
             answer.rotations,
@@ -86,24 +104,27 @@ class Synthesizer:
         return ClipAnswer(clip, answer.trust)
 
     def _door(
-        self, controls: Mapping[str, float], extrapolate: Policy
-    ) -> tuple[Floats, tuple[str, ...]]:
-        """Control point (1, d) and a warning for each control outside its sampled range."""
+        self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None
+    ) -> _Question:
         card = self.session.card
         for name in controls:
             if card.control(name) is None:
                 known = ", ".join(c.name for c in card.controls)
                 raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+        labels = _labels(card.performers, performer)
         point = np.array([[_required(control, controls) for control in card.controls]])
         warnings = tuple(_outside(c, v) for c, v in zip(card.controls, point[0], strict=True))
         said = tuple(filter(None, warnings))
         if said and extrapolate == "refuse":
             raise OutsideSamples("controls", "; ".join(said))
-        return point, said
+        given = {name: float(value) for name, value in controls.items()}
+        return _Question(given, performer, point, labels, said)
 
-    def _duration(self, point: Floats) -> float:
+    def _duration(self, question: _Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
-        duration = float(self.session.run(point, np.zeros((1, 1)), "duration")[0][0])
+        start = np.zeros((1, 1))
+        answers = self.session.run(question.point, start, "duration", labels=question.labels)
+        duration = float(answers[0][0])
         low, high = self.session.card.durations
         if not low / FARTHEST <= duration <= high * FARTHEST:
             raise OutsideSamples(
@@ -113,24 +134,26 @@ class Synthesizer:
             )
         return duration
 
-    def _answer(
-        self,
-        point: Floats,
-        when: Floats,
-        controls: Mapping[str, float],
-        warnings: tuple[str, ...],
-    ) -> PoseAnswer:
-        rotations, root, offsets, duration, sigma = (
-            answer[0].astype(np.float64) for answer in self.session.run(point, when[None], *OUTPUTS)
-        )
+    def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
+        answers = self.session.run(question.point, when[None], *OUTPUTS, labels=question.labels)
+        rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
         trust = Trust(
             self.identity,
-            {name: float(value) for name, value in controls.items()},
+            question.controls,
             float(duration),
             float(sigma),
-            warnings,
+            question.warnings,
+            question.performer,
         )
         return PoseAnswer(when, rotations, root, offsets, trust)
+
+
+def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
+    """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
+    if asked is not None and asked not in performers:
+        known = f"one of {', '.join(performers)}" if performers else "none: this model knows none"
+        raise InvalidField("performer", f"{asked!r}, expected {known}")
+    return np.array([[float(name == asked) for name in performers]])
 
 
 def _required(control: Control, controls: Mapping[str, float]) -> float:

@@ -108,14 +108,21 @@ def _model(service: Service, request: Request) -> Synthesizer:
 
 
 async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
-    answer: PoseAnswer = model.pose(question.controls, question.times, question.extrapolate)
+    answer: PoseAnswer = model.pose(
+        question.controls, question.times, question.extrapolate, question.performer
+    )
     content = await _made(len(answer.times), poses.json, answer)
     return Response(content, media_type="application/json")
 
 
 async def _clip(model: Synthesizer, question: ClipQuestion, encoder: Encoder) -> Response:
     answer: ClipAnswer = model.clip(
-        question.controls, question.fps, question.extrapolate, question.start, question.end
+        question.controls,
+        question.fps,
+        question.extrapolate,
+        question.start,
+        question.end,
+        question.performer,
     )
     content = await _made(len(answer.clip), encoder.encode, answer)
     return answers.file(content, encoder, answer.trust)

@@ -26,22 +26,25 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class PoseQuestion:
-    """Which poses: control values and times, s."""
+    """Which poses: control values and times, s, and who moves; nobody that was seen for none."""
 
     controls: dict[str, float]
     times: list[float]
     extrapolate: Policy
+    performer: str | None = None
 
 
 @dataclass(frozen=True)
 class ClipQuestion:
-    """Which clip: control values, frames a second, and the part between start and end, s."""
+    """Which clip: control values, frames a second, the part between start and end, s, and who
+    moves; nobody that was seen for none."""
 
     controls: dict[str, float]
     fps: float
     start: float
     end: float | None
     extrapolate: Policy
+    performer: str | None = None
 
 
 class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,6 +53,7 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     controls: dict[str, msgspec.Raw]
     times: list[float]
     extrapolate: Policy = POLICY
+    performer: str | None = None
 
 
 class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -60,6 +64,7 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     start: float = 0.0
     end: float | None = None
     extrapolate: Policy = POLICY
+    performer: str | None = None
 
 
 Body = TypeVar("Body", PoseBody, ClipBody)
@@ -70,19 +75,21 @@ _FLOAT = msgspec.json.Decoder(float)
 
 
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
-    """Question of query parameters: `time` once or more, `extrapolate`, and one per control."""
+    """Question of query parameters: `time` once or more, extrapolate, performer, and one per
+    control."""
     times = [_number(name, text) for name, text in pairs if name == "time"]
     if not times:
         raise _bad_parameter("time", "missing; give seconds from the start of the clip")
     single = _unique([pair for pair in pairs if pair[0] != "time"])
-    policy = _policy(single.pop("extrapolate", POLICY))
-    return PoseQuestion(_numbers(single), times, policy)
+    policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
+    return PoseQuestion(_numbers(single), times, policy, performer)
 
 
 def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
-    """Question of query parameters: fps, start, end, extrapolate, and one per control."""
+    """Question of query parameters: fps, start, end, extrapolate, performer, and one per
+    control."""
     single = _unique(pairs)
-    policy = _policy(single.pop("extrapolate", POLICY))
+    policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
     numbers = _numbers(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -90,20 +97,21 @@ def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
         end=numbers.pop("end", None),
         controls=numbers,
         extrapolate=policy,
+        performer=performer,
     )
 
 
 def pose_of_body(content: bytes) -> PoseQuestion:
     """Question of a JSON body."""
     body = _decoded(_POSE, content)
-    return PoseQuestion(_controls(body.controls), body.times, body.extrapolate)
+    return PoseQuestion(_controls(body.controls), body.times, body.extrapolate, body.performer)
 
 
 def clip_of_body(content: bytes) -> ClipQuestion:
     """Question of a JSON body."""
     body = _decoded(_CLIP, content)
     controls = _controls(body.controls)
-    return ClipQuestion(controls, body.fps, body.start, body.end, body.extrapolate)
+    return ClipQuestion(controls, body.fps, body.start, body.end, body.extrapolate, body.performer)
 
 
 def _unique(pairs: Pairs) -> dict[str, str]:

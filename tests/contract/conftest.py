@@ -18,10 +18,10 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
-def models(model_path, tmp_path_factory) -> Path:
-    """Folder with the model under the name that the examples use."""
+def models(labelled_path, tmp_path_factory) -> Path:
+    """Folder with the model that knows performers under the name that the examples use."""
     folder = tmp_path_factory.mktemp("models")
-    shutil.copy(model_path, folder / "reach.onnx")
+    shutil.copy(labelled_path, folder / "reach.onnx")
     return folder
 
 

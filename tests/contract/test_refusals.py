@@ -51,6 +51,9 @@ WRONG_PARAMETERS = [
     ({"extrapolate": "other"}, 400, "bad-parameter", "extrapolate", "expected one of"),
     ({"turn": "1e3", "extrapolate": "refuse"}, 422, "outside-samples", "controls", "turn = 1000"),
     ({"turn": ["1", "2"]}, 400, "bad-parameter", "turn", "expected once"),
+    ({"performer": "Tall"}, 422, "invalid-field", "performer", "expected one of middle, short, t"),
+    ({"performer": ""}, 422, "invalid-field", "performer", "'', expected one of middle, short, t"),
+    ({"performer": ["tall", "tall"]}, 400, "bad-parameter", "performer", "expected once"),
     ({"fps": ["30", "30"]}, 400, "bad-parameter", "fps", "expected once"),
 ]
 
@@ -110,6 +113,9 @@ WRONG_BODIES = [
     (b'{"controls": {}, "fps": "30"}', 400, "bad-body", "/fps"),
     (b'{"controls": {}, "extrapolate": "other"}', 400, "bad-body", "/extrapolate"),
     (b'{"controls": {}}', 422, "invalid-field", "/controls/stature"),
+    (b'{"controls": {}, "performer": 1}', 400, "bad-body", "/performer"),
+    (b'{"controls": {}, "performer": "Tall"}', 422, "invalid-field", "/performer"),
+    (b'{"controls": {}, "performer": "tall"}', 422, "invalid-field", "/controls/stature"),
 ]
 
 

@@ -68,7 +68,7 @@ def failures(event):
 
 
 def narrowed(spec, card):
-    """The contract with what only this model's card says: its controls and the times it has."""
+    """The contract with what only this model's card says: its controls, times and performers."""
     narrow = copy.deepcopy(spec)
     parts = narrow["components"]
     numbers = {
@@ -92,6 +92,9 @@ def narrowed(spec, card):
     times = {"type": "number", "minimum": 0, "maximum": 0.8}
     parts["parameters"]["time"]["schema"]["items"] = times
     parts["schemas"]["PoseQuestion"]["properties"]["times"]["items"] = times
+    performers = list(card.performers)
+    parts["parameters"]["performer"]["schema"] = {"enum": performers}
+    parts["schemas"]["Performer"] = {"enum": [*performers, None]}
     for parameter in parts["parameters"].values():
         parameter.pop("example", None)
     return narrow

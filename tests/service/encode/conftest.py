@@ -9,7 +9,12 @@ from service.motion.answer import ClipAnswer, Trust
 from service.motion.skeleton import Skeleton
 
 TRUST = Trust(
-    "walk@0123abcd", {"speed": 1.25, "turn rate": -0.5}, 1.5, 0.0125, ("speed 1.25 is beyond 1.2",)
+    "walk@0123abcd",
+    {"speed": 1.25, "turn rate": -0.5},
+    1.5,
+    0.0125,
+    ("speed 1.25 is beyond 1.2",),
+    "ada",
 )
 
 # name, parent, rest offset in metres.

@@ -188,6 +188,8 @@ def test_an_answer_without_warnings_can_be_written(walk, tmp_path):
     stage = opened(usd.usda(ClipAnswer(walk.clip, bare)), tmp_path / "bare.usda")
     facts = stage.GetRootLayer().customLayerData["posefield"]
     assert (facts["controls"], list(facts["warnings"])) == ({}, [])
+    # USD has no null: who was not asked for is not mentioned.
+    assert set(bare.facts()) - set(facts) == {"performer"}
 
 
 PRINT_DIGESTS = """

@@ -31,6 +31,7 @@ CARD = ModelCard(
     samples=92,
     ranks=(22, 6, 24),
     durations=(0.8, 1.9),
+    performers=("ada", "bob"),
     diagnostics={"truncation_rms_m": 0.005, "notes": ["one"], "explained": {"pose": 0.9}},
     provenance={"licence": "CC0", "clips": 92},
 )
@@ -51,7 +52,15 @@ def test_card_read_is_the_card_written():
     assert replace(read, skeleton=CARD.skeleton) == CARD
 
 
-@pytest.mark.parametrize("field", [f.name for f in fields(ModelCard)])
+def test_card_of_before_performers_were_told_apart_has_none():
+    metadata = card.dump(CARD)
+    del metadata["posefield.performers"]
+    read = card.load(metadata)
+    assert read.performers == ()
+    assert replace(read, skeleton=CARD.skeleton, performers=CARD.performers) == CARD
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(ModelCard) if f.name != "performers"])
 def test_card_without_one_of_its_fields_is_refused_by_name(field):
     metadata = card.dump(CARD)
     del metadata[f"posefield.{field}"]
