@@ -1,6 +1,10 @@
-"""The training job's commands: `sample` and `train`."""
+"""The training job's commands: `sample`, `train` and `evaluate`."""
 
+import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +25,7 @@ def commands(app: typer.Typer) -> None:
     """Add the training job's commands to the one command line."""
     app.command("sample")(sample)
     app.command("train")(train_command)
+    app.command("evaluate")(evaluate)
 
 
 def sample(
@@ -84,6 +89,94 @@ def train_command(
         _write_report(trained, exported, progress, report)
     progress("done")
     typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
+
+
+class Protocol(StrEnum):
+    """Ways to ask how good a model is."""
+
+    CLIP = "clip"
+    PERFORMER = "performer"
+    TRUTH = "truth"
+
+
+def evaluate(
+    recipe_file: Annotated[
+        Path | None, typer.Argument(help="a TOML file", metavar="RECIPE", show_default=False)
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
+    ] = None,
+    protocol: Annotated[
+        list[Protocol] | None,
+        typer.Option(help="hold out clips, or performers, or compare with the truth; all that can"),
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="the .html file to write")] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
+    ] = None,
+    table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
+) -> None:
+    """Measure how far a recipe's models lie from motions they have not seen, beside other methods.
+
+    Everything is fitted anew without what is held out.
+    """
+    if report and report.suffix != ".html":
+        raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
+    if table1:
+        _table1(json_file)
+    elif recipe_file is None:
+        raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
+    else:
+        asked = [one.value for one in protocol or []]
+        _evaluate(recipe_file, data or recipe_file.parent, asked, report, json_file)
+
+
+def _table1(json_file: Path | None) -> None:
+    from model_export.evaluate import table1
+
+    found = table1.measure()
+    if json_file:
+        files.write(as_json(table1.facts(found)).encode(), json_file)
+    typer.echo(table1.text(found))
+
+
+def _evaluate(
+    recipe_file: Path, data: Path, asked: list[str], report: Path | None, json_file: Path | None
+) -> None:
+    from model_export import ingest, recipe
+    from model_export.evaluate import protocol, summary
+
+    own = recipe.read(recipe_file)
+    examples, _ = ingest.ingest(own, data)
+    can = protocol.protocols(own, examples)
+    for name in asked:
+        if name not in can:
+            raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
+    results = []
+    for name in asked or can:
+        with _bar(name) as progress:
+            results.append(protocol.run(own, examples, name, progress))
+        typer.echo(f"{summary.table(results[-1])}\n")
+    typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
+    first, *others = map(summary.facts, results)
+    if json_file:
+        files.write(as_json({**first, "others": others}).encode(), json_file)
+    if report:
+        from model_export.evaluate import render
+
+        files.write(render.html(own.description, results), report)
+
+
+@contextmanager
+def _bar(name: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on standard error that is told how many parts are done, of how many."""
+    with typer.progressbar(length=1, label=name, file=sys.stderr) as bar:
+
+        def progress(done: int, parts: int) -> None:
+            bar.length = parts
+            bar.update(done - bar.pos)
+
+        yield progress
 
 
 class _Progress:

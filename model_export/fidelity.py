@@ -81,8 +81,7 @@ def judge(recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor)
     parents, weights = examples[0].clip.skeleton.parents, joint_weights(recipe, examples)
     offsets = np.stack([example.offsets for example in examples])
     whole = positions(own_tensor, own_tensor.values, parents, offsets)
-    moment = _moment(recipe, examples)
-    return Judge(own_tensor, parents, offsets, weights, moment, whole)
+    return Judge(own_tensor, parents, offsets, weights, moment(recipe, examples), whole)
 
 
 def positions(
@@ -102,7 +101,11 @@ def _effector(gaps: Floats, moment: Moment | None) -> float | None:
     return float(np.sqrt(np.mean(np.square(gaps[:, moment.frame, moment.joint]))))
 
 
-def _moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
+def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
+    """Where and when the recipe's event is; None where it names none.
+
+    Raises TrainingError where its joint is none of the skeleton's.
+    """
     event = recipe.event
     if event is None:
         return None

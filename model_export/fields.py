@@ -14,6 +14,8 @@ from service.motion.conventions import Floats
 
 # Bone offsets that a model need not tell apart, m.
 SAME_BONE = 5e-4
+# Standard errors by which a field of the controls has to be better than none.
+SURE = 2.0
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,19 @@ def fit(settings: Kriging, covariance: str, samples: Samples, values: Floats) ->
     found = tuned(settings, covariance, samples, values)
     explained = 1.0 - found.unexplained
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
-    if explained <= 0.0 and settings.nugget is None:
+    if not _sure(found, samples, values) and settings.nugget is None:
         return Fitted(Constant(values.mean(axis=0)), explained, samples.from_mean(values))
     return Fitted(kriging.solve(found.hyper, samples.points, values), explained, found.residuals)
+
+
+def _sure(found: Tuned, samples: Samples, values: Floats) -> bool:
+    """Whether leaving-one-out gains on the mean of the others by more than its standard error.
+
+    Scales and nugget were chosen for this very gain: a small one is what chance can give them.
+    """
+    from_mean = np.sum(np.square(samples.from_mean(values)), axis=1)
+    gains = from_mean - np.sum(np.square(found.residuals), axis=1)
+    return bool(gains.mean() > SURE * gains.std(ddof=1) / np.sqrt(len(gains)))
 
 
 def proportions(offsets: Floats) -> tuple[Proportions, Floats]:

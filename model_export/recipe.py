@@ -211,6 +211,9 @@ class Recipe(_Part):
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
     description: Text
     licence: Text = Field(description="licence of the motion data, with what it asks to be said")
+    truth: Literal["reaching"] | None = Field(
+        default=None, description="procedural family whose noise-free motions are known everywhere"
+    )
     source: Source
     clips: Clips
     controls: Annotated[list[ControlColumn], Field(min_length=1)]

@@ -1,5 +1,6 @@
 """How far one motion lies from another: numbers of one clip, in metres, and their means."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,7 +32,8 @@ class Errors:
 
     relative and absolute: warp-invariant, with the root's position taken out and with it left in;
     plain_…: at equal shares of the duration. shell: the farthest of three points around each
-    joint, root-relative and warp-invariant. effector, m: at the event. acceleration: mean size of
+    joint, root-relative and warp-invariant. effector, m: at the event, not a number where
+    there is none. acceleration: mean size of
     the synthesised motion's over the captured one's, at equal durations. skate and skate_captured:
     mean speed, m/s, of feet on the ground. duration: logarithm of synthesised over captured.
     squared: mean squared absolute distance, m².
@@ -65,12 +67,18 @@ def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
         _distances(_apart(_rooted(own), _rooted(true))),
         _distances(_apart(own, true)),
         _distances(np.linalg.norm(_rooted(warped) - _rooted(true), axis=-1)[:, :, 1:].max(axis=2)),
-        float(np.linalg.norm(made.event - captured.event)),
+        _effector(made.event, captured.event),
         _acceleration(own) / _acceleration(true),
         skate(made, feet),
         skate(captured, feet),
         float(np.log(made.duration / captured.duration)),
     )
+
+
+def _effector(made: Floats | None, captured: Floats | None) -> float:
+    if made is None or captured is None:
+        return math.nan
+    return float(np.linalg.norm(made - captured))
 
 
 def _rooted(points: Floats) -> Floats:

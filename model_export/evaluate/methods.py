@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model_export import hosvd, naive, samples, travel, variogram
+from model_export import fidelity, hosvd, naive, samples, travel, variogram
 from model_export.evaluate import motion
 from model_export.evaluate.motion import EVEN, Event, Motion
 from model_export.evaluate.peers import PEERS, Peer
@@ -14,6 +14,17 @@ from model_export.samples import Samples
 from model_export.train import Trained
 from service.motion import skeleton
 from service.motion.conventions import Floats
+
+OURS, NAIVE = "posefield", "naive"
+# What would only repeat another row where performers are not told apart.
+LABELLED = ("gp_controls", "nearest_same_performer")
+DEFINITIONS = {
+    OURS: "the model as it is exported: truncated, with its own bones and timing",
+    NAIVE: "kriging of every frame by itself, isotropic, variogram fitted by weighted least "
+    "squares (Mukai & Kuriyama 2005); our code, checked against GSTools",
+    **{name: words for name, (_, words) in PEERS.items()},
+}
+"""What exactly each method is."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +36,14 @@ class Asked:
 
 
 @dataclass(frozen=True)
+class Answers:
+    """Motions of each method, and our own standard deviation (Q,) of each query, m."""
+
+    motions: dict[str, list[Motion]]
+    sigma: Floats
+
+
+@dataclass(frozen=True)
 class _Values:
     """What is predicted for Q queries: pose vectors (Q, T, D) in canonical time, and the rest."""
 
@@ -32,86 +51,106 @@ class _Values:
     beside: dict[str, Floats]
 
 
-def answers(recipe: Recipe, trained: Trained, asked: Asked) -> dict[str, list[Motion]]:
-    """Motions of every method, ours first."""
-    made = {"posefield": _ours(recipe, trained, asked)}
+def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
+    """Answers of every method, ours first."""
+    event = fidelity.moment(recipe, trained.examples)
+    points = trained.model.bank.points(asked.controls, _labels(trained, asked))
+    motions = {OURS: _ours(trained, asked, points, event)}
     for name, predict in _methods(recipe, trained).items():
-        made[name] = _restore(recipe, trained, predict(asked))
-    return made
+        motions[name] = _restore(trained, predict(points), event)
+    return Answers(motions, trained.model.spread.numpy(points))
 
 
-def event(recipe: Recipe, trained: Trained) -> Event:
-    """..."""
-    names = trained.skeleton.names
-    joint = names.index(recipe.event.joint) if recipe.event else len(names) - 1
-    return Event(joint, 1.0)
+def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:
+    """The event of a captured clip, by its own landmarks."""
+    found = fidelity.moment(recipe, trained.examples)
+    if found is None or recipe.event is None:
+        return None
+    if recipe.event.at == "end":
+        return Event(found.joint, 1.0)
+    return Event(found.joint, landmarks[recipe.clips.landmarks.index(recipe.event.at)])
 
 
 def _labels(trained: Trained, asked: Asked) -> Floats:
     return samples.labels(asked.performers, trained.model.bank.performers)
 
 
-def _ours(recipe: Recipe, trained: Trained, asked: Asked) -> list[Motion]:
-    """The model as it ships: truncated, with its own bones and timing."""
-    labels = _labels(trained, asked)
-    own = trained.model.evaluate(asked.controls, np.zeros((len(asked.controls), 1)), labels)
-    found = trained.model.evaluate(asked.controls, own.duration[:, None] * EVEN, labels)
-    translations = np.repeat(found.bone_offsets[:, None], len(EVEN), axis=1)
-    translations[:, :, 0] = found.root_position
-    return _motions(recipe, trained, found.rotations, translations, found.duration)
+def _ours(
+    trained: Trained, asked: Asked, points: Floats, event: fidelity.Moment | None
+) -> list[Motion]:
+    labels, model = _labels(trained, asked), trained.model
+    fields = model.bank.numpy(points)
+    times = np.exp(fields["duration"]) * EVEN
+    found = model.evaluate(asked.controls, times, labels)
+    places = found.rotations, found.root_position, found.bone_offsets
+    return _motions(trained, *places, found.duration, fields["warp"], event)
 
 
 def _motions(
-    recipe: Recipe, trained: Trained, rotations: Floats, translations: Floats, durations: Floats
+    trained: Trained,
+    rotations: Floats,
+    path: Floats,
+    offsets: Floats,
+    durations: Floats,
+    logs: Floats,
+    event: fidelity.Moment | None,
 ) -> list[Motion]:
-    parents, own = trained.skeleton.parents, event(recipe, trained)
-    return [
-        motion.posed(parents, *parts, own)
-        for parts in zip(rotations, translations, map(float, durations), strict=True)
-    ]
+    """Motions of rotations (Q, S, J, 4), root paths (Q, S, 3) and bone offsets (Q, J, 3)."""
+    translations = np.repeat(offsets[:, None], len(EVEN), axis=1)
+    translations[:, :, 0] = path
+    events = [_synthesised_event(trained, log, event) for log in logs]
+    parts = zip(rotations, translations, map(float, durations), events, strict=True)
+    return [motion.posed(trained.skeleton.parents, *part) for part in parts]
 
 
-def _methods(recipe: Recipe, trained: Trained) -> dict[str, Callable[[Asked], _Values]]:
-    laid, _ = samples.lay(recipe, trained.examples)
-    beside = trained.values
+def _synthesised_event(
+    trained: Trained, logs: Floats, event: fidelity.Moment | None
+) -> Event | None:
+    """When a motion in its own predicted timing is at the canonical frame of the event."""
+    if event is None:
+        return None
+    timing = trained.model.timing
+    place = np.array([event.frame / (timing.frames - 1)])
+    return Event(event.joint, float(timing.basis.invert(logs, place)[0]))
 
-    def of_peer(peer: Peer) -> Callable[[Asked], _Values]:
-        def predict(asked: Asked) -> _Values:
-            points = trained.model.bank.points(asked.controls, _labels(trained, asked))
-            found = {name: peer(laid, values, points) for name, values in beside.items()}
-            coefficients = found.pop("pose")
-            return _Values(_numbers(trained, coefficients), found)
+
+def _methods(recipe: Recipe, trained: Trained) -> dict[str, Callable[[Floats], _Values]]:
+    """Points (Q, d + p) to predicted values, by name."""
+    laid, performers = samples.lay(recipe, trained.examples)
+
+    def of_peer(peer: Peer) -> Callable[[Floats], _Values]:
+        def predict(points: Floats) -> _Values:
+            found = {name: peer(laid, v, points) for name, v in trained.values.items()}
+            return _Values(_numbers(trained, found.pop("pose")), found)
 
         return predict
 
-    def by_frame(asked: Asked) -> _Values:
-        points = trained.model.bank.points(asked.controls, _labels(trained, asked))
-        return _naive(trained, laid, beside, points)
-
-    return {"naive": by_frame, **{name: of_peer(peer) for name, (peer, _) in PEERS.items()}}
+    left = () if performers else LABELLED
+    peers = {name: of_peer(peer) for name, (peer, _) in PEERS.items() if name not in left}
+    return {NAIVE: lambda points: _naive(trained, laid, points), **peers}
 
 
 def _numbers(trained: Trained, coefficients: Floats) -> Floats:
     """Pose vectors (Q, T, D) of motions (Q, N) in the coordinates of the sample mode."""
-    lengths = np.linalg.norm(hosvd.unfold(trained.full.core, 2), axis=1)
-    unit = trained.full.core / np.maximum(lengths, 1e-12 * lengths[0])
-    whole = hosvd.mode_dot(hosvd.mode_dot(unit, trained.full.bases[0], 0), trained.full.bases[1], 1)
+    full = trained.full
+    lengths = np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
+    unit = full.core / np.maximum(lengths, 1e-12 * lengths[0])
+    whole = hosvd.mode_dot(hosvd.mode_dot(unit, full.bases[0], 0), full.bases[1], 1)
     table = np.einsum("dtn,qn->qtd", whole, coefficients, optimize=True)
     return trained.tensor.mean + table @ trained.tensor.unwhiten.T
 
 
-def _naive(trained: Trained, laid: Samples, beside: dict[str, Floats], points: Floats) -> _Values:
+def _naive(trained: Trained, laid: Samples, points: Floats) -> _Values:
     """Kriging of every frame by itself; all else the same way, as one frame."""
     known, asked = laid.points[:, : laid.controls], points[:, : laid.controls]
-    vectors = _numbers(trained, beside["pose"])
-    positions = _positions(trained, vectors)
+    vectors = _numbers(trained, trained.values["pose"])
 
     def krige(shown: Floats, values: Floats) -> Floats:
         return naive.fit(known, shown, values, "matern52", variogram.fit).numpy(asked)
 
-    rest = {name: values for name, values in beside.items() if name != "pose"}
+    rest = {name: values for name, values in trained.values.items() if name != "pose"}
     found = {n: krige(v[:, None, :, None], v[:, None])[:, 0] for n, v in rest.items()}
-    return _Values(krige(positions, vectors), found)
+    return _Values(krige(_positions(trained, vectors), vectors), found)
 
 
 def _positions(trained: Trained, vectors: Floats) -> Floats:
@@ -123,22 +162,18 @@ def _positions(trained: Trained, vectors: Floats) -> Floats:
     return skeleton.forward(trained.skeleton.parents, rotations, translations)[0]
 
 
-def _restore(recipe: Recipe, trained: Trained, values: _Values) -> list[Motion]:
+def _restore(trained: Trained, values: _Values, event: fidelity.Moment | None) -> list[Motion]:
     """Motions of predicted values, by the model's own timing, travel, chart and bones."""
-    timing = trained.model.timing
+    timing, beside = trained.model.timing, values.beside
     steps = np.tile(EVEN, (len(values.numbers), 1))
-    zero = np.zeros((len(steps), 1))
-    _, place = timing.numpy(zero, values.beside["warp"], steps)
+    _, place = timing.numpy(np.zeros((len(steps), 1)), beside["warp"], steps)
     rotations, path = trained.tensor.chart.poses(_between(values.numbers, place))
-    if "travel" in values.beside:
+    if "travel" in beside:
         share = place / (timing.frames - 1)
-        rotations, path = travel.put_back(rotations, path, values.beside["travel"], share)
-    translations = np.repeat(
-        trained.model.proportions.numpy(values.beside["offsets"])[:, None], len(EVEN), axis=1
-    )
-    translations[:, :, 0] = path
-    durations = np.exp(values.beside["duration"][:, 0])
-    return _motions(recipe, trained, rotations, translations, durations)
+        rotations, path = travel.put_back(rotations, path, beside["travel"], share)
+    offsets = trained.model.proportions.numpy(beside["offsets"])
+    durations = np.exp(beside["duration"][:, 0])
+    return _motions(trained, rotations, path, offsets, durations, beside["warp"], event)
 
 
 def _between(table: Floats, place: Floats) -> Floats:

@@ -18,11 +18,11 @@ SHELL = 0.03
 @dataclass(frozen=True)
 class Motion:
     """points (FRAMES, J, 4, 3): each joint, then three points of the shell around it, m. duration,
-    s. event: position (3,) of the effector at its event, m."""
+    s. event: position (3,) of the event's joint at its event, m; None where there is no event."""
 
     points: Floats
     duration: float
-    event: Floats
+    event: Floats | None
 
     @property
     def joints(self) -> Floats:
@@ -32,7 +32,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Event:
-    """Which joint is looked at, and at which share of each motion's duration."""
+    """Which joint is looked at, and at which share of a motion's duration."""
 
     joint: int
     share: float
@@ -44,7 +44,7 @@ class Event:
         return np.array([np.interp(at, frames, column) for column in joints[:, self.joint].T])
 
 
-def of_clip(clip: Clip, event: Event) -> Motion:
+def of_clip(clip: Clip, event: Event | None) -> Motion:
     """Motion of a captured clip on its own skeleton."""
     rotations, path = align.resample(clip, EVEN)
     translations = np.repeat(clip.translations.mean(axis=0)[None], FRAMES, axis=0)
@@ -57,11 +57,11 @@ def posed(
     rotations: Floats,
     translations: Floats,
     duration: float,
-    event: Event,
+    event: Event | None,
 ) -> Motion:
     """Motion of local rotations (FRAMES, J, 4) and translations (FRAMES, J, 3), m."""
     positions, orientations = skeleton.forward(parents, rotations, translations)
     axes = quat.rotate(orientations[:, :, None], SHELL * np.eye(3))
     shell = positions[:, :, None] + axes
     points = np.concatenate([positions[:, :, None], shell], axis=2)
-    return Motion(points, duration, event.of(positions))
+    return Motion(points, duration, event.of(positions) if event else None)

@@ -4,12 +4,14 @@ A peer is a library's own method, not our copy of it. It sees the controls in ha
 given everything that is kriged: reduced motions, bone offsets, duration, warp and travel.
 """
 
+import warnings
 from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RBFInterpolator
 from sklearn.dummy import DummyRegressor
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from sklearn.linear_model import LinearRegression
@@ -36,9 +38,17 @@ Kernel = Literal["thin_plate_spline", "linear", "cubic"]
 def _rbf(kernel: Kernel) -> Peer:
     def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
         known, asked = _controls(samples, queries)
-        return RBFInterpolator(known, values, kernel=kernel, degree=1, smoothing=0.0)(asked)
+        return RBFInterpolator(*_merged(known, values), kernel=kernel, degree=1)(asked)
 
     return predict
+
+
+def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Distinct points and the mean of the values at each: an interpolator can meet only one."""
+    points, place, counts = np.unique(known, axis=0, return_inverse=True, return_counts=True)
+    sums = np.zeros((len(points), values.shape[1]))
+    np.add.at(sums, np.ravel(place), values)
+    return points, sums / counts[:, None]
 
 
 def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Floats:
@@ -50,7 +60,8 @@ def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Fl
 
 
 def _thin_plate(known: Floats, values: Floats, smoothing: float) -> RBFInterpolator:
-    return RBFInterpolator(known, values, kernel="thin_plate_spline", degree=1, smoothing=smoothing)
+    points, means = _merged(known, values)
+    return RBFInterpolator(points, means, kernel="thin_plate_spline", degree=1, smoothing=smoothing)
 
 
 def _left_out(samples: Samples, known: Floats, values: Floats, smoothing: float) -> float:
@@ -69,7 +80,10 @@ def gp(samples: Samples, values: Floats, queries: Floats) -> Floats:
     lengths = np.ones(samples.points.shape[1])
     kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(lengths, (0.1, 100.0))
     model = GaussianProcessRegressor(kernel + WhiteKernel(0.1, (1e-5, 10.0)), random_state=0)
-    found = model.fit(samples.points, (values - centre) / size).predict(queries)
+    with warnings.catch_warnings():
+        # A length at its bound is an answer: the control says nothing, or everything.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        found = model.fit(samples.points, (values - centre) / size).predict(queries)
     return centre + size * found.reshape(len(queries), -1)
 
 

@@ -39,10 +39,13 @@ class Chapter(Protocol):
         """The same in words and pictures, in centimetres."""
 
 
-def html(title: str, lead: str, figures: Sequence[tuple[str, str]], body: Sequence[Section]) -> str:
+def html(
+    kind: str, title: str, lead: str, figures: Sequence[tuple[str, str]], body: Sequence[Section]
+) -> str:
     """The whole page; figures: the few numbers that stand at its top, with what they are."""
     template = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
     return template.substitute(
+        kind=escape(kind),
         title=escape(title),
         lead=escape(lead),
         figures="\n".join(

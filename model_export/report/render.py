@@ -40,7 +40,7 @@ def render(trained: Trained, exported: Exported, steps: Sequence[Step]) -> Rende
     facts = {"report": FORMAT, **{name: part.facts() for name, part in chapters.items()}}
     sections = [part.section() for part in chapters.values()]
     card = exported.card
-    html = page.html(card.name, card.description, own.figures(), sections)
+    html = page.html("training report", card.name, card.description, own.figures(), sections)
     text = json.dumps(facts, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
     return Rendered(html.encode(), f"{text}\n".encode())
 

@@ -23,6 +23,7 @@ schema = 1
 name = "reaching"
 description = "Procedural reaching motions of three performers, standing and sitting"
 licence = "CC0-1.0"
+truth = "reaching"
 
 [source]
 metres_per_unit = 1.0

@@ -1,0 +1,176 @@
+"""A protocol's result as means over clips, as JSON and as a table."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from model_export.evaluate import errors
+from model_export.evaluate.errors import Errors
+from model_export.evaluate.methods import DEFINITIONS, OURS
+from model_export.evaluate.protocol import Result
+from model_export.report import plain
+from service.motion.conventions import Floats
+
+HEAD = (
+    "method",
+    "relative",
+    "±",
+    "less ours",
+    "±",
+    "global",
+    "effector",
+    "plain rel.",
+    "plain glob.",
+    "duration",
+    "accel.",
+    "skate",
+)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One method over all clips.
+
+    mean: its errors. standard_error, m: of the mean relative distance. worse, worse_error, m: by
+    how much its relative distance exceeds ours on the same clip, and the standard error of that.
+    """
+
+    name: str
+    mean: Errors
+    standard_error: float
+    worse: float
+    worse_error: float
+
+    @property
+    def skate(self) -> float:
+        """Speed of its feet on the ground over that of the captured ones; 0 without feet."""
+        captured = self.mean.skate_captured
+        return self.mean.skate / captured if captured else 0.0
+
+    def facts(self) -> dict[str, Any]:
+        """Figures by name, distances in centimetres."""
+        mean = self.mean
+        return {
+            "relative_cm": _cm(mean.relative.mean),
+            "global_cm": _cm(mean.absolute.mean),
+            "effector_cm": _cm(mean.effector),
+            "plain_relative_cm": _cm(mean.plain_relative.mean),
+            "plain_global_cm": _cm(mean.plain_absolute.mean),
+            "standard_error_cm": _cm(self.standard_error),
+            "difference_cm": _cm(self.worse),
+            "difference_standard_error_cm": _cm(self.worse_error),
+            "duration_error": plain.number(mean.duration),
+            "acceleration_ratio": plain.number(mean.acceleration),
+            "skate_ratio": plain.number(self.skate) if mean.skate_captured else None,
+            "skate_cm_per_s": _cm(mean.skate),
+            "distances_cm": {
+                name: {key: _cm(value) for key, value in asdict(getattr(mean, name)).items()}
+                for name in _DISTANCES
+            },
+            "definition": DEFINITIONS[self.name],
+        }
+
+    def cells(self) -> tuple[str, ...]:
+        """Its row of the table, in centimetres and shares."""
+        mean = self.mean
+        ours = self.name == OURS
+        return (
+            self.name,
+            _two(mean.relative.mean),
+            _two(self.standard_error),
+            "" if ours else f"{100 * self.worse:+.2f}",
+            "" if ours else _two(self.worse_error),
+            _two(mean.absolute.mean),
+            "" if np.isnan(mean.effector) else _two(mean.effector),
+            _two(mean.plain_relative.mean),
+            _two(mean.plain_absolute.mean),
+            f"{100 * mean.duration:.1f} %",
+            f"{mean.acceleration:.2f}",
+            f"{self.skate:.2f}" if mean.skate_captured else "",
+        )
+
+
+_DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
+
+
+def _two(metres: float) -> str:
+    return f"{100 * metres:.2f}"
+
+
+def _cm(metres: float) -> float | None:
+    return None if np.isnan(metres) else plain.number(100.0 * metres)
+
+
+def relative(found: Sequence[Errors]) -> Floats:
+    """Mean relative distance (C,) of each clip, m."""
+    return np.array([error.relative.mean for error in found])
+
+
+def of(result: Result) -> list[Summary]:
+    """Every method of a result, ours first."""
+    ours = relative(result.errors[OURS])
+    return [_summary(name, found, ours) for name, found in result.errors.items()]
+
+
+def _summary(name: str, found: Sequence[Errors], ours: Floats) -> Summary:
+    own = relative(found)
+    return Summary(
+        name,
+        errors.mean(found),
+        _standard_error(own),
+        float((own - ours).mean()),
+        _standard_error(own - ours),
+    )
+
+
+def _standard_error(values: Floats) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+
+
+def sigma_ratio(result: Result) -> float:
+    """Mean of squared distance over squared prediction: one where sigma is right."""
+    squared = np.array([error.squared for error in result.errors[OURS]])
+    return float(np.mean(squared / np.square(result.sigma)))
+
+
+def facts(result: Result) -> dict[str, Any]:
+    """Figures of a result as JSON holds them."""
+    return {
+        "family": result.family,
+        "protocol": result.protocol,
+        "clips": len(result.clips),
+        "sigma_ratio": plain.number(sigma_ratio(result)),
+        "methods": {summary.name: summary.facts() for summary in of(result)},
+    }
+
+
+def table(result: Result) -> str:
+    """A result in Markdown, the columns even for who reads it as it is."""
+    rows = [HEAD, *(summary.cells() for summary in of(result))]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(HEAD))]
+    lines = [
+        "| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |"
+        for row in rows
+    ]
+    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
+    title = (
+        f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
+        f"sigma ratio {sigma_ratio(result):.2f}"
+    )
+    return "\n".join([title, "", lines[0], rule, *lines[1:]])
+
+
+LEGEND = (
+    "Centimetres, mean over joints, frames and clips. relative: root position taken out; global: "
+    "left in; both after slope-limited time warping; plain: at equal shares of the duration. "
+    "less ours: the method's relative error less ours, clip by clip. effector: the event's joint "
+    "at its event. duration: root mean square of the logarithm. accel., skate: synthesised over "
+    "captured. sigma ratio: squared error over the squared error predicted."
+)
+
+
+def definitions(result: Result) -> str:
+    """What each method of a result is, a line each."""
+    return "\n".join(f"  {name}: {DEFINITIONS[name]}" for name in result.errors)
