@@ -65,9 +65,7 @@ def notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     laid, performers = lay(recipe, examples)
     if recipe.kriging.label and not performers:
         name = examples[0].row.performer
-        said.append(
-            f"all clips are of the one performer {name!r}: kriging.label tells nobody apart"
-        )
+        said.append(f"all clips are of one performer, {name!r}: kriging.label tells nobody apart")
     if len(np.unique(laid.groups)) > len(np.unique(_takes(examples))):
         said.append(
             "clips of one file are not left out together: those of the other files alone could "

@@ -9,6 +9,7 @@ import jsonschema
 import pytest
 
 from model_export import recipe
+from model_export.covariance import COVARIANCES
 from service.motion.errors import RecipeError
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
@@ -156,6 +157,22 @@ FAULTS = {
         "[kriging]\ndrift = 2\n[size]",
         ["kriging.drift", "0, 1, 'mean' or 'chosen'", "found 2"],
     ),
+    "unknown drift": ("[size]", '[kriging]\ndrift = "best"\n[size]', ["kriging.drift", "'best'"]),
+    "unknown covariance": (
+        "[size]",
+        '[kriging]\ncovariance = "cubic"\n[size]',
+        ["kriging.covariance", "'matern52'", "'chosen'", "found 'cubic'"],
+    ),
+    "unknown label": (
+        "[size]",
+        '[kriging]\nlabel = "mood"\n[size]',
+        ["kriging.label", "should be 'performer'", "'mood'"],
+    ),
+    "unknown reference": (
+        "[size]",
+        '[alignment]\nreference = "medoid"\n[size]',
+        ["alignment.reference", "'prediction' or 'mean'", "'medoid'"],
+    ),
     "weight of zero": (
         "[size]",
         "[motion.joint_weights]\nHead = 0.0\n[size]",
@@ -172,6 +189,46 @@ def test_a_fault_is_named_with_its_key_and_what_was_expected(read, tmp_path, old
     assert caught.value.path == str(tmp_path / "recipe.toml")
     for part in said:
         assert part in caught.value.message
+
+
+DRIFTS = {
+    "0": ((0,),),
+    "1": ((1,),),
+    '"mean"': ((0, 1),),
+    '"chosen"': ((1,), (0, 1)),
+}
+
+
+@pytest.mark.parametrize(("said", "tried"), DRIFTS.items())
+def test_a_drift_says_which_degrees_are_tried(read, said, tried):
+    assert read(MINIMAL + f"[kriging]\ndrift = {said}\n").kriging.drifts == tried
+
+
+@pytest.mark.parametrize("name", [*COVARIANCES, "chosen"])
+def test_every_covariance_may_be_named(read, name):
+    own = read(MINIMAL + f'[kriging]\ncovariance = "{name}"\n').kriging
+    assert own.covariances == (("matern52", "gaussian") if name == "chosen" else (name,))
+
+
+@pytest.mark.parametrize("name", ["prediction", "mean"])
+def test_a_reference_may_be_named(read, name):
+    assert read(MINIMAL + f'[alignment]\nreference = "{name}"\n').alignment.reference == name
+    assert read(MINIMAL).alignment.reference == "prediction"
+
+
+def test_a_label_needs_the_column_that_says_who_moved(read):
+    labelled = MINIMAL + '[kriging]\nlabel = "performer"\n'
+    with pytest.raises(RecipeError, match=r"kriging\.label is 'performer', but clips\.performer"):
+        read(labelled)
+    told = labelled.replace('file = "file"', 'file = "file"\nperformer = "who"')
+    assert read(told).kriging.label == "performer"
+    assert read(MINIMAL).kriging.label is None
+
+
+def test_feet_are_named_or_there_are_none(read):
+    assert read(MINIMAL).motion.feet == []
+    footed = MINIMAL.replace("cyclic = false", 'cyclic = false\nfeet = ["l", "r"]')
+    assert read(footed).motion.feet == ["l", "r"]
 
 
 @pytest.mark.parametrize(
