@@ -157,7 +157,7 @@ class Contents:
     def _weighed(self, net: Net, basis: str, row: str) -> str:
         """Averages (S, D) of the samples of rows, by weights from the rows' inverses."""
         fields = self.field.fields
-        inverse = np.stack([field.inverse[:, : len(field.samples)] for field in fields])
+        inverse = np.stack([field.weighing for field in fields])
         weights = net("MatMul", basis, net("Gather", net.weights("inverses", inverse), row))
         samples = net.weights("values", self.field.values.transpose(1, 0, 2))
         return net("Squeeze", net("MatMul", weights, net("Gather", samples, row)), net.indices(1))
@@ -182,9 +182,11 @@ def check(
     controls (B, d) and times (B, S): the rivals' answers have B and S as one axis.
     """
     model = made.trained.model
-    fields = model.bank.numpy(controls)
+    # The procedural family's performers are not told apart.
+    points = model.bank.points(controls, np.zeros((len(controls), 0)))
+    fields = model.bank.numpy(points)
     _, place = model.timing.numpy(fields["duration"], fields["warp"], times)
-    frames = field.numpy(model.bank.points(controls))
+    frames = field.numpy(points)
     below = np.minimum(place.astype(int), frames.shape[1] - 2)
     share = (place - below)[..., None]
     which = np.arange(len(frames))[:, None]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost
+from model_export import cost, samples
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -46,6 +46,7 @@ def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     Raises ExportRefused where onnxruntime answers anything else than the float64 reference does.
     """
     about = {"producer_name": "posefield", "producer_version": __version__}
+    notes = [*notes, *samples.notes(recipe, trained.examples)]
     # The gate's finding is part of the card, so the weights are judged before it is written.
     draft = _card(recipe, trained, notes, parity=0.0)
     parity = gate(trained.model, trained.model.onnx(card.dump(draft), about), draft)

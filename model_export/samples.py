@@ -7,8 +7,10 @@ import numpy as np
 
 from model_export.field_bank import half_ranges
 from model_export.ingest import Example
+from model_export.kriging import drift
 from model_export.recipe import Recipe
 from service.motion.conventions import Floats, Indices
+from service.motion.errors import TrainingError
 
 
 @dataclass(frozen=True)
@@ -44,11 +46,67 @@ def labels(names: Sequence[str], performers: Sequence[str]) -> Floats:
 
 
 def lay(recipe: Recipe, examples: Sequence[Example]) -> tuple[Samples, tuple[str, ...]]:
-    """Samples of a recipe's examples, and the performers that it tells apart, by name."""
-    controls = np.stack([example.controls for example in examples])
+    """Samples of a recipe's examples, and the performers that it tells apart, by name.
+
+    Raises TrainingError where a drift hangs on a single example.
+    """
+    points = _points(examples)
     names = [example.row.performer for example in examples]
-    performers = tuple(sorted(set(names))) if recipe.kriging.label else ()
-    points = half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
-    _, takes = np.unique([str(e.row.place) for e in examples], return_inverse=True)
+    # One alone is told apart from nobody.
+    apart = recipe.kriging.label is not None and len(set(names)) > 1
+    performers = tuple(sorted(set(names))) if apart else ()
     both = np.hstack([points, labels(names, performers)])
-    return Samples(both, controls.shape[1], takes), performers
+    return Samples(both, points.shape[1], _groups(recipe, examples, points)), performers
+
+
+def notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
+    """What a recipe asks of its examples that they are too few for, in a sentence each."""
+    said = []
+    laid, performers = lay(recipe, examples)
+    if recipe.kriging.label and not performers:
+        name = examples[0].row.performer
+        said.append(f"all clips are of one performer, {name!r}: kriging.label tells nobody apart")
+    if len(np.unique(laid.groups)) > len(np.unique(_takes(examples))):
+        said.append(
+            "clips of one file are not left out together: those of the other files alone could "
+            "not carry the drift"
+        )
+    return said
+
+
+def _points(examples: Sequence[Example]) -> Floats:
+    controls = np.stack([example.controls for example in examples])
+    return half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
+
+
+def _takes(examples: Sequence[Example]) -> Indices:
+    """Number (N,) of the file that each example was cut from."""
+    return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
+
+
+def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indices:
+    """Groups (N,) by file, or where no field is left without one of the files, of one each.
+
+    Raises TrainingError where there is none without a single example.
+    """
+    degree = max(map(max, recipe.kriging.drifts))
+    takes, alone = _takes(examples), np.arange(len(examples))
+    if _needed(takes, points, degree) is None:
+        return takes
+    needed = _needed(alone, points, degree)
+    if needed is not None:
+        raise TrainingError(
+            f"without the clip of line {examples[needed].row.line} the controls of all others "
+            "follow linearly from one another, and it can only be predicted by a drift of degree "
+            "0; expected at least two clips that differ there: add one, or set kriging.drift to 0"
+        )
+    return alone
+
+
+def _needed(groups: Indices, points: Floats, degree: int) -> int | None:
+    """First group without which points (N, d) do not determine a drift."""
+    functions = drift(points, points.shape[1], degree)
+    for group in np.unique(groups):
+        if np.linalg.matrix_rank(functions[groups != group]) < functions.shape[1]:
+            return int(group)
+    return None

@@ -73,7 +73,10 @@ def fit(experimental: Experimental, covariance: str) -> Fit:
     """Weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
 
     Nugget and sill enter linearly, so that for each range they are solved for and not searched.
+    Where no lag has pairs enough, as with a control of two values, nothing is known: no sill.
     """
+    if not len(experimental.pairs):
+        return Fit(0.0, 0.0, float(RANGES[-1]))
     squared = np.square(experimental.distances[None] / RANGES[:, None])
     rising = 1.0 - COVARIANCES[covariance].numpy(squared)
     weights = experimental.pairs / np.maximum(experimental.values, 1e-30) ** 2

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_export import export, ingest, recipe, train
+from model_export import export, ingest, recipe, samples, train
 from service.motion import quat
 from service.motion.conventions import UP
 from service.synthesis import session
@@ -14,7 +14,12 @@ from service.synthesis.synthesizer import Synthesizer
 RECIPES = Path(recipe.__file__).parent / "recipes"
 CLIPS = {"hdm05_grab_high": 29, "hdm05_deposit_floor": 32, "cmu_walk": 78}
 # How many times fewer numbers than the aligned tensor's the motion is stored in at 1 cm, at least.
-STORED = {"hdm05_grab_high": 15.0, "hdm05_deposit_floor": 8.5, "cmu_walk": 35.0}
+STORED = {"hdm05_grab_high": 15.5, "hdm05_deposit_floor": 9.0, "cmu_walk": 45.0}
+# Share of the variation between clips that the others predict, at least; 83, 62, 72 % measured.
+EXPLAINED = {"hdm05_grab_high": 0.79, "hdm05_deposit_floor": 0.58, "cmu_walk": 0.68}
+# How far a clip left out with its take may lie from its prediction, m; 11.3, 16.0, 4.2 measured.
+MISSED = {"hdm05_grab_high": 0.12, "hdm05_deposit_floor": 0.17, "cmu_walk": 0.045}
+PERFORMERS = {"hdm05_grab_high": 5, "hdm05_deposit_floor": 5}
 # How far from facing ahead a first pose may be, rad: a reach begins there by definition, though
 # cut to a few ranks; a walker's pelvis swings about its heading.
 FACING = {"hdm05_grab_high": 0.05, "hdm05_deposit_floor": 0.05, "cmu_walk": 0.25}
@@ -43,13 +48,23 @@ def test_a_recipe_trains_and_passes_the_gate(made):
     own, examples, trained, exported = made
     assert len(examples) == exported.card.samples == CLIPS[own.name]
     assert 0.0 < exported.parity < export.ALLOWED
-    assert len(exported.content) < 120_000
+    assert len(exported.content) < 95_000
     budget = 0.01 * own.size.rms_budget_cm
-    assert 0.9 * budget < exported.card.diagnostics["truncation_rms_m"] <= budget
-    assert 0.0 < exported.card.diagnostics["truncation_effector_m"] < 3 * budget
+    assert 0.97 * budget < exported.card.diagnostics["truncation_rms_m"] <= budget
+    assert 0.0 < exported.card.diagnostics["truncation_effector_m"] < 2.2 * budget
     assert exported.card.diagnostics["compression"]["stored"] > STORED[own.name]
     # The controls say something about every family; a field of nothing would explain nothing.
-    assert trained.explained["pose"] > 0.4
+    assert trained.explained["pose"] > EXPLAINED[own.name]
+    assert np.sqrt(trained.missed.mean()) < MISSED[own.name]
+
+
+def test_performers_are_told_apart(made):
+    own, examples, trained, _ = made
+    who = sorted({example.row.performer for example in examples})
+    assert trained.model.bank.performers == tuple(who)
+    assert len(who) == PERFORMERS.get(own.name, len(who)) > 1
+    # They move differently in every family: half a unit apart, where 0.05 is the least.
+    assert trained.pose.hyper.label > 0.3
 
 
 def test_a_clip_at_the_middle_begins_at_the_origin_and_faces_ahead(made, model):
@@ -79,7 +94,9 @@ def test_samples_are_met_better_than_by_the_mean_motion(made):
     own, examples, trained, _ = made
     aligned, model = trained.aligned, trained.model
     frames = np.tile(np.arange(float(own.motion.frames)), (len(examples), 1))
-    fields = model.bank.numpy(np.stack([example.controls for example in examples]))
+    labels = samples.labels([e.row.performer for e in examples], model.bank.performers)
+    controls = np.stack([example.controls for example in examples])
+    fields = model.bank.numpy(model.bank.points(controls, labels))
     rotations, root = model.decoder.numpy(fields["pose"], frames)
     mean = model.decoder.numpy(np.zeros_like(fields["pose"]), frames)[1]
     error, of_mean = (np.sqrt(np.mean((r - aligned.root_path) ** 2)) for r in (root, mean))

@@ -20,9 +20,14 @@ def covariance(request):
     return request.param
 
 
-@pytest.fixture(params=[0, 1], ids=["constant drift", "linear drift"])
+@pytest.fixture(params=[(0,), (1,), (0, 1)], ids=["constant drift", "linear drift", "both"])
 def hyper(request, covariance):
     return Hyper(covariance, request.param, np.array([0.5, 0.9, 1.4]), 0.1)
+
+
+def each_drift(hyper):
+    """The same field with each of its drifts alone."""
+    return [replace(hyper, drifts=(degree,)) for degree in hyper.drifts]
 
 
 @pytest.fixture
@@ -69,14 +74,14 @@ def test_drift_is_reproduced(hyper, samples, points):
     found = field.predict(points)
     assert far(found[:, 0], 5.0) < TOLERANCE
     away = far(found[:, 1:], linear(points))
-    assert away < TOLERANCE if hyper.drift else away > 1e-2
+    assert away < TOLERANCE if hyper.drifts == (1,) else away > 1e-2
 
 
 def test_weights_add_up_to_one_and_reproduce_the_drift(hyper, samples, points):
     weights = kriging.solve(hyper, samples, samples).weights(points)
     assert far(weights.sum(axis=1), 1.0) < TOLERANCE
     away = far(weights @ samples, points)
-    assert away < TOLERANCE if hyper.drift else away > 1e-2
+    assert away < TOLERANCE if hyper.drifts == (1,) else away > 1e-2
     near = kriging.covariances(hyper, points, samples)
     assert far(near.sum(axis=1), 1.0) > 1e-2
 
@@ -131,15 +136,52 @@ def test_weights_are_the_best_unbiased_ones(hyper, samples, values, points, rng)
     own = kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
     cross = kriging.covariances(hyper, points, samples)
     best = field.weights(points)
-    unbiased = np.linalg.qr(kriging.drift(samples, hyper.drift), mode="complete")[0]
-    free = unbiased[:, kriging.drift(samples, hyper.drift).shape[1] :]
+    functions = kriging.drift(samples, 3, max(hyper.drifts))
+    free = np.linalg.qr(functions, mode="complete")[0][:, functions.shape[1] :]
 
     def error(w):
         return 1.0 - 2.0 * np.sum(w * cross, axis=1) + np.sum((w @ own) * w, axis=1)
 
-    for _ in range(10):
-        other = best + 0.1 * rng.normal(size=(20, free.shape[1])) @ free.T
-        assert np.all(error(other) > error(best))
+    others = [best + 0.1 * rng.normal(size=(20, free.shape[1])) @ free.T for _ in range(10)]
+    if len(hyper.drifts) == 1:
+        assert all(np.all(error(other) > error(best)) for other in others)
+    else:
+        # Averaged weights are no optimum: those of the constant drift alone have less variance.
+        constant = kriging.solve(each_drift(hyper)[0], samples, values)
+        assert np.all(error(constant.weights(points)) < error(best))
+
+
+def test_two_drifts_predict_the_mean_of_both(hyper, samples, values, points):
+    field = kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
+    alone = [
+        kriging.solve(own, samples, values) for own in each_drift(replace(hyper, drifts=(0, 1)))
+    ]
+    predicted = [own.predict(points) for own in alone]
+    weighed = [own.weights(points) for own in alone]
+    assert far(field.predict(points), np.mean(predicted, axis=0)) < TOLERANCE
+    assert far(field.weights(points), np.mean(weighed, axis=0)) < TOLERANCE
+    assert min(far(field.predict(points), own) for own in predicted) > 1e-3
+    # Nor is the variance a mean: what the two err in common alone stays whole.
+    mean = np.mean([own.variance(points) for own in alone], axis=0)
+    assert far(field.variance(points), mean) > 1e-6
+    assert np.all(field.variance(points) < mean + TOLERANCE)
+
+
+def test_with_one_drift_the_variance_is_one_minus_the_systems_own_form(
+    hyper, samples, values, points
+):
+    for own, degree in zip(each_drift(hyper), hyper.drifts, strict=True):
+        functions = kriging.drift(samples, 3, degree)
+        k = functions.shape[1]
+        system = np.block(
+            [[kriging.noisy(own, samples), functions], [functions.T, np.zeros((k, k))]]
+        )
+        b = np.hstack([kriging.covariances(own, points, samples), kriging.drift(points, 3, degree)])
+        expected = 1.0 - np.sum(b @ np.linalg.inv(system) * b, axis=1)
+        field = kriging.solve(own, samples, values)
+        assert far(field.variance(points), expected) < TOLERANCE
+        both = kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
+        assert far(both.variance(points), expected) > 1e-6
 
 
 def test_variance_grows_away_from_the_samples(hyper, samples, values):
@@ -149,17 +191,43 @@ def test_variance_grows_away_from_the_samples(hyper, samples, values):
     assert outside > 1.0
 
 
-def test_leave_one_out_in_closed_form_is_what_leaving_out_gives(hyper, samples, values):
-    inverse = kriging.invert(hyper, samples)
-    residuals, variances = kriging.leave_one_out(inverse, values)
+def left_out_one_by_one(hyper, samples, values, groups):
+    """Residuals and variances of every sample by fields from all other groups, solved anew."""
+    residuals, variances = np.empty_like(values), np.empty(len(samples))
+    for group in np.unique(groups):
+        own = groups == group
+        field = kriging.solve(hyper, samples[~own], values[~own])
+        residuals[own] = values[own] - field.predict(samples[own])
+        variances[own] = field.variance(samples[own]) + hyper.nugget
+    return residuals, variances
+
+
+ALONE = np.arange(30)
+# Groups of one to five, of which no two neighbours need be of one.
+TAKES = np.repeat(ALONE, [5, 4, 3, 3, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1] + 14 * [0])[
+    np.random.Generator(np.random.PCG64(3)).permutation(30)
+]
+
+
+@pytest.mark.parametrize("groups", [ALONE, TAKES], ids=["alone", "takes"])
+def test_leaving_out_in_closed_form_is_what_leaving_out_gives(hyper, samples, values, groups):
+    matrix = kriging.leave_out(hyper, samples, groups)
+    residuals, variances = left_out_one_by_one(hyper, samples, values, groups)
+    assert far(matrix @ values, residuals) < TOLERANCE
+    own = np.sum((matrix @ kriging.noisy(hyper, samples)) * matrix, axis=1)
+    assert far(own, variances) < TOLERANCE
+    # Negative controls: nothing left out, and others left out together.
     fitted = values - kriging.solve(hyper, samples, values).predict(samples)
-    for i in range(30):
-        kept = np.arange(30) != i
-        field = kriging.solve(hyper, samples[kept], values[kept])
-        own = values[i] - field.predict(samples[i : i + 1])[0]
-        assert far(residuals[i], own) < TOLERANCE
-        assert far(variances[i], field.variance(samples[i : i + 1])[0] + hyper.nugget) < TOLERANCE
-        assert far(fitted[i], own) > 1e-3
+    assert far(fitted, residuals) > 1e-2
+    other = TAKES if groups is ALONE else ALONE
+    assert far(kriging.leave_out(hyper, samples, other) @ values, residuals) > 1e-2
+
+
+def test_names_of_groups_do_not_matter(hyper, samples):
+    renamed = np.array([7, 3, 100, -2, *range(200, 226)])[TAKES]
+    expected = kriging.leave_out(hyper, samples, TAKES)
+    assert np.array_equal(kriging.leave_out(hyper, samples, renamed), expected)
+    assert far(kriging.leave_out(hyper, samples, np.roll(TAKES, 1)), expected) > 1e-2
 
 
 def check(samples, degree=1, nugget_is_zero=False, names=NAMES):

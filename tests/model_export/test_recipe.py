@@ -9,6 +9,7 @@ import jsonschema
 import pytest
 
 from model_export import recipe
+from model_export.covariance import COVARIANCES
 from service.motion.errors import RecipeError
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
@@ -66,8 +67,8 @@ def test_the_least_recipe_is_read_and_the_rest_has_its_defaults(read):
     assert (least.name, least.source.metres_per_unit, least.motion.frames) == ("tiny", 0.01, 20)
     assert least.controls[0].unit == "m/s"
     assert (least.kriging.covariance, least.kriging.drift, least.kriging.nugget) == (
-        "matern52",
-        1,
+        "chosen",
+        "chosen",
         None,
     )
     assert (least.alignment.knots, least.size.ranks, least.source.root_offset) == (6, None, None)
@@ -151,7 +152,27 @@ FAULTS = {
     "name with a blank": ('"tiny"', '"tiny one"', ["name", "pattern", "'tiny one'"]),
     "another version": ("schema = 1", "schema = 2", ["schema", "should be 1", "found 2"]),
     "negative nugget": ("[size]", "[kriging]\nnugget = -0.1\n[size]", ["kriging.nugget", "-0.1"]),
-    "degree two": ("[size]", "[kriging]\ndrift = 2\n[size]", ["kriging.drift", "equal to 1"]),
+    "degree two": (
+        "[size]",
+        "[kriging]\ndrift = 2\n[size]",
+        ["kriging.drift", "0, 1, 'mean' or 'chosen'", "found 2"],
+    ),
+    "unknown drift": ("[size]", '[kriging]\ndrift = "best"\n[size]', ["kriging.drift", "'best'"]),
+    "unknown covariance": (
+        "[size]",
+        '[kriging]\ncovariance = "cubic"\n[size]',
+        ["kriging.covariance", "'matern52'", "'chosen'", "found 'cubic'"],
+    ),
+    "unknown label": (
+        "[size]",
+        '[kriging]\nlabel = "mood"\n[size]',
+        ["kriging.label", "should be 'performer'", "'mood'"],
+    ),
+    "unknown reference": (
+        "[size]",
+        '[alignment]\nreference = "medoid"\n[size]',
+        ["alignment.reference", "'prediction' or 'mean'", "'medoid'"],
+    ),
     "weight of zero": (
         "[size]",
         "[motion.joint_weights]\nHead = 0.0\n[size]",
@@ -168,6 +189,46 @@ def test_a_fault_is_named_with_its_key_and_what_was_expected(read, tmp_path, old
     assert caught.value.path == str(tmp_path / "recipe.toml")
     for part in said:
         assert part in caught.value.message
+
+
+DRIFTS = {
+    "0": ((0,),),
+    "1": ((1,),),
+    '"mean"': ((0, 1),),
+    '"chosen"': ((1,), (0, 1)),
+}
+
+
+@pytest.mark.parametrize(("said", "tried"), DRIFTS.items())
+def test_a_drift_says_which_degrees_are_tried(read, said, tried):
+    assert read(MINIMAL + f"[kriging]\ndrift = {said}\n").kriging.drifts == tried
+
+
+@pytest.mark.parametrize("name", [*COVARIANCES, "chosen"])
+def test_every_covariance_may_be_named(read, name):
+    own = read(MINIMAL + f'[kriging]\ncovariance = "{name}"\n').kriging
+    assert own.covariances == (("matern52", "gaussian") if name == "chosen" else (name,))
+
+
+@pytest.mark.parametrize("name", ["prediction", "mean"])
+def test_a_reference_may_be_named(read, name):
+    assert read(MINIMAL + f'[alignment]\nreference = "{name}"\n').alignment.reference == name
+    assert read(MINIMAL).alignment.reference == "prediction"
+
+
+def test_a_label_needs_the_column_that_says_who_moved(read):
+    labelled = MINIMAL + '[kriging]\nlabel = "performer"\n'
+    with pytest.raises(RecipeError, match=r"kriging\.label is 'performer', but clips\.performer"):
+        read(labelled)
+    told = labelled.replace('file = "file"', 'file = "file"\nperformer = "who"')
+    assert read(told).kriging.label == "performer"
+    assert read(MINIMAL).kriging.label is None
+
+
+def test_feet_are_named_or_there_are_none(read):
+    assert read(MINIMAL).motion.feet == []
+    footed = MINIMAL.replace("cyclic = false", 'cyclic = false\nfeet = ["l", "r"]')
+    assert read(footed).motion.feet == ["l", "r"]
 
 
 @pytest.mark.parametrize(

@@ -39,20 +39,23 @@ class Case:
     allowed: float
 
 
-def bank(covariance="matern52", drift=1, constant=(), same_drift=True):
-    """Fields pose, offsets, duration and warp; `constant` ones do not depend on the controls."""
+def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
+    """Fields pose, offsets, duration and warp; `constant` ones do not depend on the controls.
+
+    offsets: the drifts of the bone offsets' field, where they are others.
+    """
     own = rng()
     samples = own.uniform(-1.0, 1.0, (SAMPLES, CONTROLS))
     fields = {}
     for name, size in {"pose": 6, "offsets": 2, "duration": 1, "warp": 4}.items():
-        hyper = Hyper(covariance, drift, own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3))
-        if name == "offsets" and not same_drift:
-            hyper = replace(hyper, drift=1 - drift)
+        hyper = Hyper(covariance, drifts, own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3))
+        if name == "offsets" and offsets is not None:
+            hyper = replace(hyper, drifts=offsets)
         values = own.normal(size=(SAMPLES, size))
         solved = kriging.solve(hyper, samples, values)
         fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
     pose = fields.pop("pose")
-    return FieldBank(LOW, HIGH, pose, fields)
+    return FieldBank(LOW, HIGH, (), pose, fields)
 
 
 def asked():
@@ -64,12 +67,17 @@ def asked():
     return controls.astype(np.float32).astype(np.float64)
 
 
+def points(own, controls):
+    """Points of nobody in particular."""
+    return own.points(controls, np.zeros((len(controls), 0)))
+
+
 def field_bank(**given):
     own, controls = bank(**given), asked()
     found = outputs(lambda net, c: tuple(own.onnx(net, c)[1].values()), (2,) * 4, controls=controls)
-    expected = own.numpy(controls)
+    expected = own.numpy(points(own, controls))
     assert list(expected) == ["pose", "offsets", "duration", "warp"]
-    other = replace(own, high=HIGH * 1.05).numpy(controls)
+    other = own.numpy(points(replace(own, high=HIGH * 1.05), controls))
     # At a sample the distance is a root of what rounding leaves, where these have their kink.
     kinked = given.get("covariance") in ("exponential", "spherical")
     allowed = 2e-3 if kinked else 2e-4
@@ -79,18 +87,18 @@ def field_bank(**given):
 def basis_of_bank():
     own, controls = bank(), asked()
     found = outputs(lambda net, c: own.onnx(net, c)[0], (2,), controls=controls)
-    points = own.points(controls)
-    near = [kriging.covariances(field.hyper, points, field.samples) for field in own.kriged]
-    return Case(found, [np.hstack([points, *near])], [np.hstack([points, *near[::-1]])], 2e-5)
+    at = points(own, controls)
+    near = [kriging.covariances(field.hyper, at, field.samples) for field in own.kriged]
+    return Case(found, [np.hstack([at, *near])], [np.hstack([at, *near[::-1]])], 2e-5)
 
 
-def spread(covariance, drift):
-    own, controls = bank(covariance, drift), asked()
+def spread(covariance, drifts):
+    own, controls = bank(covariance, drifts), asked()
     stage = Spread(own.pose, 0.04)
     found = outputs(lambda net, c: stage.onnx(net, own.onnx(net, c)[0]), (1,), controls=controls)
-    points = own.points(controls)
-    without_nugget = np.sqrt(0.04 * own.pose.variance(points))
-    return Case(found, [stage.numpy(points)], [without_nugget], 1e-4)
+    at = points(own, controls)
+    without_nugget = np.sqrt(0.04 * own.pose.variance(at))
+    return Case(found, [stage.numpy(at)], [without_nugget], 1e-4)
 
 
 def timing(knots=6):
@@ -190,24 +198,33 @@ def travel():
     return Case(found, list(stage.numpy(**given)), list(wrong), 2e-6)
 
 
+DRIFTS = ((0,), (1,), (0, 1))
 CASES = {
     **{
-        f"fields, {name}, drift {drift}": (field_bank, {"covariance": name, "drift": drift})
+        f"fields, {name}, drifts {drifts}": (field_bank, {"covariance": name, "drifts": drifts})
         for name in COVARIANCES
-        for drift in (0, 1)
+        for drifts in DRIFTS
     },
     "fields, one constant": (field_bank, {"constant": ("duration",)}),
     "fields, all but the pose constant": (
         field_bank,
         {"constant": ("offsets", "duration", "warp")},
     ),
-    "fields, constant without drift": (field_bank, {"constant": ("warp",), "drift": 0}),
-    "fields, drifts of both degrees": (field_bank, {"same_drift": False}),
+    "fields, constant without drift": (field_bank, {"constant": ("warp",), "drifts": (0,)}),
+    **{
+        f"fields, drifts {drifts}, bones {offsets}": (
+            field_bank,
+            {"drifts": drifts, "offsets": offsets},
+        )
+        for drifts in DRIFTS
+        for offsets in DRIFTS
+        if drifts != offsets
+    },
     "basis of the fields": (basis_of_bank, {}),
     **{
-        f"spread, {name}, drift {drift}": (spread, {"covariance": name, "drift": drift})
+        f"spread, {name}, drifts {drifts}": (spread, {"covariance": name, "drifts": drifts})
         for name in COVARIANCES
-        for drift in (0, 1)
+        for drifts in DRIFTS
     },
     **{f"timing, {knots} knots": (timing, {"knots": knots}) for knots in (3, 4, 6, 12, 24)},
     "decoder": (decoder, {"stage": decoder_stage()}),
@@ -232,13 +249,21 @@ def test_graph_answers_what_the_reference_does(name):
 
 def test_constant_field_ignores_the_controls():
     own = bank(constant=("duration",))
-    values = own.numpy(asked())["duration"]
-    assert np.array_equal(values, np.repeat(values[:1], BATCH, axis=0))
-    assert np.ptp(own.numpy(asked())["pose"], axis=0).min() > 1e-2
+    values = own.numpy(points(own, asked()))
+    lengths = values["duration"]
+    assert np.array_equal(lengths, np.repeat(lengths[:1], BATCH, axis=0))
+    assert np.ptp(values["pose"], axis=0).min() > 1e-2
 
 
 def test_sampled_range_is_minus_one_to_one():
-    assert np.max(np.abs(bank().points(np.stack([LOW, HIGH])) - [[-1.0], [1.0]])) < 1e-12
+    assert np.max(np.abs(points(bank(), np.stack([LOW, HIGH])) - [[-1.0], [1.0]])) < 1e-12
+
+
+def test_labels_stand_behind_the_controls():
+    told = np.eye(2)
+    found = replace(bank(), performers=("ann", "bob")).points(np.stack([LOW, HIGH]), told)
+    assert np.array_equal(found[:, :CONTROLS], points(bank(), np.stack([LOW, HIGH])))
+    assert np.array_equal(found[:, CONTROLS:], told)
 
 
 def test_spread_at_a_sample_is_never_less_than_the_nugget():

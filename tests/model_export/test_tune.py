@@ -5,7 +5,8 @@ import pytest
 
 from model_export import kriging, tune
 from model_export.kriging import Hyper
-from model_export.tune import NUGGETS, SCALES
+from model_export.samples import Samples
+from model_export.tune import LABELS, NUGGETS, SCALES
 
 
 @pytest.fixture
@@ -20,7 +21,16 @@ def wave(samples):
 
 
 def guess(samples, values, covariance="matern52"):
-    return tune.first_guess(samples, values, covariance, 1)
+    return tune.first_guess(samples, values, covariance, (1,))
+
+
+def alone(samples):
+    """Samples each of its own group, of performers that nobody tells apart."""
+    return Samples(samples, samples.shape[1], np.arange(len(samples)))
+
+
+def tuned_at(samples, values, nugget=None):
+    return tune.tune(guess(samples, values), alone(samples), values, nugget)
 
 
 def left_out(hyper, samples, values):
@@ -42,8 +52,8 @@ def test_first_guess_keeps_within_the_bounds(samples, rng):
 
 def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
     values = wave(samples) + 0.2 * rng.normal(size=(50, 2))
-    hyper = Hyper("matern52", 1, np.array([1.0, 0.5]), 0.1)
-    found = tune.fixed(hyper, samples, values)
+    hyper = Hyper("matern52", (1,), np.array([1.0, 0.5]), 0.1)
+    found = tune.fixed(hyper, alone(samples), values)
     mean_of_others = (values.sum(axis=0) - values) / 49
     share = left_out(hyper, samples, values) / np.sum((values - mean_of_others) ** 2)
     assert abs(found.unexplained - share) < 1e-9
@@ -54,10 +64,10 @@ def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
 
 def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     samples = rng.uniform(-1.0, 1.0, size=(400, 2))
-    hyper = Hyper("matern52", 0, np.array([1.0, 1.0]), 0.1)
+    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1)
     root = np.linalg.cholesky(kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400))
     values = np.sqrt(2.5) * root @ rng.normal(size=(400, 6))
-    found = tune.fixed(hyper, samples, values)
+    found = tune.fixed(hyper, alone(samples), values)
     # Summed over six values; 2400 squares scatter by three per cent.
     assert abs(found.sill / (6 * 2.5) - 1.0) < 0.1
     unscaled = np.mean(np.sum(np.square(found.residuals), axis=1))
@@ -67,35 +77,35 @@ def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
 def test_tuning_leaves_less_than_any_start(samples, rng):
     values = wave(samples) + 0.05 * rng.normal(size=(50, 2))
     own = guess(samples, values)
-    tuned = tune.tune(own, samples, values, None)
+    tuned = tuned_at(samples, values)
     best = np.sum(np.square(tuned.residuals))
     for scale in (0.2, 0.5, 1.2):
         for nugget in (0.02, 0.3, 2.0):
-            start = Hyper("matern52", 1, np.full(2, scale), nugget)
-            assert best <= np.sum(np.square(tune.fixed(start, samples, values).residuals))
-    assert best <= np.sum(np.square(tune.fixed(own, samples, values).residuals))
+            start = Hyper("matern52", (1,), np.full(2, scale), nugget)
+            assert best <= np.sum(np.square(tune.fixed(start, alone(samples), values).residuals))
+    assert best <= np.sum(np.square(tune.fixed(own, alone(samples), values).residuals))
 
 
 def test_tuned_parameters_keep_within_the_bounds(samples, rng):
     for values in (wave(samples), samples @ np.ones((2, 1)), rng.normal(size=(50, 2))):
-        hyper = tune.tune(guess(samples, values), samples, values, None).hyper
+        hyper = tuned_at(samples, values).hyper
         assert np.all((hyper.scales >= SCALES[0] - 1e-12) & (hyper.scales <= SCALES[1] + 1e-12))
         assert NUGGETS[0] * (1 - 1e-9) <= hyper.nugget <= NUGGETS[1] * (1 + 1e-9)
 
 
 def test_control_that_matters_more_gets_the_larger_scale(samples):
     values = wave(samples)
-    x, y = tune.tune(guess(samples, values), samples, values, None).hyper.scales
+    x, y = tuned_at(samples, values).hyper.scales
     assert x > 2.0 * y
     swapped = samples[:, ::-1]
-    x, y = tune.tune(guess(swapped, values), swapped, values, None).hyper.scales
+    x, y = tuned_at(swapped, values).hyper.scales
     assert y > 2.0 * x
 
 
 def test_nugget_is_worth_the_variance_of_the_noise(samples, rng):
-    smooth = tune.tune(guess(samples, wave(samples)), samples, wave(samples), None)
+    smooth = tuned_at(samples, wave(samples))
     noisy = wave(samples) + 0.5 * rng.normal(size=(50, 2))
-    rough = tune.tune(guess(samples, noisy), samples, noisy, None)
+    rough = tuned_at(samples, noisy)
     expected = 2 * 0.5**2
     assert 0.5 * expected < rough.hyper.nugget * rough.sill < 2.0 * expected
     assert smooth.hyper.nugget * smooth.sill < 0.1 * expected
@@ -103,36 +113,132 @@ def test_nugget_is_worth_the_variance_of_the_noise(samples, rng):
 
 def test_given_nugget_is_kept(samples):
     values = wave(samples)
-    tuned = tune.tune(guess(samples, values), samples, values, 0.037)
+    tuned = tuned_at(samples, values, 0.037)
     assert tuned.hyper.nugget == 0.037
-    free = tune.tune(guess(samples, values), samples, values, None)
+    free = tuned_at(samples, values)
     assert free.hyper.nugget != 0.037
     assert free.unexplained <= tuned.unexplained
 
 
 def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
     noise = rng.normal(size=(50, 4))
-    assert tune.tune(guess(samples, wave(samples)), samples, wave(samples), None).unexplained < 0.05
-    assert tune.tune(guess(samples, noise), samples, noise, None).unexplained > 0.9
+    assert tuned_at(samples, wave(samples)).unexplained < 0.05
+    assert tuned_at(samples, noise).unexplained > 0.9
 
 
 def test_values_that_never_change_count_as_unexplained(samples):
-    assert (
-        tune.fixed(Hyper("matern52", 1, np.ones(2), 0.1), samples, np.zeros((50, 2))).unexplained
-        == 1.0
-    )
+    hyper = Hyper("matern52", (1,), np.ones(2), 0.1)
+    assert tune.fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
 
 
-def test_tuned_field_carries_the_inverse_of_its_own_system(samples):
-    tuned = tune.tune(guess(samples, wave(samples)), samples, wave(samples), None)
-    assert np.array_equal(tuned.inverse, kriging.invert(tuned.hyper, samples))
+PEOPLE, TAKES = 4, 20
+
+
+@pytest.fixture
+def people():
+    """Who moved in each of fifty samples, and in which take: no take is of two people."""
+    take = np.arange(50) % TAKES
+    return take % PEOPLE, take
+
+
+def labelled(samples, people):
+    who, takes = people
+    return Samples(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, takes)
+
+
+def own_ways(samples, people, rng, apart):
+    """Everybody's own wave on top of the common one."""
+    offsets = apart * rng.normal(size=(PEOPLE, 2))
+    return wave(samples) + offsets[people[0]] + 0.05 * rng.normal(size=(50, 2))
+
+
+def tuned_for(samples, people, values, nugget=None):
+    return tune.tune(guess(samples, values), labelled(samples, people), values, nugget)
+
+
+def test_groups_are_left_out_together(samples, people, rng):
+    values = own_ways(samples, people, rng, 1.0)
+    hyper = Hyper("matern52", (0, 1), np.array([1.0, 0.5]), 0.1, 0.8)
+    laid = labelled(samples, people)
+    found = tune.fixed(hyper, laid, values)
+    residuals, from_mean, variances = np.empty((50, 2)), np.empty((50, 2)), np.empty(50)
+    for take in range(TAKES):
+        own = people[1] == take
+        field = kriging.solve(hyper, laid.points[~own], values[~own])
+        residuals[own] = values[own] - field.predict(laid.points[own])
+        variances[own] = field.variance(laid.points[own]) + 0.1
+        from_mean[own] = values[own] - values[~own].mean(axis=0)
+    assert np.max(np.abs(found.residuals - residuals)) < 1e-9
+    assert np.max(np.abs(found.variances - variances)) < 1e-9
+    assert abs(found.unexplained - np.sum(residuals**2) / np.sum(from_mean**2)) < 1e-9
+    single = tune.fixed(hyper, Samples(laid.points, 2, np.arange(50)), values)
+    assert np.max(np.abs(single.residuals - residuals)) > 1e-2
+    assert abs(single.unexplained - found.unexplained) > 1e-3
+
+
+def test_performers_who_move_differently_are_told_apart(samples, people, rng):
+    values = own_ways(samples, people, rng, 1.0)
+    apart = tuned_for(samples, people, values)
+    # What counts is the label beside the nugget: this one is far above what alike ones get.
+    assert apart.hyper.label > 4.0 * LABELS[0]
+    blind = tune.tune(guess(samples, values), Samples(samples, 2, people[1]), values, None)
+    assert apart.unexplained < 0.5 * blind.unexplained
+
+
+def test_performers_who_move_alike_are_not_told_apart(samples, people, rng):
+    alike = tuned_for(samples, people, own_ways(samples, people, rng, 0.0))
+    # At the bound, to which the simplex is clipped.
+    assert alike.hyper.label < 1.2 * LABELS[0]
+
+
+def test_label_keeps_within_its_bounds(samples, people, rng):
+    for apart in (0.0, 0.3, 100.0):
+        label = tuned_for(samples, people, own_ways(samples, people, rng, apart)).hyper.label
+        assert LABELS[0] * (1 - 1e-9) <= label <= LABELS[1] * (1 + 1e-9)
+    assert tuned_at(samples, wave(samples)).hyper.label == 0.0
+
+
+def test_tuning_with_labels_leaves_less_than_any_start(samples, people, rng):
+    values = own_ways(samples, people, rng, 0.5)
+    best = np.sum(np.square(tuned_for(samples, people, values).residuals))
+    for scale in (0.2, 1.2):
+        for label in (0.5, 2.0):
+            start = Hyper("matern52", (1,), np.full(2, scale), 0.02, label)
+            found = tune.fixed(start, labelled(samples, people), values).residuals
+            assert best <= np.sum(np.square(found))
+
+
+def test_tuning_twice_gives_the_same_bits(samples, people, rng):
+    values = own_ways(samples, people, rng, 0.5)
+    a, b = (tuned_for(samples, people, values) for _ in range(2))
+    assert np.array_equal(a.residuals, b.residuals)
+    assert (a.hyper.label, a.hyper.nugget) == (b.hyper.label, b.hyper.nugget)
+
+
+def alike(a, b):
+    """Whether two fields are one: the simplex stops when its corners lie within a per cent."""
+    near = np.max(np.abs(np.log(a.hyper.scales / b.hyper.scales))) < 0.05
+    return near and abs(a.unexplained - b.unexplained) < 1e-4
 
 
 def test_order_of_samples_does_not_matter(samples, rng):
     values = wave(samples) + 0.1 * rng.normal(size=(50, 2))
     order = rng.permutation(50)
-    a = tune.tune(guess(samples, values), samples, values, None)
-    b = tune.tune(guess(samples[order], values[order]), samples[order], values[order], None)
-    # The simplex stops when its corners lie within a per cent of one another.
-    assert np.max(np.abs(np.log(a.hyper.scales / b.hyper.scales))) < 0.05
-    assert abs(a.unexplained - b.unexplained) < 1e-4
+    first = tuned_at(samples, values)
+    assert alike(first, tuned_at(samples[order], values[order]))
+    assert not alike(first, tuned_at(samples[order], values))
+
+
+def test_order_of_labelled_and_grouped_samples_does_not_matter(samples, people, rng):
+    values = own_ways(samples, people, rng, 0.5)
+    order = rng.permutation(50)
+    who, takes = people
+    first = tuned_for(samples, people, values)
+    second = tuned_for(samples[order], (who[order], takes[order]), values[order])
+    assert alike(first, second)
+    assert abs(np.log(first.hyper.label / second.hyper.label)) < 0.05
+    # Who is called first, and which take, is nothing either.
+    renamed = (who + 1) % PEOPLE, (7 * takes) % TAKES
+    third = tuned_for(samples, renamed, values)
+    assert alike(first, third)
+    assert not alike(first, tuned_for(samples, (who[order], takes[order]), values))

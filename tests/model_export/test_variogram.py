@@ -102,6 +102,16 @@ def test_fit_finds_the_model_that_was_put_in(covariance, reach):
     )
 
 
+@pytest.mark.parametrize("count", [3, 40])
+def test_without_a_lag_of_pairs_enough_there_is_no_sill(count, rng):
+    """As with a control of two values: pairs are at no distance or at the largest."""
+    samples = np.repeat([[-1.0], [1.0]], [1, count - 1], axis=0)
+    data = variogram.experimental(samples, rng.normal(size=(count, 2)))
+    assert len(data.pairs) == 0
+    found = variogram.fit(data, "matern52")
+    assert (found.nugget, found.sill, found.range) == (0.0, 0.0, RANGES[-1])
+
+
 def misfit(fit, data, covariance):
     gap = model(covariance, fit.nugget, fit.sill, fit.range, data.distances) - data.values
     return np.sum(data.pairs / data.values**2 * gap**2)

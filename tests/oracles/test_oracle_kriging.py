@@ -32,7 +32,7 @@ def points(rng):
 @pytest.mark.parametrize("degree", [0, 1])
 def test_gaussian_field_is_scipys(samples, values, points, degree, nugget):
     scales = np.array([0.8, 1.1, 0.9, 1.4])
-    own = kriging.solve(Hyper("gaussian", degree, scales, nugget), samples, values)
+    own = kriging.solve(Hyper("gaussian", (degree,), scales, nugget), samples, values)
     found = own.predict(points)
 
     def theirs(factor=3.0, smoothing=nugget, other=degree):
@@ -74,7 +74,7 @@ def test_value_and_variance_are_those_of_gstools(name, samples, values, points):
         # It is no covariance in four dimensions, and GSTools says so.
         samples, points = samples[:, :3], points[:, :3]
     scales = np.full(samples.shape[1], 1.0 / 1.6)
-    own = kriging.solve(Hyper(name, 1, scales, NUGGET), samples, values)
+    own = kriging.solve(Hyper(name, (1,), scales, NUGGET), samples, values)
     found, variance = own.predict(points), own.variance(points)
     for component in (0, 3):
         value, error = theirs(name, 1.6, samples, values[:, component], points)
@@ -88,17 +88,34 @@ def test_value_and_variance_are_those_of_gstools(name, samples, values, points):
     assert np.max(np.abs(variance - error)) > 1e-3
 
 
-@pytest.mark.parametrize("name", covariance.COVARIANCES)
-@pytest.mark.parametrize("degree", [0, 1])
-def test_leave_one_out_in_closed_form_is_what_leaving_out_gives(name, degree, samples, values):
-    hyper = Hyper(name, degree, np.array([0.5, 0.6, 0.9, 1.4]), NUGGET)
-    inverse = kriging.invert(hyper, samples)
-    residuals, variances = kriging.leave_one_out(inverse, values)
-    for i in range(0, 40, 3):
-        kept = np.arange(40) != i
-        field = kriging.solve(hyper, samples[kept], values[kept])
-        own = values[i] - field.predict(samples[i : i + 1])[0]
-        assert np.max(np.abs(residuals[i] - own)) < TOLERANCE
-        assert abs(variances[i] - NUGGET - field.variance(samples[i : i + 1])[0]) < TOLERANCE
-    kept_in = values - kriging.solve(hyper, samples, values).predict(samples)
-    assert np.max(np.abs(residuals - kept_in)) > 1e-2
+@pytest.mark.parametrize("nugget", [0.0, NUGGET])
+def test_two_drifts_are_the_mean_of_scipys_two_degrees(samples, values, points, nugget):
+    scales = np.array([0.8, 1.1, 0.9, 1.4])
+    found = kriging.solve(Hyper("gaussian", (0, 1), scales, nugget), samples, values)
+    given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": nugget}
+    both = [
+        RBFInterpolator(samples * scales, values, degree=degree, **given)(points * scales)
+        for degree in (0, 1)
+    ]
+    assert np.max(np.abs(found.predict(points) - np.mean(both, axis=0))) < TOLERANCE
+    assert np.max(np.abs(found.predict(points) - both[0])) > 1e-2
+
+
+@pytest.mark.parametrize("drifts", [(0,), (1,), (0, 1)], ids=str)
+def test_groups_left_out_are_what_scipy_predicts_from_the_rest(samples, values, drifts):
+    scales = np.array([0.8, 1.1, 0.9, 1.4])
+    groups = np.repeat(np.arange(10), 4)
+    hyper = Hyper("gaussian", drifts, scales, NUGGET)
+    found = kriging.leave_out(hyper, samples, groups) @ values
+    given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": NUGGET}
+    for group in range(10):
+        own = groups == group
+        predicted = [
+            RBFInterpolator(samples[~own] * scales, values[~own], degree=degree, **given)(
+                samples[own] * scales
+            )
+            for degree in drifts
+        ]
+        assert np.max(np.abs(found[own] - values[own] + np.mean(predicted, axis=0))) < TOLERANCE
+    alone = kriging.leave_out(hyper, samples, np.arange(40)) @ values
+    assert np.max(np.abs(found - alone)) > 1e-2

@@ -65,12 +65,15 @@ def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
     assert np.abs(bones - np.linalg.norm(own.tip_offsets, axis=-1)).max() < ROUNDING
 
 
-def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained, clip):
-    """To first order they are one: a fifth is what poses this far apart make of it."""
-    pair = figures.compare(trained, clip)
-    assert pair.apart == pytest.approx(np.sqrt(trained.missed[clip]), rel=0.2)
-    other = figures.compare(trained, int(np.argmin(trained.missed)))
-    assert other.apart != pytest.approx(np.sqrt(trained.missed.max()), rel=0.2)
+def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
+    """Over the family, whose poses the metric is averaged over, within five per cent; a single clip
+    may be a third off, for its joints hang otherwise than the family's do on average."""
+    clips = range(len(trained.examples))
+    drawn = np.array([figures.compare(trained, clip).apart for clip in clips])
+    missed = np.sqrt(trained.missed)
+    assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.sqrt(np.mean(missed**2)), rel=0.05)
+    assert np.abs(drawn / missed - 1.0).max() < 1.0 / 3.0
+    assert np.abs(drawn[::-1] / missed - 1.0).max() > 1.0
 
 
 def test_the_nearest_clip_is_the_nearest(trained, clip):

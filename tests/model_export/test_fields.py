@@ -1,0 +1,75 @@
+"""Which field is taken: the one that leave-one-out finds best among those to be tried."""
+
+import numpy as np
+import pytest
+
+from model_export import fields, tune
+from model_export.field_bank import Constant
+from model_export.kriging import Kriging as Field
+from model_export.recipe import Kriging
+from model_export.samples import Samples
+
+
+@pytest.fixture
+def laid(rng):
+    return Samples(rng.uniform(-1.0, 1.0, (40, 2)), 2, np.arange(40) // 2)
+
+
+@pytest.fixture(params=["smooth", "straight", "rough"])
+def values(request, laid, rng):
+    x, y = laid.points.T
+    ways = {
+        "smooth": np.stack([np.sin(3.0 * x), np.cos(2.0 * y)], axis=1),
+        "straight": np.stack([2.0 * x - y, 0.5 * y], axis=1),
+        "rough": np.stack([np.abs(x - 0.2), np.sign(y)], axis=1),
+    }
+    return ways[request.param] + 0.1 * rng.normal(size=(40, 2))
+
+
+def candidates(laid, values, covariances=("matern52", "gaussian"), drifts=((1,), (0, 1))):
+    found = {}
+    for covariance in covariances:
+        for own in drifts:
+            guess = tune.first_guess(laid.points, values, covariance, own)
+            found[covariance, own] = tune.tune(guess, laid, values, None)
+    return found
+
+
+def test_the_least_left_out_of_all_candidates_is_chosen(laid, values):
+    tried = candidates(laid, values)
+    best = min(tried, key=lambda name: tried[name].unexplained)
+    chosen = fields.chosen(Kriging(), laid, values)
+    assert (chosen.hyper.covariance, chosen.hyper.drifts) == best
+    assert chosen.unexplained == tried[best].unexplained
+    assert len({field.unexplained for field in tried.values()}) > 1
+
+
+@pytest.mark.parametrize(("drift", "drifts"), [(0, (0,)), (1, (1,)), ("mean", (0, 1))])
+def test_what_the_recipe_names_is_not_chosen_again(laid, values, drift, drifts):
+    settings = Kriging(covariance="exponential", drift=drift)
+    chosen = fields.chosen(settings, laid, values)
+    assert (chosen.hyper.covariance, chosen.hyper.drifts) == ("exponential", drifts)
+
+
+def test_fields_beside_the_pose_choose_their_drift_and_not_their_covariance(laid, values):
+    tried = candidates(laid, values, ("gaussian",))
+    best = min(tried, key=lambda name: tried[name].unexplained)
+    found = fields.fit(Kriging(), "gaussian", laid, values).field
+    assert isinstance(found, Field)
+    assert (found.hyper.covariance, found.hyper.drifts) == best
+
+
+def test_noise_is_answered_with_its_mean_and_a_field_is_not(laid, rng):
+    noise = rng.normal(size=(40, 2))
+    found = fields.fit(Kriging(), "matern52", laid, noise)
+    assert isinstance(found.field, Constant)
+    assert np.array_equal(found.field.mean, noise.mean(axis=0))
+    assert np.array_equal(found.residuals, laid.from_mean(noise))
+    kept = fields.fit(Kriging(nugget=0.1), "matern52", laid, noise)
+    assert isinstance(kept.field, Field)
+
+
+def test_values_that_never_change_are_a_constant(laid):
+    found = fields.fit(Kriging(), "matern52", laid, np.full((40, 2), 3.0))
+    assert isinstance(found.field, Constant)
+    assert found.explained == 0.0 and not found.residuals.any()

@@ -1,0 +1,197 @@
+"""What training makes of input that is odd: a clear refusal, or a model that says so."""
+
+import re
+
+import numpy as np
+import pytest
+from minimal import SKELETON, recipe_with, small_clip, write_clips
+
+from model_export import export, ingest, train
+from service.motion import quat
+from service.motion.clip import assemble
+from service.motion.errors import BvhError, RecipeError, TrainingError
+
+EIGHT = tuple(small_clip(0.1 * i, 21 + i % 3) for i in range(8))
+LABELLED = {"clips": {"performer": "who"}, "kriging": {"label": "performer"}}
+CUTS = {"clips": {"first_frame": "a", "last_frame": "b"}}
+
+
+@pytest.fixture
+def model(tmp_path):
+    """Function that trains a model of clips and the table that lists them, and writes its file."""
+
+    def of(motions, rows=None, head="file,v", **sections):
+        write_clips(tmp_path, motions)
+        if rows is not None:
+            (tmp_path / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
+        recipe = recipe_with(**sections)
+        examples, notes = ingest.ingest(recipe, tmp_path)
+        trained = train.train(recipe, examples, lambda _: None)
+        return trained, export.export(recipe, trained, notes)
+
+    return of
+
+
+def notes(exported):
+    return exported.card.diagnostics["notes"]
+
+
+def speeds(*values):
+    return [f"{index}.bvh,{value}" for index, value in enumerate(values)]
+
+
+def test_a_plain_family_has_nothing_to_be_noted(model):
+    trained, exported = model(EIGHT)
+    assert notes(exported) == []
+    assert trained.explained["pose"] > 0.9
+
+
+def test_equal_controls_with_different_motion_are_met_by_a_nugget(model):
+    """Pairs at one speed, of which half of the motion is not the speed's."""
+    trained, _ = model(EIGHT)
+    apart = [small_clip(0.1 * (i // 2) + 0.5 * (i % 2), 21 + i % 3) for i in range(8)]
+    twins, exported = model(apart, speeds(0, 0, 1, 1, 2, 2, 3, 3))
+    assert twins.pose.hyper.nugget > 0.1 > 10.0 * trained.pose.hyper.nugget
+    assert exported.card.samples == 8
+    # Neither of a pair is met: the answer lies between.
+    points = twins.model.bank.pose.samples
+    coefficients = twins.model.bank.pose.predict(points)
+    assert np.max(np.abs(coefficients[0] - coefficients[1])) < 1e-12
+    gaps = twins.model.decoder.reduced.bases[2] - coefficients
+    assert np.all(np.linalg.norm(gaps, axis=1) > 1e-2)
+
+
+def turning_arm(angle):
+    """A clip whose arm is turned by that angle at its end, and not at its beginning."""
+    clip = small_clip()
+    rotations = clip.rotations.copy()
+    share = np.linspace(0.0, 1.0, len(clip))
+    rotations[:, 3] = quat.about(np.array([0.0, 0.0, 1.0]), share * angle)
+    return assemble(SKELETON, rotations, clip.root_path, SKELETON.offsets, 30.0)
+
+
+def test_a_joint_far_from_its_mean_is_named_with_its_clip(model):
+    # Given, for with the least nugget a clip that is so unlike all others asks too much of float32.
+    nugget = {"kriging": {"nugget": 0.05}}
+    still = [turning_arm(0.3) for _ in range(7)]
+    _, exported = model([*still, turning_arm(0.98 * np.pi)], **nugget)
+    (said,) = notes(exported)
+    assert re.fullmatch(
+        r"line 9, 7\.bvh: close to half a turn from the family's mean: LeftArm by 16\d degrees",
+        said,
+    )
+    _, near = model([*still, turning_arm(0.8 * np.pi)], **nugget)
+    assert notes(near) == []
+
+
+@pytest.mark.parametrize("cell", ["nan", "inf", ""])
+def test_a_control_that_is_no_number_is_refused_by_line_and_column(model, cell):
+    with pytest.raises(RecipeError, match=r"clips\.csv:3: .*column 'v'.*") as refused:
+        model(EIGHT, speeds(0, cell, *range(2, 8)))
+    assert repr(cell) in str(refused.value)
+
+
+def spoil(tmp_path, old, new):
+    """Function that puts something else into the second motion file."""
+    path = tmp_path / "1.bvh"
+    text = path.read_text()
+    assert re.search(old, text)
+    path.write_text(re.sub(old, new, text, count=1))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (r"(Frame Time: \S+\s+)\S+", r"\1nan", r"1\.bvh:\d+: found 'nan', expected a number"),
+        (r"Frames: \d+", "Frames: 0", r"1\.bvh:\d+: found 0 frames, expected at least 1"),
+    ],
+    ids=["a number that is none", "no frame"],
+)
+def test_a_motion_file_that_holds_none_is_refused_by_line(tmp_path, old, new, said):
+    write_clips(tmp_path, EIGHT)
+    spoil(tmp_path, old, new)
+    with pytest.raises(BvhError, match=said):
+        ingest.ingest(recipe_with(), tmp_path)
+
+
+def test_a_clip_of_one_frame_is_refused_by_line(tmp_path, model):
+    still = small_clip(frames=2)
+    write_clips(tmp_path, [*EIGHT[:1], still, *EIGHT[2:]])
+    spoil(tmp_path, r"Frames: 2", "Frames: 1")
+    path = tmp_path / "1.bvh"
+    path.write_text("\n".join(path.read_text().rstrip("\n").split("\n")[:-1]) + "\n")
+    with pytest.raises((BvhError, RecipeError), match=r"frame"):
+        ingest.ingest(recipe_with(), tmp_path)
+    rows = [f"{i}.bvh,{i},0,{0 if i == 1 else 20}" for i in range(8)]
+    with pytest.raises(RecipeError, match=r"clips\.csv:3: .*frame"):
+        model(EIGHT, rows, "file,v,a,b", **CUTS)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_fewer_samples_than_a_line_needs_are_refused(model, count):
+    with pytest.raises(TrainingError, match=f"{count} samples, expected at least 3 for 1 control"):
+        model(EIGHT[:count])
+
+
+def test_as_many_samples_as_a_line_needs_are_enough(model):
+    trained, exported = model(EIGHT[:3])
+    assert exported.card.samples == 3
+    assert np.isfinite(trained.missed).all()
+
+
+def test_one_performer_is_told_apart_from_nobody(model):
+    rows = [f"{i}.bvh,{i},ann" for i in range(8)]
+    trained, exported = model(EIGHT, rows, "file,v,who", **LABELLED)
+    assert trained.model.bank.performers == exported.card.performers == ()
+    assert notes(exported) == [
+        "all clips are of one performer, 'ann': kriging.label tells nobody apart"
+    ]
+    plain, _ = model(EIGHT)
+    assert np.array_equal(trained.pose.residuals, plain.pose.residuals)
+
+
+def test_two_performers_are_told_apart(model):
+    rows = [f"{i}.bvh,{i // 2},{'ann' if i % 2 else 'bob'}" for i in range(8)]
+    apart = [small_clip(0.1 * (i // 2) + 0.5 * (i % 2), 21 + i % 3) for i in range(8)]
+    trained, exported = model(apart, rows, "file,v,who", **LABELLED)
+    assert exported.card.performers == ("ann", "bob")
+    assert notes(exported) == []
+    blind, _ = model(apart, rows, "file,v,who")
+    assert trained.missed.mean() < 0.5 * blind.missed.mean()
+
+
+@pytest.mark.parametrize("values", [(0, 1) * 4, (0, 1, 2, 2) * 2], ids=["two", "three"])
+def test_a_control_of_few_values_is_taken_and_they_are_listed(model, values):
+    trained, exported = model(EIGHT, speeds(*values))
+    (control,) = exported.card.controls
+    assert control.values == tuple(map(float, sorted(set(values))))
+    assert np.isfinite(trained.missed).all()
+    assert np.isfinite([*trained.pose.hyper.scales, trained.pose.hyper.nugget]).all()
+
+
+def test_a_control_of_many_values_is_a_continuum(model):
+    eleven = [small_clip(0.1 * i) for i in range(11)]
+    _, exported = model(eleven)
+    assert exported.card.controls[0].values == ()
+
+
+def test_a_value_that_one_clip_alone_has_is_refused_for_a_line(model):
+    with pytest.raises(TrainingError, match=r"without the clip of line 9 .* set kriging.drift to"):
+        model(EIGHT, speeds(0, 0, 0, 0, 0, 0, 0, 1))
+    trained, _ = model(EIGHT, speeds(0, 0, 0, 0, 0, 0, 0, 1), kriging={"drift": 0})
+    assert np.isfinite(trained.missed).all()
+
+
+def test_clips_of_one_take_make_a_model_that_says_so(model):
+    rows = [f"0.bvh,{i},{10 * i},{10 * i + 15}" for i in range(8)]
+    trained, exported = model([small_clip(0.0, 100)], rows, "file,v,a,b", **CUTS)
+    (said,) = notes(exported)
+    assert said.startswith("clips of one file are not left out together")
+    assert trained.explained["pose"] > 0.9
+
+
+def test_motions_that_are_all_the_same_make_a_model_of_their_mean(model):
+    trained, _ = model([EIGHT[0]] * 8)
+    assert np.sqrt(trained.missed.mean()) < 1e-6
+    answer = trained.model.evaluate(np.array([[0.0], [7.0]]), np.full((2, 1), 0.3))
+    assert np.ptp(answer.positions(SKELETON.parents), axis=0).max() < 1e-6
