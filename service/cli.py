@@ -45,6 +45,9 @@ Performer = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
+# What only the evaluation needs; everything else that can be missing is training's.
+EVALUATE = ("joblib", "numba", "sklearn")
+
 
 def main() -> None:
     """Run the command line; faults that have a name end as one line and an exit code."""
@@ -55,7 +58,8 @@ def main() -> None:
     try:
         app()
     except ModuleNotFoundError as fault:
-        typer.echo(f"posefield: needs {fault.name}: install posefield[train,evaluate]", err=True)
+        extra = "evaluate" if fault.name in EVALUATE else "train"
+        typer.echo(f"posefield: needs {fault.name}: install posefield[{extra}]", err=True)
         sys.exit(2)
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)
