@@ -12,7 +12,7 @@ from model_export.samples import Samples
 
 @pytest.fixture
 def laid(rng):
-    return Samples(rng.uniform(-1.0, 1.0, (40, 2)), 2, np.arange(40) // 2)
+    return Samples(rng.uniform(-1.0, 1.0, (24, 2)), 2, np.arange(24) // 2)
 
 
 @pytest.fixture(params=["smooth", "straight", "rough"])
@@ -23,7 +23,7 @@ def values(request, laid, rng):
         "straight": np.stack([2.0 * x - y, 0.5 * y], axis=1),
         "rough": np.stack([np.abs(x - 0.2), np.sign(y)], axis=1),
     }
-    return ways[request.param] + 0.1 * rng.normal(size=(40, 2))
+    return ways[request.param] + 0.1 * rng.normal(size=(24, 2))
 
 
 def candidates(laid, values, covariances=("matern52", "gaussian"), drifts=((1,), (0, 1))):
@@ -60,7 +60,7 @@ def test_fields_beside_the_pose_choose_their_drift_and_not_their_covariance(laid
 
 
 def test_noise_is_answered_with_its_mean_and_a_field_is_not(laid, rng):
-    noise = rng.normal(size=(40, 2))
+    noise = rng.normal(size=(24, 2))
     found = fields.fit(Kriging(), "matern52", laid, noise)
     assert isinstance(found.field, Constant)
     assert np.array_equal(found.field.mean, noise.mean(axis=0))
@@ -70,6 +70,6 @@ def test_noise_is_answered_with_its_mean_and_a_field_is_not(laid, rng):
 
 
 def test_values_that_never_change_are_a_constant(laid):
-    found = fields.fit(Kriging(), "matern52", laid, np.full((40, 2), 3.0))
+    found = fields.fit(Kriging(), "matern52", laid, np.full((24, 2), 3.0))
     assert isinstance(found.field, Constant)
     assert found.explained == 0.0 and not found.residuals.any()
