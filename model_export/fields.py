@@ -14,6 +14,8 @@ from service.motion.conventions import Floats
 
 # Bone offsets that a model need not tell apart, m.
 SAME_BONE = 5e-4
+# A Gaussian field is conditioned worse than one of Matérn: what it gains has to be worth that.
+CLEARLY = 0.95
 # Standard errors by which a field of the controls has to be better than none.
 SURE = 2.0
 
@@ -28,9 +30,11 @@ class Fitted:
 
 
 def chosen(settings: Kriging, samples: Samples, values: Floats) -> Tuned:
-    """Field of values (N, m) of least leave-one-out error among the covariances to be tried."""
-    found = [tuned(settings, name, samples, values) for name in settings.covariances]
-    return min(found, key=lambda field: field.unexplained)
+    """Field of values (N, m) of the first covariance to be tried, or one of clearly less
+    leave-one-out error."""
+    first, *others = (tuned(settings, name, samples, values) for name in settings.covariances)
+    best = min(others, key=lambda field: field.unexplained, default=first)
+    return best if best.unexplained < CLEARLY * first.unexplained else first
 
 
 def tuned(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Tuned:

@@ -120,8 +120,8 @@ class Kriging(_Part):
         "matern52", "matern32", "gaussian", "exponential", "spherical", "chosen"
     ] = Field(
         default="chosen",
-        description="how alike motions are by their distance; chosen is matern52 or gaussian, "
-        "whichever leave-one-out finds better",
+        description="how alike motions are by their distance; chosen is matern52, or "
+        "gaussian where leave-one-out finds it better by a twentieth",
     )
     drift: Literal[0, 1, "mean", "chosen"] = Field(
         default="chosen",
