@@ -49,8 +49,8 @@ class Trained:
     tuned pose field. values: what each field is laid through (N, m), the pose's whole motions in
     the coordinates of the sample mode. missed (N,): mean squared joint distance, m², of each clip
     from what all others predict for it. explained: for each field the share of the variation
-    between clips that leave-one-out predicts from the controls; one at or below zero is answered
-    with its mean.
+    between clips that leave-one-out predicts from the controls; one that is not surely above zero
+    is answered with its mean.
     fidelity: what the truncation costs.
     """
 

@@ -54,11 +54,11 @@ class Fields:
         """A row a field."""
         words = (
             "The share of the variation between clips that leave-one-out predicts from the "
-            "controls. At or below zero the controls explain nothing, and the field is answered "
-            "with its mean. A scale is what a half-range of the control is worth as distance: at "
-            "the lower bound of 0.15 the field is all but linear in it. The nugget, as share of "
-            "the sill, is what equal controls leave open. Performers is how far apart two of them "
-            "are, wherever the controls are equal; zero where they are not told apart.",
+            "controls. A field that does not gain on the mean of the clips by two standard errors "
+            "is answered with that mean. A scale is what a half-range of the control is worth as "
+            "distance: at the lower bound of 0.15 the field is all but linear in it. The nugget, "
+            "as share of the sill, is what equal controls leave open. Performers is how far apart "
+            "two of them are, wherever the controls are equal; zero where they are not told apart.",
         )
         heading = ("field", "what it is", "explained", "answered with", "nugget", "performers")
         scales = tuple(f"scale: {name}" for name in self.controls)
