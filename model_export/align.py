@@ -56,14 +56,14 @@ def align(
     joint_weights (J,): importance of each joint's position in the comparison. The mean warp is
     the identity: canonical time is the family's own average, not the reference's.
     """
-    traces = [_trace(example.clip, np.sqrt(joint_weights)) for example in examples]
+    traces = [trace(example.clip, np.sqrt(joint_weights)) for example in examples]
     marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
     medoid = _medoid(_straight(traces, marks, COARSE))
     fine = _straight(traces, marks, FINE)
     logs = _round(fine, fine[medoid], marks, basis)
     for _ in range(rounds):
         pairs = zip(traces, logs, strict=True)
-        warped = np.stack([_at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs])
+        warped = np.stack([at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs])
         predicted = predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
         logs = _round(fine, predicted, marks, basis)
     resampled = [
@@ -83,14 +83,14 @@ def _even(frames: int) -> Floats:
     return np.linspace(0.0, 1.0, frames)
 
 
-def _trace(clip: Clip, weights: Floats) -> Floats:
-    """Joint positions (F, J * 3) around the root, seen from its heading, m."""
+def trace(clip: Clip, weights: Floats) -> Floats:
+    """Joint positions (F, J * 3) around the root, seen from its heading, m, times weights (J,)."""
     positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
     facing = quat.about(UP, -heading(clip))[:, None]
     return (quat.rotate(facing, positions) * weights[:, None]).reshape(len(clip), -1)
 
 
-def _at(values: Floats, u: Floats) -> Floats:
+def at(values: Floats, u: Floats) -> Floats:
     """Rows (S, features) of values (F, features) at fractions u (S,) of the way through."""
     place = u * (len(values) - 1)
     before = np.minimum(place.astype(np.int64), len(values) - 2)
@@ -109,7 +109,7 @@ def _straight(traces: list[Floats], marks: Floats, frames: int) -> Floats:
     """Traces (N, frames, features) with their landmarks brought together by straight lines."""
     knees, canonical = _knees(marks)
     times = [np.interp(_even(frames), canonical, own) for own in knees]
-    return np.stack([_at(trace, u) for trace, u in zip(traces, times, strict=True)])
+    return np.stack([at(trace, u) for trace, u in zip(traces, times, strict=True)])
 
 
 def _medoid(traces: Floats) -> int:
@@ -153,7 +153,7 @@ def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
     before = np.minimum(place.astype(np.int64), len(clip) - 2)
     share = place - before
     rotations = quat.slerp(clip.rotations[before], clip.rotations[before + 1], share[:, None])
-    return rotations, _at(clip.root_path, np.clip(u, 0.0, 1.0))
+    return rotations, at(clip.root_path, np.clip(u, 0.0, 1.0))
 
 
 def positions(aligned: Aligned, parents: tuple[int, ...], offsets: Floats) -> Floats:

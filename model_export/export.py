@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost, samples
+from model_export import cost, phase, samples, strangers
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -176,7 +176,12 @@ def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str,
         "nugget": _round(hyper.nugget),
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
-        "notes": notes + _found(trained),
+        "notes": [
+            *notes,
+            *strangers.notes(trained),
+            *phase.notes(trained.examples),
+            *_found(trained),
+        ],
     }
 
 

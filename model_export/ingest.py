@@ -25,7 +25,8 @@ class Example:
     """One clip with what it is an example of.
 
     controls (d,), landmarks: fractions of the clip, in order. jumps: what a solver did to small
-    joints between two frames, and is undone.
+    joints between two frames, and is undone. shift: the share of a cycle by which it begins later
+    than it was cut.
     """
 
     row: Row
@@ -33,6 +34,7 @@ class Example:
     controls: Floats
     landmarks: tuple[float, ...]
     jumps: tuple[Finding, ...]
+    shift: float = 0.0
 
     @property
     def offsets(self) -> Floats:
@@ -87,9 +89,9 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
         notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
     # Before a cycle is closed, which would spread a jump over all of it.
     clip, jumps = flips.without_jumps(clip, 0)
-    clip = _loop(_heading_out(clip)) if recipe.motion.cyclic else _origin_out(clip)
+    clip = _loop(set_out(clip)) if recipe.motion.cyclic else _origin_out(clip)
     if recipe.motion.root == "in_place":
-        clip = _travel_out(clip)
+        clip = stay(clip)
     return Example(row, clip, row.controls, _landmarks(row, last), tuple(jumps))
 
 
@@ -170,14 +172,18 @@ def _origin_out(clip: Clip) -> Clip:
     return place(clip, _floor(clip.root_path[0]), heading(clip)[0])
 
 
-def _heading_out(clip: Clip) -> Clip:
-    """The same for a gait, whose pelvis swings: the straight line through its heading counts."""
+def set_out(clip: Clip) -> Clip:
+    """Clip of a gait over the origin, facing ahead at the start of the line through its heading.
+
+    Its pelvis swings: the first frame alone does not say where the walker is going.
+    """
     time = np.arange(len(clip)) / (len(clip) - 1)
     _, at_start = np.polyfit(time, heading(clip), 1)
     return place(clip, _floor(clip.root_path[0]), at_start)
 
 
-def _travel_out(clip: Clip) -> Clip:
+def stay(clip: Clip) -> Clip:
+    """Clip without the straight line of its travel over the floor."""
     translations = clip.translations.copy()
     travel = _floor(clip.root_path[-1] - clip.root_path[0])
     translations[:, 0] -= np.linspace(0.0, 1.0, len(clip))[:, None] * travel

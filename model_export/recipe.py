@@ -111,6 +111,11 @@ class Alignment(_Part):
         default="prediction",
         description="what a clip is re-aligned to: what the others predict for it, or their mean",
     )
+    begin: Literal["in_phase", "as_cut"] = Field(
+        default="as_cut",
+        description="where a cyclic clip begins: as_cut where its frames say, or in_phase with "
+        "the family, for cycles that were cut at no moment in particular",
+    )
 
 
 class Kriging(_Part):

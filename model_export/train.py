@@ -13,8 +13,10 @@ from model_export import (
     fields,
     hosvd,
     kriging,
+    phase,
     ranks,
     samples,
+    strangers,
     tensor,
     travel,
 )
@@ -29,6 +31,7 @@ from model_export.hosvd import Multilinear
 from model_export.ingest import Example
 from model_export.model import Model
 from model_export.recipe import Recipe
+from model_export.strangers import Stranger
 from model_export.tensor import MotionTensor
 from model_export.timing import Timing
 from model_export.travel import Travel
@@ -51,7 +54,8 @@ class Trained:
     from what all others predict for it. explained: for each field the share of the variation
     between clips that leave-one-out predicts from the controls; one that is not surely above zero
     is answered with its mean.
-    fidelity: what the truncation costs.
+    residuals: of each field but the pose, left out (N, m). fidelity: what the truncation costs.
+    strangers: what speaks against clips that do not seem to belong.
     """
 
     model: Model
@@ -65,7 +69,9 @@ class Trained:
     missed: Floats
     explained: dict[str, float]
     findings: list[Finding]
+    residuals: dict[str, Floats]
     fidelity: Fidelity
+    strangers: tuple[Stranger, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,13 +107,15 @@ def _train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Train
     examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")
     weights = fidelity.joint_weights(recipe, examples)
+    examples = phase.in_phase(recipe, examples, weights)
     moved = _move(recipe, examples, weights)
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
     own_tensor = tensor.build(moved.numbers, moved.chart, parents, moved.offsets, weights)
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
-    return _fit(recipe, examples, moved, own_tensor, full)
+    trained = _fit(recipe, examples, moved, own_tensor, full)
+    return replace(trained, strangers=strangers.find(recipe, trained))
 
 
 def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
@@ -193,6 +201,7 @@ def _fit(
         missed,
         {"pose": 1.0 - pose.unexplained, **explained},
         moved.findings,
+        {name: found.residuals for name, found in fitted.items()},
         judge.of(reduced),
     )
 

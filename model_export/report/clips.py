@@ -23,6 +23,7 @@ class Clips:
     """Clips by how far they lie from what all others predict: missed (N,), m, largest first.
 
     indices (N,): into the trained examples. files and performers: of each clip. controls (N, d).
+    strangers (N,): what speaks against each clip, nothing against most; none at all where empty.
     """
 
     missed: Floats
@@ -31,6 +32,7 @@ class Clips:
     performers: tuple[str, ...]
     controls: Floats
     names: tuple[str, ...]
+    strangers: tuple[str, ...] = ()
 
     @property
     def worst(self) -> tuple[int, ...]:
@@ -54,9 +56,15 @@ class Clips:
         means = {name: (len(m), float(np.sqrt(np.mean(m**2)))) for name, m in own.items()}
         return dict(sorted(means.items(), key=lambda item: -item[1][1]))
 
+    @property
+    def _against(self) -> tuple[str, ...]:
+        return self.strangers or ("",) * len(self.files)
+
     def facts(self) -> dict[str, Any]:
         """Every clip, the worst first."""
-        named = zip(self.files, self.performers, self.missed, self.controls, strict=True)
+        named = zip(
+            self.files, self.performers, self.missed, self.controls, self._against, strict=True
+        )
         return {
             "rms_m": plain.number(self.mean),
             "performers": [
@@ -69,8 +77,9 @@ class Clips:
                     "performer": performer,
                     "missed_m": plain.number(missed),
                     "controls": dict(zip(self.names, plain.numbers(given), strict=True)),
+                    "against": against,
                 }
-                for file, performer, missed, given in named
+                for file, performer, missed, given, against in named
             ],
         }
 
@@ -87,7 +96,8 @@ class Clips:
         )
         caption = (
             "Distance of each clip from its prediction, the worst first, with its performer. "
-            "Orange clips are drawn below; the dashed line is the root mean square."
+            "Orange clips are drawn below; the dashed line is the root mean square. Outlined clips "
+            "do not seem to belong."
         )
         drawn = picture.draw("clips", 3.0, self._paint, alt, caption)
         return Section("clips", "Every clip left out", (said,), self._tables(), (drawn,))
@@ -98,7 +108,10 @@ class Clips:
             for name, (count, mean) in self.by_performer.items()
         )
         own = Table(("performer", "clips", "cm"), rows)
-        return (self._named(), own) if rows else (self._named(),)
+        strange = tuple((f, s) for f, s in zip(self.files, self._against, strict=True) if s)
+        told = Table(("does not seem to belong", "what speaks against it"), strange)
+        tables = ((told, strange), (self._named(), self.files), (own, rows))
+        return tuple(table for table, content in tables if content)
 
     def _named(self) -> Table:
         rows = [
@@ -113,7 +126,9 @@ class Clips:
         ax = figure.subplots()
         at = np.arange(len(self.missed))
         colours = [picture.ORANGE if i < DRAWN else picture.BLUE for i in at]
-        ax.bar(at, 100 * self.missed, width=0.72, color=colours)
+        # A stranger stands out by its outline, in any colour.
+        edges = [picture.INK if against else "none" for against in self._against]
+        ax.bar(at, 100 * self.missed, width=0.72, color=colours, edgecolor=edges, linewidth=1.6)
         ax.axhline(100 * self.mean, color=picture.INK, linestyle="--", linewidth=0.9)
         ax.grid(visible=False, axis="x")
         ax.set(ylabel="missed by (cm)", xlim=(-0.7, len(at) - 0.3))
@@ -134,4 +149,11 @@ def of(trained: Trained, controls: tuple[Control, ...]) -> Clips:
         tuple(example.row.performer for example in examples),
         np.stack([example.controls for example in examples]),
         tuple(control.name for control in controls),
+        _against(trained, order),
+    )
+
+
+def _against(trained: Trained, order: list[int]) -> tuple[str, ...]:
+    return tuple(
+        "; ".join(one.said for one in trained.strangers if one.clip == clip) for clip in order
     )

@@ -22,11 +22,13 @@ ENDS = 0.1
 
 @dataclass(frozen=True)
 class Warps:
-    """maps (N, 501): canonical time of each clip's own times. labels and durations, s, of each."""
+    """maps (N, 501): canonical time of each clip's own times. labels and durations, s, of each.
+    shifts (N,): the share of its cycle by which each begins later than it was cut."""
 
     maps: Floats
     labels: tuple[str, ...]
     durations: Floats
+    shifts: Floats | None = None
 
     @property
     def _factors(self) -> Floats:
@@ -63,6 +65,7 @@ class Warps:
                     "largest_stretch": plain.number(self.stretches[i]),
                     "at_share": plain.number(self.places[i]),
                     "at_the_bound": bool(self.bound[i]),
+                    "shift": plain.number(0.0 if self.shifts is None else self.shifts[i]),
                 }
                 for i in self._order
             ]
@@ -94,7 +97,19 @@ class Warps:
             "Right: how much the pace of each clip was changed where it was changed most, sorted.",
         )
         table = Table(("stretched most", "duration (s)", "times", "at"), rows)
-        return Section("warps", "Alignment in time", (said, self._bounded()), (table,), (drawn,))
+        words = (said, self._bounded(), *self._shifted())
+        return Section("warps", "Alignment in time", words, (table,), (drawn,))
+
+    def _shifted(self) -> tuple[str, ...]:
+        if self.shifts is None or not self.shifts.any():
+            return ()
+        most = int(np.argmax(np.abs(self.shifts)))
+        return (
+            "Before that every cycle was begun at the family's phase: "
+            f"{100 * np.sqrt(np.mean(np.square(self.shifts))):.1f} % of a cycle from where it was "
+            f"cut (root mean square), {self.labels[most]} by {100 * self.shifts[most]:+.1f} %. Its "
+            "end, and what is said to happen there, moved with it.",
+        )
 
     def _bounded(self) -> str:
         met = int(self.bound.sum())
@@ -132,4 +147,5 @@ def of(trained: Trained) -> Warps:
         trained.model.timing.basis.evaluate(aligned.logs, DENSE),
         tuple(left_out.label(example) for example in trained.examples),
         aligned.durations,
+        np.array([example.shift for example in trained.examples]),
     )
