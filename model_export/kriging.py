@@ -18,7 +18,7 @@ from service.motion.errors import TrainingError
 
 @dataclass(frozen=True)
 class Hyper:
-    """covariance: its name. drifts: polynomial degrees whose predictions are averaged, of 0 and 1.
+    """covariance: its name. drifts: polynomial degrees, 0 or 1, whose predictions are averaged.
     scales (d,): what a unit of each control is worth as distance (one over the range). nugget: as
     a share of the sill. label: the distance between two performers who are told apart, who never
     enter the drift."""
@@ -119,9 +119,11 @@ def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
     out together. Closed form from the inverse of the whole system (Dubrule 1983, for blocks).
     """
     inverse = np.asarray(np.linalg.inv(noisy(hyper, samples)), dtype=np.float64)
-    functions = [drift(samples, len(hyper.scales), degree) for degree in hyper.drifts]
-    residuals = [_left_out(_without(inverse, f), groups) for f in functions]
-    return np.mean(np.stack(residuals), axis=0)
+    residuals = {
+        degree: _left_out(_without(inverse, drift(samples, len(hyper.scales), degree)), groups)
+        for degree in sorted(set(hyper.drifts))
+    }
+    return np.mean(np.stack([residuals[degree] for degree in hyper.drifts]), axis=0)
 
 
 def _without(inverse: Floats, functions: Floats) -> Floats:

@@ -118,6 +118,10 @@ class Alignment(_Part):
     )
 
 
+# Degree one meets targets, degree zero keeps what clips have in common.
+MIXED = (0, 1, 1)
+
+
 class Kriging(_Part):
     """The field of the control coefficients."""
 
@@ -128,10 +132,10 @@ class Kriging(_Part):
         description="how alike motions are by their distance; chosen is matern52, or "
         "gaussian where leave-one-out finds it better by a twentieth",
     )
-    drift: Literal[0, 1, "mean", "chosen"] = Field(
+    drift: Literal[0, 1, "mixed", "chosen"] = Field(
         default="chosen",
-        description="polynomial degree; mean is the mean of what both degrees predict, and chosen "
-        "is that or degree one, whichever leave-one-out finds better",
+        description="polynomial degree; mixed is one part of what degree zero predicts and two of "
+        "degree one, and chosen is that or degree one, whichever leave-one-out finds better",
     )
     nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
         default=None, description="share of the sill; fitted by leave-one-out if not said"
@@ -151,8 +155,8 @@ class Kriging(_Part):
     def drifts(self) -> tuple[tuple[int, ...], ...]:
         """What is tried of the degrees whose predictions are averaged."""
         if self.drift == "chosen":
-            return (1,), (0, 1)
-        return ((0, 1),) if self.drift == "mean" else ((self.drift,),)
+            return (1,), MIXED
+        return (MIXED,) if self.drift == "mixed" else ((self.drift,),)
 
 
 class Event(_Part):

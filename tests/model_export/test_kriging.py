@@ -20,7 +20,7 @@ def covariance(request):
     return request.param
 
 
-@pytest.fixture(params=[(0,), (1,), (0, 1)], ids=["constant drift", "linear drift", "both"])
+@pytest.fixture(params=[(0,), (1,), (0, 1), (0, 1, 1)], ids=["constant", "linear", "both", "mixed"])
 def hyper(request, covariance):
     return Hyper(covariance, request.param, np.array([0.5, 0.9, 1.4]), 0.1)
 

@@ -194,8 +194,8 @@ def test_a_fault_is_named_with_its_key_and_what_was_expected(read, tmp_path, old
 DRIFTS = {
     "0": ((0,),),
     "1": ((1,),),
-    '"mean"': ((0, 1),),
-    '"chosen"': ((1,), (0, 1)),
+    '"mixed"': ((0, 1, 1),),
+    '"chosen"': ((1,), (0, 1, 1)),
 }
 
 
