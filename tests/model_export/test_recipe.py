@@ -155,7 +155,7 @@ FAULTS = {
     "degree two": (
         "[size]",
         "[kriging]\ndrift = 2\n[size]",
-        ["kriging.drift", "0, 1, 'mean' or 'chosen'", "found 2"],
+        ["kriging.drift", "0, 1, 'mixed' or 'chosen'", "found 2"],
     ),
     "unknown drift": ("[size]", '[kriging]\ndrift = "best"\n[size]', ["kriging.drift", "'best'"]),
     "unknown covariance": (

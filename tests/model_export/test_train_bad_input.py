@@ -75,13 +75,13 @@ def test_a_joint_far_from_its_mean_is_named_with_its_clip(model):
     nugget = {"kriging": {"nugget": 0.05}}
     still = [turning_arm(0.3) for _ in range(7)]
     _, exported = model([*still, turning_arm(0.98 * np.pi)], **nugget)
-    (said,) = notes(exported)
+    (said,) = [note for note in notes(exported) if "half a turn" in note]
     assert re.fullmatch(
         r"line 9, 7\.bvh: close to half a turn from the family's mean: LeftArm by 16\d degrees",
         said,
     )
     _, near = model([*still, turning_arm(0.8 * np.pi)], **nugget)
-    assert notes(near) == []
+    assert not [note for note in notes(near) if "half a turn" in note]
 
 
 @pytest.mark.parametrize("cell", ["nan", "inf", ""])
