@@ -103,8 +103,8 @@ def _cut(clip: Clip, first: int, last: int) -> Clip:
 def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
     """Clip without the dropped joints and all that hangs below them."""
     joints = clip.skeleton
-    missing = set(recipe.motion.drop_joints) | set(recipe.motion.joint_weights)
-    missing -= set(joints.names)
+    needed = _needed(recipe)
+    missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
     if missing:
         raise row.fault(f"{row.place} has no joints {sorted(missing)} that the recipe names")
     dropped = {joints.names.index(name) for name in recipe.motion.drop_joints}
@@ -114,6 +114,9 @@ def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
     if 0 in dropped:
         raise row.fault("the root cannot be dropped")
     kept = [joint for joint in range(len(joints)) if joint not in dropped]
+    gone = needed - {joints.names[joint] for joint in kept}
+    if gone:
+        raise row.fault(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
     tips = [i for i, joint in enumerate(joints.tip_joints) if joint not in dropped]
     smaller = Skeleton(
         tuple(joints.names[joint] for joint in kept),
@@ -123,6 +126,12 @@ def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
         joints.tip_offsets[tips],
     )
     return Clip(smaller, clip.rotations[:, kept], clip.translations[:, kept], clip.rate)
+
+
+def _needed(recipe: Recipe) -> set[str]:
+    """Joints that a recipe speaks of."""
+    event = {recipe.event.joint} if recipe.event else set()
+    return {*recipe.motion.joint_weights, *recipe.motion.feet} | event
 
 
 def _landmarks(row: Row, last: int) -> tuple[float, ...]:

@@ -178,6 +178,11 @@ def test_joints_behind_a_dropped_one_keep_their_parents(read):
         ({"drop_joints": ["Hips"]}, "the root cannot be dropped"),
         ({"drop_joints": ["Tail"]}, r"0\.bvh has no joints \['Tail'\] that the recipe names"),
         ({"joint_weights": {"Tail": 2.0}}, r"0\.bvh has no joints \['Tail'\]"),
+        ({"feet": ["Tail"]}, r"0\.bvh has no joints \['Tail'\]"),
+        (
+            {"feet": ["LeftHand"], "drop_joints": ["LeftArm"]},
+            r"joints \['LeftHand'\] are dropped, and named by the recipe elsewhere",
+        ),
     ],
 )
 def test_joints_that_cannot_be_followed_are_refused_by_row(read, motion, message):

@@ -201,7 +201,7 @@ def test_sigma_says_how_far_the_truth_may_lie(trained, examples, rng):
 def test_clips_aligned_to_what_others_predict_make_the_better_model(
     trained, small_recipe, examples, rng
 ):
-    """Measured 0.86 cm root-relative from the truth, and 1.01 cm where all are aligned to the mean."""
+    """Measured 0.86 cm root-relative from the truth, and 1.01 where all are aligned to the mean."""
     to_mean = small_recipe.alignment.model_copy(update={"reference": "mean"})
     other = train.train(small_recipe.model_copy(update={"alignment": to_mean}), examples, quiet)
     figure = examples[0].clip.skeleton
