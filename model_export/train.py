@@ -22,7 +22,7 @@ from model_export import (
 )
 from model_export.align import Aligned
 from model_export.chart import Chart
-from model_export.decoder import Decoder
+from model_export.decoder import Decoder, Proportions
 from model_export.fidelity import Fidelity
 from model_export.field_bank import FieldBank, Spread
 from model_export.fields import Fitted
@@ -31,6 +31,7 @@ from model_export.hosvd import Multilinear
 from model_export.ingest import Example
 from model_export.model import Model
 from model_export.recipe import Recipe
+from model_export.samples import Samples
 from model_export.strangers import Stranger
 from model_export.tensor import MotionTensor
 from model_export.timing import Timing
@@ -156,16 +157,27 @@ def _predictor(recipe: Recipe, examples: Sequence[Example]) -> align.Predict:
     return mean if recipe.alignment.reference == "mean" else predict
 
 
-def _fit(
+@dataclass(frozen=True)
+class _Fits:
+    """Every field at its own parameters: where its samples lie, what it is laid through (N, m),
+    and what it misses (N,) of the poses, m²."""
+
+    laid: Samples
+    performers: tuple[str, ...]
+    proportions: Proportions
+    values: dict[str, Floats]
+    pose: Tuned
+    beside: dict[str, Fitted]
+    missed: Floats
+
+
+def _fits(
     recipe: Recipe,
     examples: Sequence[Example],
     moved: _Moved,
     own_tensor: MotionTensor,
     full: Multilinear,
-) -> Trained:
-    """Every field at its own parameters, and the stages that they feed."""
-    controls = np.stack([example.controls for example in examples])
-    low, high = controls.min(axis=0), controls.max(axis=0)
+) -> _Fits:
     laid, performers = samples.lay(recipe, examples)
     proportions, bones = fields.proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
@@ -174,34 +186,59 @@ def _fit(
     pose = fields.chosen(recipe.kriging, laid, motions)
     covariance = pose.hyper.covariance
     fitted = {k: fields.fit(recipe.kriging, covariance, laid, v) for k, v in beside.items()}
+    values = {"pose": motions, **beside}
+    missed = _missed(own_tensor, pose, fitted)
+    return _Fits(laid, performers, proportions, values, pose, fitted, missed)
+
+
+def _model(
+    recipe: Recipe,
+    controls: Floats,
+    own_tensor: MotionTensor,
+    fits: _Fits,
+    reduced: Multilinear,
+) -> Model:
+    """The stages that the fields feed, of controls (N, d)."""
+    solved = kriging.solve(fits.pose.hyper, fits.laid.points, reduced.bases[2])
+    others = {name: found.field for name, found in fits.beside.items()}
+    ends = controls.min(axis=0), controls.max(axis=0)
+    return Model(
+        FieldBank(*ends, fits.performers, solved, others),
+        Spread(solved, float(np.mean(fits.missed / fits.pose.variances))),
+        Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
+        Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means),
+        fits.proportions,
+        Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
+    )
+
+
+def _fit(
+    recipe: Recipe,
+    examples: Sequence[Example],
+    moved: _Moved,
+    own_tensor: MotionTensor,
+    full: Multilinear,
+) -> Trained:
+    """Fields, the ranks that keep the budgets, and the model of both."""
+    fits = _fits(recipe, examples, moved, own_tensor, full)
+    controls = np.stack([example.controls for example in examples])
     judge = fidelity.judge(recipe, examples, own_tensor)
     price = cost.PRICES[recipe.size.cost](own_tensor, controls.shape[1])
     reduced = full.truncated(ranks.choose(recipe.size, full, price, judge))
-    solved = kriging.solve(pose.hyper, laid.points, reduced.bases[2])
-    missed = _missed(own_tensor, pose, fitted)
-    others = {name: found.field for name, found in fitted.items()}
-    model = Model(
-        FieldBank(low, high, performers, solved, others),
-        Spread(solved, float(np.mean(missed / pose.variances))),
-        Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
-        Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, moved.chart.means),
-        proportions,
-        Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
-    )
-    explained = {name: found.explained for name, found in fitted.items()}
+    explained = {name: found.explained for name, found in fits.beside.items()}
     return Trained(
-        model,
+        _model(recipe, controls, own_tensor, fits, reduced),
         tuple(examples),
         _mean_skeleton(examples, moved.offsets),
         moved.aligned,
         own_tensor,
         full,
-        pose,
-        {"pose": motions, **beside},
-        missed,
-        {"pose": 1.0 - pose.unexplained, **explained},
+        fits.pose,
+        fits.values,
+        fits.missed,
+        {"pose": 1.0 - fits.pose.unexplained, **explained},
         moved.findings,
-        {name: found.residuals for name, found in fitted.items()},
+        {name: found.residuals for name, found in fits.beside.items()},
         judge.of(reduced),
     )
 
