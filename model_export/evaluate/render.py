@@ -66,7 +66,8 @@ def _bars(result: Result, found: Sequence[Summary]) -> Picture:
         0.9 + 0.27 * len(found),
         partial(_paint_bars, found),
         f"Root-relative, global and effector errors of {len(found)} methods.",
-        "Mean distance by method, ours in orange; the lines are standard errors over clips.",
+        "Mean distance by method, ours in orange, cut at two and a half times ours; the lines are "
+        "standard errors over clips.",
     )
 
 
