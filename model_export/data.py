@@ -1,12 +1,38 @@
 """The data folder: motion files in folders, or in zip files of those folders' names."""
 
 import zipfile
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from service.motion.errors import RecipeError
 
-Place = Path | zipfile.Path
+
+@dataclass(frozen=True)
+class Member:
+    """A file within a zip file, by name alone: it can be sent to another process."""
+
+    archive: Path
+    entry: str
+
+    def __str__(self) -> str:
+        return f"{self.archive}/{self.entry}"
+
+    @property
+    def name(self) -> str:
+        """The last part of its name."""
+        return PurePosixPath(self.entry).name
+
+    def is_file(self) -> bool:
+        """Whether the archive has it."""
+        return zipfile.Path(_open(self.archive), self.entry).is_file()
+
+    def read_bytes(self) -> bytes:
+        """Everything that the file holds."""
+        return _open(self.archive).read(self.entry)
+
+
+Place = Path | Member
 
 
 def find(folder: Path, name: str) -> Place:
@@ -38,7 +64,7 @@ def _in_zip(folder: Path, parts: tuple[str, ...]) -> list[Place]:
     if len(parts) < 2 or not archive.is_file():
         return []
     names = ("/".join(parts), "/".join(parts[1:]))
-    return [zipfile.Path(_open(archive), name) for name in names]
+    return [Member(archive, name) for name in names]
 
 
 @lru_cache(maxsize=8)

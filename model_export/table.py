@@ -60,10 +60,10 @@ def read(recipe: Recipe, folder: Path) -> list[Row]:
 
 def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
     try:
-        text = place.read_text(encoding="utf-8-sig")
+        text = place.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
-    reader = csv.DictReader(io.StringIO(text), strict=True)
+    reader = csv.DictReader(io.StringIO(text, newline=None), strict=True)
     try:
         records = [(reader.line_num, record) for record in reader]
     except csv.Error as fault:

@@ -1,5 +1,6 @@
 """Motion files are found in folders and in zips, and nowhere else."""
 
+import pickle
 import zipfile
 
 import pytest
@@ -30,14 +31,22 @@ def filled(request, tmp_path):
 
 def test_a_file_is_found(filled):
     folder, content = filled
-    assert data.find(folder, NAME).read_text() == content
+    assert data.find(folder, NAME).read_bytes().decode() == content
+
+
+def test_a_place_can_be_sent_to_another_process(filled):
+    folder, content = filled
+    place = data.find(folder, NAME)
+    sent = pickle.loads(pickle.dumps(place))
+    assert (sent, str(sent), sent.name) == (place, str(place), "walk.bvh")
+    assert sent.read_bytes().decode() == content
 
 
 def test_a_folder_goes_before_a_zip(tmp_path):
     write_zip(tmp_path / "takes.zip", [NAME])
     (tmp_path / NAME).parent.mkdir(parents=True)
     (tmp_path / NAME).write_text("unpacked")
-    assert data.find(tmp_path, NAME).read_text() == "unpacked"
+    assert data.find(tmp_path, NAME).read_bytes().decode() == "unpacked"
 
 
 def test_what_is_not_there_is_refused_with_every_place_that_was_tried(tmp_path):
@@ -76,7 +85,7 @@ def test_a_zip_entry_cannot_be_reached_by_a_path_that_leaves(tmp_path):
     write_zip(tmp_path / "takes.zip", ["../secret.bvh", "bvh/walk.bvh"])
     with pytest.raises(RecipeError, match="expected a path below"):
         data.find(tmp_path, "takes/../secret.bvh")
-    assert data.find(tmp_path, NAME).read_text() == "content of bvh/walk.bvh"
+    assert data.find(tmp_path, NAME).read_bytes().decode() == "content of bvh/walk.bvh"
 
 
 def test_a_zip_that_is_none_is_refused_by_name(tmp_path):
