@@ -158,6 +158,5 @@ def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
 
 def positions(aligned: Aligned, parents: tuple[int, ...], offsets: Floats) -> Floats:
     """Joint positions (N, T, J, 3) of aligned clips with bone offsets (N, J, 3), m."""
-    translations = np.repeat(offsets[:, None], aligned.rotations.shape[1], axis=1)
-    translations[:, :, 0] = aligned.root_path
+    translations = skeleton.translations(offsets, aligned.root_path)
     return skeleton.forward(parents, aligned.rotations, translations)[0]

@@ -62,23 +62,24 @@ def foreign(offsets: Floats, performers: tuple[str, ...], clip: int) -> Foreign 
     if not whose[clip] or not len(own):
         return None
     usual = np.median(offsets[own], axis=0)
-    apart = _apart(offsets[clip], usual)
-    spread = float(np.median([_apart(one, usual) for one in offsets[own]]))
-    if apart < max(SAME, CLEAR * spread):
+    gap = apart(offsets[clip], usual)
+    spread = float(np.median([apart(one, usual) for one in offsets[own]]))
+    if gap < max(SAME, CLEAR * spread):
         return None
     near = _nearest(offsets, whose, clip)
-    if near[0] < apart / CLEAR:
-        return Foreign(apart, len(own), near[1], near[0])
-    return Foreign(apart, len(own), "", 0.0) if len(own) > 1 else None
+    if near[0] < gap / CLEAR:
+        return Foreign(gap, len(own), near[1], near[0])
+    return Foreign(gap, len(own), "", 0.0) if len(own) > 1 else None
 
 
 def _nearest(offsets: Floats, whose: npt.NDArray[np.str_], clip: int) -> tuple[float, str]:
     """The other performer whose bones are most like a clip's, and how far they are, m."""
     names = sorted(set(whose.tolist()) - {whose[clip], ""})
     means = [np.median(offsets[whose == name], axis=0) for name in names]
-    apart = [(_apart(offsets[clip], mean), name) for mean, name in zip(means, names, strict=True)]
-    return min(apart, default=(np.inf, ""))
+    gaps = [(apart(offsets[clip], mean), name) for mean, name in zip(means, names, strict=True)]
+    return min(gaps, default=(np.inf, ""))
 
 
-def _apart(a: Floats, b: Floats) -> float:
+def apart(a: Floats, b: Floats) -> float:
+    """Root mean square distance of points (..., 3)."""
     return float(np.sqrt(np.mean(np.sum(np.square(a - b), axis=-1))))

@@ -74,8 +74,7 @@ def train_command(
 
     if output.suffix != ".onnx":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
-    if report and report.suffix != ".html":
-        raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
+    _expect_html(report)
     progress = _Progress()
     progress(f"reading {recipe_file}")
     own = recipe.read(recipe_file)
@@ -89,6 +88,11 @@ def train_command(
         _write_report(trained, exported, progress, report)
     progress("done")
     typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
+
+
+def _expect_html(report: Path | None) -> None:
+    if report and report.suffix != ".html":
+        raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
 
 
 class Protocol(StrEnum):
@@ -120,8 +124,7 @@ def evaluate(
 
     Everything is fitted anew without what is held out.
     """
-    if report and report.suffix != ".html":
-        raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
+    _expect_html(report)
     if table1:
         _table1(json_file)
     elif recipe_file is None:

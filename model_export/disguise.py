@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from model_export.bones import apart
 from service.motion.conventions import UP, Floats
 
 # A disguise is named where the clip without it lies at less than this share of its distance.
@@ -38,11 +39,6 @@ def found(own: Floats, expected: Floats, names: tuple[str, ...], left: Floats) -
     ]
     best = min(undone, key=lambda disguise: disguise.after)
     return best if best.after < BETTER * before else None
-
-
-def apart(a: Floats, b: Floats) -> float:
-    """Root mean square distance of joints (..., 3)."""
-    return float(np.sqrt(np.mean(np.sum(np.square(a - b), axis=-1))))
 
 
 def _without(

@@ -197,8 +197,7 @@ def _found(trained: Trained) -> list[str]:
         entry = f"{joint} by {np.degrees(finding.angle):.0f} degrees"
         said.setdefault((finding.clip, finding.kind), []).append(entry)
     return [
-        f"line {trained.examples[clip].row.line}, {trained.examples[clip].row.place.name}: "
-        f"{_MEANING[kind]}: {', '.join(entries)}"
+        f"{trained.examples[clip].row.named}: {_MEANING[kind]}: {', '.join(entries)}"
         for (clip, kind), entries in sorted(said.items())
     ]
 

@@ -88,11 +88,8 @@ def positions(
     own_tensor: MotionTensor, values: Floats, parents: tuple[int, ...], offsets: Floats
 ) -> Floats:
     """Joint positions (N, T, J, 3) of whitened values (D', T, N), bone offsets (N, J, 3), m."""
-    numbers = own_tensor.mean + values.transpose(2, 1, 0) @ own_tensor.unwhiten.T
-    rotations, root = own_tensor.chart.poses(numbers)
-    translations = np.repeat(offsets[:, None], rotations.shape[1], axis=1)
-    translations[:, :, 0] = root
-    return skeleton.forward(parents, rotations, translations)[0]
+    rotations, root = own_tensor.chart.poses(own_tensor.numbers(values))
+    return skeleton.forward(parents, rotations, skeleton.translations(offsets, root))[0]
 
 
 def _effector(gaps: Floats, moment: Moment | None) -> float | None:

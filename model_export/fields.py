@@ -39,8 +39,10 @@ def chosen(settings: Kriging, samples: Samples, values: Floats) -> Tuned:
 
 def tuned(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Tuned:
     """Field of values (N, m) of least leave-one-out error among the drifts to be tried."""
-    controls = samples.points[:, : samples.controls]
-    guesses = [tune.first_guess(controls, values, covariance, d) for d in settings.drifts]
+    guesses = [
+        tune.first_guess(samples.half_ranges, values, covariance, drifts)
+        for drifts in settings.drifts
+    ]
     found = [tune.tune(guess, samples, values, settings.nugget) for guess in guesses]
     return min(found, key=lambda field: field.unexplained)
 

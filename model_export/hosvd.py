@@ -12,6 +12,9 @@ import numpy as np
 from service.motion.conventions import Floats
 from service.motion.errors import TrainingError
 
+# Directions that carry less than this share of the first are rounding.
+NOTHING = 1e-9
+
 
 @dataclass(frozen=True)
 class Multilinear:
@@ -32,6 +35,25 @@ class Multilinear:
         prefix = tuple(slice(rank) for rank in ranks)
         bases = (basis[:, :rank] for basis, rank in zip(self.bases, ranks, strict=True))
         return Multilinear(self.core[prefix], tuple(bases))
+
+    @property
+    def motions(self) -> Floats:
+        """Slices along the last mode, each as a row (N, r) whose distances are theirs."""
+        return self.bases[-1] * self._lengths
+
+    def slices(self, motions: Floats) -> Floats:
+        """Slices (..., B) of the tensor that rows (B, r) like `motions` stand for."""
+        # Directions that carry next to nothing are rounding, and have no length to be divided by.
+        lengths = self._lengths
+        carried = lengths > NOTHING * lengths[0]
+        worth = np.where(carried, 1.0 / np.where(carried, lengths, 1.0), 0.0)
+        rest = Multilinear(self.core * worth, (*self.bases[:-1], motions))
+        return rest.restored()
+
+    @property
+    def _lengths(self) -> Floats:
+        """Singular values (r,) of the last mode."""
+        return np.linalg.norm(unfold(self.core, self.core.ndim - 1), axis=1)
 
     def restored(self) -> Floats:
         """The tensor that core and bases stand for."""

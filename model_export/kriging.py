@@ -147,6 +147,12 @@ def _left_out(block: Floats, groups: Indices) -> Floats:
     return residual
 
 
+def left_out_variances(hyper: Hyper, samples: Floats, left_out: Floats) -> Floats:
+    """Variances (n,) of residuals by a matrix (n, n) of `leave_out`, the nugget counted in, as
+    shares of the sill."""
+    return np.sum((left_out @ noisy(hyper, samples)) * left_out, axis=1)
+
+
 def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:
     """Refuse samples that no field can be laid through, saying which and why.
 
@@ -166,7 +172,7 @@ def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: 
                 f"control {name!r} has the value {column[0]:g} in all {count} samples, expected "
                 "at least two values; leave it out of the recipe"
             )
-    if np.linalg.matrix_rank(np.hstack([np.ones((count, 1)), samples])) <= len(names) * degree:
+    if np.linalg.matrix_rank(drift(samples, len(names), degree)) < 1 + len(names) * degree:
         raise TrainingError(f"controls {names}: one of them follows linearly from the others")
     if nugget_is_zero:
         _refuse_twins(samples)

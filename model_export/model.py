@@ -26,9 +26,7 @@ class Outputs:
 
     def positions(self, parents: tuple[int, ...]) -> Floats:
         """Joint positions (B, S, J, 3), m."""
-        offsets = self.bone_offsets[:, None]
-        translations = np.repeat(offsets, self.rotations.shape[1], axis=1).astype(np.float64)
-        translations[:, :, 0] = self.root_position
+        translations = skeleton.translations(self.bone_offsets, self.root_position)
         return skeleton.forward(parents, self.rotations, translations)[0]
 
 

@@ -74,8 +74,7 @@ def _judged(hyper: Hyper, laid: Samples, motions: Floats, outside: list[int]) ->
         with_it = np.append(kept, clip)
         left_out[clip, with_it] = _left_out(hyper, laid, with_it)[-1]
     distances = np.linalg.norm(left_out @ motions, axis=1)
-    noisy = kriging.noisy(hyper, laid.points)
-    times = distances / np.sqrt(np.sum((left_out @ noisy) * left_out, axis=1))
+    times = distances / np.sqrt(kriging.left_out_variances(hyper, laid.points, left_out))
     return Judged(left_out, distances, times / np.median(times[kept]), tuple(outside))
 
 

@@ -158,8 +158,8 @@ def _rolled(clip: Clip, frames: int) -> Clip:
 def notes(examples: Sequence[Example]) -> list[str]:
     """One sentence for every clip that was cut at quite another phase."""
     return [
-        f"line {example.row.line}, {example.row.place.name}: begun {abs(example.shift):.0%} of its "
-        f"cycle {'later' if example.shift > 0 else 'earlier'} than it was cut"
+        f"{example.row.named}: begun {abs(example.shift):.0%} of its cycle "
+        f"{'later' if example.shift > 0 else 'earlier'} than it was cut"
         for example in examples
         if abs(example.shift) > LARGE
     ]

@@ -147,6 +147,11 @@ class Kriging(_Part):
     )
 
     @property
+    def degree(self) -> int:
+        """The highest degree that is tried."""
+        return max(map(max, self.drifts))
+
+    @property
     def covariances(self) -> tuple[str, ...]:
         """The covariances that are tried."""
         return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)

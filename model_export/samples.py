@@ -26,6 +26,11 @@ class Samples:
     groups: Indices
 
     @property
+    def half_ranges(self) -> Floats:
+        """The controls (n, d) alone."""
+        return self.points[:, : self.controls]
+
+    @property
     def labelled(self) -> bool:
         """Whether performers are told apart."""
         return self.points.shape[1] > self.controls
@@ -89,7 +94,7 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
 
     Raises TrainingError where there is none without a single example.
     """
-    degree = max(map(max, recipe.kriging.drifts))
+    degree = recipe.kriging.degree
     takes, alone = _takes(examples), np.arange(len(examples))
     if _needed(takes, points, degree) is None:
         return takes

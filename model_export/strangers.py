@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from model_export import bones, disguise, leaps, outsiders, samples
+from model_export import bones, disguise, leaps, outsiders
 from model_export.bones import Foreign
 from model_export.disguise import Disguise
 from model_export.ingest import Example
@@ -56,11 +56,7 @@ def notes(trained: "Trained") -> list[str]:
     said: dict[int, list[str]] = {}
     for one in trained.strangers:
         said.setdefault(one.clip, []).append(one.said)
-    return [f"{_named(trained.examples[clip])}: {'; '.join(parts)}" for clip, parts in said.items()]
-
-
-def _named(example: Example) -> str:
-    return f"line {example.row.line}, {example.row.place.name}"
+    return [f"{trained.examples[i].row.named}: {'; '.join(parts)}" for i, parts in said.items()]
 
 
 @dataclass(frozen=True)
@@ -70,8 +66,7 @@ class _Family:
 
     @cached_property
     def judged(self) -> Judged:
-        laid, _ = samples.lay(self.recipe, self.trained.examples)
-        return outsiders.judge(self.trained.pose.hyper, laid, self.motions)
+        return outsiders.judge(self.trained.pose.hyper, self.trained.laid, self.motions)
 
     @cached_property
     def motions(self) -> Floats:
@@ -92,9 +87,8 @@ class _Family:
         apart = np.linalg.norm(self.motions - self.motions[clip], axis=1)
         apart[clip] = np.inf
         nearest = int(np.argmin(apart))
-        return (
-            f"most like it is {_named(self.trained.examples[nearest])}, {_cm(apart[nearest])} away"
-        )
+        named = self.trained.examples[nearest].row.named
+        return f"most like it is {named}, {_cm(apart[nearest])} away"
 
     def disguised(self) -> Iterator[Stranger]:
         """Clips that would lie nearer mirrored, turned or with sides exchanged."""
@@ -117,7 +111,7 @@ class _Family:
         """Joints (B, T, J, 3) around the root of slices (D', T, B) of the tensor, on bones (J, 3),
         m."""
         whole = self.trained.tensor
-        rotations, _ = whole.chart.poses(whole.mean + values.transpose(2, 1, 0) @ whole.unwhiten.T)
+        rotations, _ = whole.chart.poses(whole.numbers(values))
         translations = np.broadcast_to(offsets, (*rotations.shape[:-1], 3))
         return skeleton.forward(self.trained.skeleton.parents, rotations, translations)[0]
 

@@ -33,6 +33,11 @@ class Row:
     controls: Floats
     landmarks: tuple[int, ...]
 
+    @property
+    def named(self) -> str:
+        """How messages name it: its line and its file."""
+        return f"line {self.line}, {self.place.name}"
+
     def fault(self, message: str) -> RecipeError:
         """Error that names this row."""
         return RecipeError(self.table, message, self.line)

@@ -30,6 +30,10 @@ class MotionTensor:
     chart: Chart
     weight: float
 
+    def numbers(self, values: Floats) -> Floats:
+        """Pose vectors (B, T, D) of slices (D', T, B) like those of the tensor."""
+        return self.mean + values.transpose(2, 1, 0) @ self.unwhiten.T
+
     def rms(self, squared: Floats) -> Floats:
         """Root-mean-square joint distance, m, of squared distances summed over the tensor."""
         _, frames, samples = self.values.shape

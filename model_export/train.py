@@ -49,18 +49,19 @@ Report = Callable[[str], None]
 class Trained:
     """A model with what it was made from and what was seen on the way.
 
-    examples: in an order of their own, so that the model does not depend on the table's. pose: the
-    tuned pose field. values: what each field is laid through (N, m), the pose's whole motions in
-    the coordinates of the sample mode. missed (N,): mean squared joint distance, m², of each clip
-    from what all others predict for it. explained: for each field the share of the variation
-    between clips that leave-one-out predicts from the controls; one that is not surely above zero
-    is answered with its mean.
-    residuals: of each field but the pose, left out (N, m). fidelity: what the truncation costs.
-    strangers: what speaks against clips that do not seem to belong.
+    examples: in an order of their own, so that the model does not depend on the table's. laid:
+    where they lie. pose: the tuned pose field. values: what each field is laid through (N, m), the
+    pose's whole motions in the coordinates of the sample mode. missed (N,): mean squared joint
+    distance, m², of each clip from what all others predict for it. explained: for each field the
+    share of the variation between clips that leave-one-out predicts from the controls; one that is
+    not surely above zero is answered with its mean. residuals: of each field but the pose, left
+    out (N, m). fidelity: what the truncation costs. strangers: what speaks against clips that do
+    not seem to belong.
     """
 
     model: Model
     examples: tuple[Example, ...]
+    laid: Samples
     skeleton: Skeleton
     aligned: Aligned
     tensor: MotionTensor
@@ -77,11 +78,14 @@ class Trained:
 
 @dataclass(frozen=True)
 class _Moved:
-    """Aligned clips as pose vectors (N, T, D), with their bone offsets (N, J, 3), m.
+    """Aligned clips as pose vectors (N, T, D), with their bone offsets (N, J, 3), m, and where they
+    lie among the controls and performers.
 
     travels (N, 3) are a cycle's, and empty else.
     """
 
+    laid: Samples
+    performers: tuple[str, ...]
     aligned: Aligned
     offsets: Floats
     numbers: Floats
@@ -104,7 +108,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
 def _train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Trained:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
-    kriging.check(given, names, max(map(max, recipe.kriging.drifts)), recipe.kriging.nugget == 0)
+    kriging.check(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
     examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")
     weights = fidelity.joint_weights(recipe, examples)
@@ -131,7 +135,8 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
 def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
     """Clips aligned and written as pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
-    predict = _predictor(recipe, examples)
+    laid, performers = samples.lay(recipe, examples)
+    predict = _predictor(recipe, laid)
     aligned = align.align(examples, recipe.motion.frames, basis, settings.rounds, weights, predict)
     travels = {}
     if recipe.motion.cyclic:
@@ -140,12 +145,12 @@ def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Move
     parents = examples[0].clip.skeleton.parents
     numbers, chart, noticed = tensor.pose_vectors(aligned, parents, offsets)
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
-    return _Moved(aligned, offsets, numbers, chart, travels, jumps + noticed)
+    findings = jumps + noticed
+    return _Moved(laid, performers, aligned, offsets, numbers, chart, travels, findings)
 
 
-def _predictor(recipe: Recipe, examples: Sequence[Example]) -> align.Predict:
+def _predictor(recipe: Recipe, laid: Samples) -> align.Predict:
     """What the other clips predict for each, by a field of its own parameters."""
-    laid, _ = samples.lay(recipe, examples)
 
     def predict(values: Floats) -> Floats:
         covariance = recipe.kriging.covariances[0]
@@ -159,11 +164,9 @@ def _predictor(recipe: Recipe, examples: Sequence[Example]) -> align.Predict:
 
 @dataclass(frozen=True)
 class _Fits:
-    """Every field at its own parameters: where its samples lie, what it is laid through (N, m),
-    and what it misses (N,) of the poses, m²."""
+    """Every field at its own parameters: what it is laid through (N, m), and what it misses (N,) of
+    the poses, m²."""
 
-    laid: Samples
-    performers: tuple[str, ...]
     proportions: Proportions
     values: dict[str, Floats]
     pose: Tuned
@@ -171,39 +174,33 @@ class _Fits:
     missed: Floats
 
 
-def _fits(
-    recipe: Recipe,
-    examples: Sequence[Example],
-    moved: _Moved,
-    own_tensor: MotionTensor,
-    full: Multilinear,
-) -> _Fits:
-    laid, performers = samples.lay(recipe, examples)
+def _fits(recipe: Recipe, moved: _Moved, own_tensor: MotionTensor, full: Multilinear) -> _Fits:
+    laid = moved.laid
     proportions, bones = fields.proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
-    motions = full.bases[2] * _spectrum(full)
-    pose = fields.chosen(recipe.kriging, laid, motions)
+    pose = fields.chosen(recipe.kriging, laid, full.motions)
     covariance = pose.hyper.covariance
     fitted = {k: fields.fit(recipe.kriging, covariance, laid, v) for k, v in beside.items()}
-    values = {"pose": motions, **beside}
+    values = {"pose": full.motions, **beside}
     missed = _missed(own_tensor, pose, fitted)
-    return _Fits(laid, performers, proportions, values, pose, fitted, missed)
+    return _Fits(proportions, values, pose, fitted, missed)
 
 
 def _model(
     recipe: Recipe,
     controls: Floats,
+    moved: _Moved,
     own_tensor: MotionTensor,
     fits: _Fits,
     reduced: Multilinear,
 ) -> Model:
     """The stages that the fields feed, of controls (N, d)."""
-    solved = kriging.solve(fits.pose.hyper, fits.laid.points, reduced.bases[2])
+    solved = kriging.solve(fits.pose.hyper, moved.laid.points, reduced.bases[2])
     others = {name: found.field for name, found in fits.beside.items()}
     ends = controls.min(axis=0), controls.max(axis=0)
     return Model(
-        FieldBank(*ends, fits.performers, solved, others),
+        FieldBank(*ends, moved.performers, solved, others),
         Spread(solved, float(np.mean(fits.missed / fits.pose.variances))),
         Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
         Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means),
@@ -220,15 +217,16 @@ def _fit(
     full: Multilinear,
 ) -> Trained:
     """Fields, the ranks that keep the budgets, and the model of both."""
-    fits = _fits(recipe, examples, moved, own_tensor, full)
+    fits = _fits(recipe, moved, own_tensor, full)
     controls = np.stack([example.controls for example in examples])
     judge = fidelity.judge(recipe, examples, own_tensor)
     price = cost.PRICES[recipe.size.cost](own_tensor, controls.shape[1])
     reduced = full.truncated(ranks.choose(recipe.size, full, price, judge))
     explained = {name: found.explained for name, found in fits.beside.items()}
     return Trained(
-        _model(recipe, controls, own_tensor, fits, reduced),
+        _model(recipe, controls, moved, own_tensor, fits, reduced),
         tuple(examples),
+        moved.laid,
         _mean_skeleton(examples, moved.offsets),
         moved.aligned,
         own_tensor,
@@ -241,11 +239,6 @@ def _fit(
         {name: found.residuals for name, found in fits.beside.items()},
         judge.of(reduced),
     )
-
-
-def _spectrum(full: Multilinear) -> Floats:
-    """Singular values (N,) of the sample mode: with them rows of its basis are whole motions."""
-    return np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
 
 
 def _missed(own_tensor: MotionTensor, pose: Tuned, fitted: dict[str, Fitted]) -> Floats:

@@ -55,8 +55,7 @@ def first_guess(samples: Floats, values: Floats, covariance: str, drifts: tuple[
 def fixed(hyper: Hyper, samples: Samples, values: Floats) -> Tuned:
     """Field of given parameters with its leave-one-out residuals."""
     left_out = kriging.leave_out(hyper, samples.points, samples.groups)
-    noisy = kriging.noisy(hyper, samples.points)
-    variances = np.sum((left_out @ noisy) * left_out, axis=1)
+    variances = kriging.left_out_variances(hyper, samples.points, left_out)
     residuals, from_mean = left_out @ values, samples.from_mean(values)
     total = float(np.sum(np.square(from_mean)))
     return Tuned(

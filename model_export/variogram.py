@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from model_export import kriging
 from model_export.covariance import COVARIANCES
 from service.motion.conventions import Floats
 
@@ -40,8 +41,7 @@ class Fit:
 
 def residuals(samples: Floats, values: Floats, drift: int) -> Floats:
     """What the drift leaves of values (n, m) at samples (n, d) by ordinary least squares."""
-    one = np.ones((len(samples), 1))
-    functions = np.hstack([one, samples]) if drift else one
+    functions = kriging.drift(samples, samples.shape[1], drift)
     coefficients, *_ = np.linalg.lstsq(functions, values, rcond=None)
     return values - functions @ coefficients
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model_export import dtw
+from model_export import align, dtw
 from model_export.evaluate.motion import FRAMES, Motion
 from service.motion.conventions import UP, Floats
 
@@ -91,10 +91,7 @@ def _around(points: Floats) -> Floats:
 
 
 def _at(points: Floats, phase: Floats) -> Floats:
-    place = phase * (FRAMES - 1)
-    before = np.minimum(place.astype(np.int64), FRAMES - 2)
-    share = (place - before)[:, None, None, None]
-    return (1.0 - share) * points[before] + share * points[before + 1]
+    return align.at(points.reshape(FRAMES, -1), phase).reshape(points.shape)
 
 
 def _apart(a: Floats, b: Floats) -> Floats:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model_export import fidelity, hosvd, naive, samples, travel, variogram
+from model_export import align, fidelity, naive, samples, travel, variogram
 from model_export.evaluate import motion
 from model_export.evaluate.motion import EVEN, Event, Motion
 from model_export.evaluate.peers import PEERS, Peer
@@ -56,7 +56,7 @@ def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
     event = fidelity.moment(recipe, trained.examples)
     points = trained.model.bank.points(asked.controls, _labels(trained, asked))
     motions = {OURS: _ours(trained, asked, points, event)}
-    for name, predict in _methods(recipe, trained).items():
+    for name, predict in _methods(trained).items():
         motions[name] = _restore(trained, predict(points), event)
     return Answers(motions, trained.model.spread.numpy(points))
 
@@ -96,8 +96,7 @@ def _motions(
     event: fidelity.Moment | None,
 ) -> list[Motion]:
     """Motions of rotations (Q, S, J, 4), root paths (Q, S, 3) and bone offsets (Q, J, 3)."""
-    translations = np.repeat(offsets[:, None], len(EVEN), axis=1)
-    translations[:, :, 0] = path
+    translations = skeleton.translations(offsets, path)
     events = [_synthesised_event(trained, log, event) for log in logs]
     parts = zip(rotations, translations, map(float, durations), events, strict=True)
     return [motion.posed(trained.skeleton.parents, *part) for part in parts]
@@ -114,9 +113,9 @@ def _synthesised_event(
     return Event(event.joint, float(timing.basis.invert(logs, place)[0]))
 
 
-def _methods(recipe: Recipe, trained: Trained) -> dict[str, Callable[[Floats], _Values]]:
+def _methods(trained: Trained) -> dict[str, Callable[[Floats], _Values]]:
     """Points (Q, d + p) to predicted values, by name."""
-    laid, performers = samples.lay(recipe, trained.examples)
+    laid = trained.laid
 
     def of_peer(peer: Peer) -> Callable[[Floats], _Values]:
         def predict(points: Floats) -> _Values:
@@ -125,41 +124,29 @@ def _methods(recipe: Recipe, trained: Trained) -> dict[str, Callable[[Floats], _
 
         return predict
 
-    left = () if performers else LABELLED
+    left = () if laid.labelled else LABELLED
     peers = {name: of_peer(peer) for name, (peer, _) in PEERS.items() if name not in left}
     return {NAIVE: lambda points: _naive(trained, laid, points), **peers}
 
 
 def _numbers(trained: Trained, coefficients: Floats) -> Floats:
     """Pose vectors (Q, T, D) of motions (Q, N) in the coordinates of the sample mode."""
-    full = trained.full
-    lengths = np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
-    unit = full.core / np.maximum(lengths, 1e-12 * lengths[0])
-    whole = hosvd.mode_dot(hosvd.mode_dot(unit, full.bases[0], 0), full.bases[1], 1)
-    table = np.einsum("dtn,qn->qtd", whole, coefficients, optimize=True)
-    return trained.tensor.mean + table @ trained.tensor.unwhiten.T
+    return trained.tensor.numbers(trained.full.slices(coefficients))
 
 
 def _naive(trained: Trained, laid: Samples, points: Floats) -> _Values:
     """Kriging of every frame by itself; all else the same way, as one frame."""
-    known, asked = laid.points[:, : laid.controls], points[:, : laid.controls]
-    vectors = _numbers(trained, trained.values["pose"])
+    whole, parents = trained.tensor, trained.skeleton.parents
+    offsets = np.stack([example.offsets for example in trained.examples])
+    positions = fidelity.positions(whole, whole.values, parents, offsets)
+    known, asked = laid.half_ranges, points[:, : laid.controls]
 
     def krige(shown: Floats, values: Floats) -> Floats:
         return naive.fit(known, shown, values, "matern52", variogram.fit).numpy(asked)
 
     rest = {name: values for name, values in trained.values.items() if name != "pose"}
     found = {n: krige(v[:, None, :, None], v[:, None])[:, 0] for n, v in rest.items()}
-    return _Values(krige(_positions(trained, vectors), vectors), found)
-
-
-def _positions(trained: Trained, vectors: Floats) -> Floats:
-    """Joint positions (N, T, J, 3) of the samples' pose vectors, m."""
-    rotations, path = trained.tensor.chart.poses(vectors)
-    offsets = np.stack([example.offsets for example in trained.examples])
-    translations = np.repeat(offsets[:, None], vectors.shape[1], axis=1)
-    translations[:, :, 0] = path
-    return skeleton.forward(trained.skeleton.parents, rotations, translations)[0]
+    return _Values(krige(positions, whole.numbers(whole.values)), found)
 
 
 def _restore(trained: Trained, values: _Values, event: fidelity.Moment | None) -> list[Motion]:
@@ -167,19 +154,11 @@ def _restore(trained: Trained, values: _Values, event: fidelity.Moment | None) -
     timing, beside = trained.model.timing, values.beside
     steps = np.tile(EVEN, (len(values.numbers), 1))
     _, place = timing.numpy(np.zeros((len(steps), 1)), beside["warp"], steps)
-    rotations, path = trained.tensor.chart.poses(_between(values.numbers, place))
+    share = place / (timing.frames - 1)
+    pairs = zip(values.numbers, share, strict=True)
+    rotations, path = trained.tensor.chart.poses(np.stack([align.at(*pair) for pair in pairs]))
     if "travel" in beside:
-        share = place / (timing.frames - 1)
         rotations, path = travel.put_back(rotations, path, beside["travel"], share)
     offsets = trained.model.proportions.numpy(beside["offsets"])
     durations = np.exp(beside["duration"][:, 0])
     return _motions(trained, rotations, path, offsets, durations, beside["warp"], event)
-
-
-def _between(table: Floats, place: Floats) -> Floats:
-    """Rows (Q, S, D) of tables (Q, T, D) at frames (Q, S)."""
-    before = np.minimum(place.astype(np.int64), table.shape[1] - 2)
-    share = (place - before)[..., None]
-    first = np.take_along_axis(table, before[..., None], axis=1)
-    second = np.take_along_axis(table, before[..., None] + 1, axis=1)
-    return (1.0 - share) * first + share * second

@@ -39,16 +39,13 @@ class Event:
 
     def of(self, joints: Floats) -> Floats:
         """Where the joint is then (3,), m."""
-        at = self.share * (FRAMES - 1)
-        frames = np.arange(FRAMES)
-        return np.array([np.interp(at, frames, column) for column in joints[:, self.joint].T])
+        return align.at(joints[:, self.joint], np.array([self.share]))[0]
 
 
 def of_clip(clip: Clip, event: Event | None) -> Motion:
     """Motion of a captured clip on its own skeleton."""
     rotations, path = align.resample(clip, EVEN)
-    translations = np.repeat(clip.translations.mean(axis=0)[None], FRAMES, axis=0)
-    translations[:, 0] = path
+    translations = skeleton.translations(clip.translations.mean(axis=0), path)
     return posed(clip.skeleton.parents, rotations, translations, clip.duration, event)
 
 

@@ -29,7 +29,7 @@ SMOOTHINGS = (0.0, *np.geomspace(1e-3, 1e2, 11))
 
 
 def _controls(samples: Samples, queries: Floats) -> tuple[Floats, Floats]:
-    return samples.points[:, : samples.controls], queries[:, : samples.controls]
+    return samples.half_ranges, queries[:, : samples.controls]
 
 
 Kernel = Literal["thin_plate_spline", "linear", "cubic"]
@@ -38,9 +38,13 @@ Kernel = Literal["thin_plate_spline", "linear", "cubic"]
 def _rbf(kernel: Kernel) -> Peer:
     def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
         known, asked = _controls(samples, queries)
-        return RBFInterpolator(*_merged(known, values), kernel=kernel, degree=1)(asked)
+        return _through(known, values, kernel, 0.0)(asked)
 
     return predict
+
+
+def _through(known: Floats, values: Floats, kernel: Kernel, smoothing: float) -> RBFInterpolator:
+    return RBFInterpolator(*_merged(known, values), kernel=kernel, degree=1, smoothing=smoothing)
 
 
 def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -56,19 +60,14 @@ def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Fl
     known, asked = _controls(samples, queries)
     losses = [_left_out(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
     best = SMOOTHINGS[int(np.argmin(losses))]
-    return _thin_plate(known, values, best)(asked)
-
-
-def _thin_plate(known: Floats, values: Floats, smoothing: float) -> RBFInterpolator:
-    points, means = _merged(known, values)
-    return RBFInterpolator(points, means, kernel="thin_plate_spline", degree=1, smoothing=smoothing)
+    return _through(known, values, "thin_plate_spline", best)(asked)
 
 
 def _left_out(samples: Samples, known: Floats, values: Floats, smoothing: float) -> float:
     total = 0.0
     for group in np.unique(samples.groups):
         out = samples.groups == group
-        found = _thin_plate(known[~out], values[~out], smoothing)(known[out])
+        found = _through(known[~out], values[~out], "thin_plate_spline", smoothing)(known[out])
         total += float(np.sum(np.square(found - values[out])))
     return total
 
@@ -122,7 +121,7 @@ def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
     for row, query in enumerate(queries):
         same = samples.points[:, samples.controls :] @ query[samples.controls :] > 0.5
         among = same if same.any() else np.ones(len(values), dtype=bool)
-        known = samples.points[among, : samples.controls]
+        known = samples.half_ranges[among]
         model = KNeighborsRegressor(1).fit(known, values[among])
         found[row] = model.predict(query[None, : samples.controls])[0]
     return found

@@ -20,7 +20,6 @@ TITLES = {
     "leave_one_performer_out": "Every performer predicted from the others",
     "truth": "Against the truth at unseen control points",
 }
-_SPREADS = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
 
 
 def html(description: str, results: Sequence[Result]) -> bytes:
@@ -147,7 +146,7 @@ def _spread(result: Result) -> Section:
     rows = [
         (one.name, name.replace("_", " "), *(f"{100 * v:.2f}" for v in vars(spread).values()))
         for one in summary.of(result)
-        for name in _SPREADS
+        for name in summary.DISTANCES
         for spread in (getattr(one.mean, name),)
     ]
     words = (

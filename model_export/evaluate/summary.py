@@ -13,6 +13,7 @@ from model_export.evaluate.protocol import Result
 from model_export.report import plain
 from service.motion.conventions import Floats
 
+DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
 HEAD = (
     "method",
     "relative",
@@ -67,7 +68,7 @@ class Summary:
             "skate_cm_per_s": _cm(mean.skate),
             "distances_cm": {
                 name: {key: _cm(value) for key, value in asdict(getattr(mean, name)).items()}
-                for name in _DISTANCES
+                for name in DISTANCES
             },
             "definition": DEFINITIONS[self.name],
         }
@@ -90,9 +91,6 @@ class Summary:
             f"{mean.acceleration:.2f}",
             f"{self.skate:.2f}" if mean.skate_captured else "",
         )
-
-
-_DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
 
 
 def _two(metres: float) -> str:

@@ -54,8 +54,7 @@ class Errors:
 
     def _some(self, poses: Poses, points: Floats) -> Floats:
         rotations, root = poses(points)
-        translations = np.tile(self.made.offsets.mean(axis=0), (*root.shape[:2], 1, 1))
-        translations[:, :, 0] = root
+        translations = skeleton.translations(self.made.offsets.mean(axis=0), root)
         return skeleton.forward(self.made.parents, rotations, translations)[0]
 
     def field(self, reduced: Multilinear) -> Kriging:

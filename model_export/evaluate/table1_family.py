@@ -36,9 +36,7 @@ class Family:
     @property
     def samples(self) -> Floats:
         """Controls (N, d) in half-ranges."""
-        controls = np.stack([example.controls for example in self.examples])
-        low, high = controls.min(axis=0), controls.max(axis=0)
-        return (2.0 * controls - low - high) / (high - low)
+        return self.trained.laid.half_ranges
 
     @property
     def numbers(self) -> Floats:

@@ -35,8 +35,7 @@ def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[Multilinear, Krigin
 
 def guess(made: Family, reduced: Multilinear) -> Hyper:
     """Parameters of the field by the variogram of the motions' slices of the core."""
-    motions = reduced.bases[2] * np.linalg.norm(hosvd.unfold(reduced.core, 2), axis=1)
-    return tune.first_guess(made.samples, motions, "matern52", (1,))
+    return tune.first_guess(made.samples, reduced.motions, "matern52", (1,))
 
 
 def naive(made: Family, fitter: Fitter) -> Naive:

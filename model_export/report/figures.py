@@ -145,7 +145,7 @@ def compare(trained: Trained, clip: int) -> Compared:
 
 
 def _nearest(trained: Trained, clip: int) -> Neighbour:
-    points, values = left_out.points(trained), left_out.values(trained)
+    points, values = trained.laid.half_ranges, trained.values["pose"]
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf
     other = int(np.argmin(distances))

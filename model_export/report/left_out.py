@@ -5,31 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from model_export import hosvd
-from model_export.field_bank import half_ranges
 from model_export.ingest import Example
 from model_export.train import Trained
 from service.motion import quat, skeleton
 from service.motion.conventions import Floats
-
-# Directions of samples that carry less than this share of the first are rounding.
-NOTHING = 1e-9
-
-
-def spectrum(trained: Trained) -> Floats:
-    """Singular values (N,) of the sample mode."""
-    return np.linalg.norm(hosvd.unfold(trained.full.core, 2), axis=1)
-
-
-def values(trained: Trained) -> Floats:
-    """Whole motions as rows (N, N), in m² summed over joints and frames: what is kriged."""
-    return trained.full.bases[2] * spectrum(trained)
-
-
-def points(trained: Trained) -> Floats:
-    """Controls (N, d) of the clips in half-ranges."""
-    given = np.stack([example.controls for example in trained.examples])
-    return half_ranges(given, given.min(axis=0), given.max(axis=0))
 
 
 def performers(trained: Trained) -> npt.NDArray[np.str_]:
@@ -39,11 +18,8 @@ def performers(trained: Trained) -> npt.NDArray[np.str_]:
 
 def motion(trained: Trained, clip: int) -> Floats:
     """Slice (D', T) of the motion tensor that all other clips predict for one."""
-    sizes = spectrum(trained)
-    worth = np.where(sizes > NOTHING * sizes[0], 1.0 / np.maximum(sizes, 1e-300), 0.0)
-    gap = trained.full.core @ (trained.pose.residuals[clip] * worth)
-    modes, frames, _ = trained.full.bases
-    return trained.tensor.values[:, :, clip] - modes @ gap @ frames.T
+    gap = trained.full.slices(trained.pose.residuals[[clip]])[:, :, 0]
+    return trained.tensor.values[:, :, clip] - gap
 
 
 @dataclass(frozen=True)
@@ -57,9 +33,8 @@ class Body:
 def body(trained: Trained, clip: int, own_motion: Floats) -> Body:
     """Where a slice (D', T) of the tensor puts the body of a clip's performer."""
     example, tensor = trained.examples[clip], trained.tensor
-    rotations, root = tensor.chart.poses(tensor.mean + own_motion.T @ tensor.unwhiten.T)
-    translations = np.repeat(example.offsets[None], len(root), axis=0)
-    translations[:, 0] = root
+    rotations, root = tensor.chart.poses(tensor.numbers(own_motion[:, :, None])[0])
+    translations = skeleton.translations(example.offsets, root)
     own = example.clip.skeleton
     joints, turns = skeleton.forward(own.parents, rotations, translations)
     ends = list(own.tip_joints)

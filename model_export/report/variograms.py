@@ -133,8 +133,8 @@ class Variograms:
 
 def of(trained: Trained, controls: tuple[Control, ...]) -> Variograms:
     """Variograms of a trained model's pose field over its controls."""
-    hyper, points = trained.pose.hyper, left_out.points(trained)
-    left = variogram.residuals(points, left_out.values(trained), max(hyper.drifts))
+    hyper, points = trained.pose.hyper, trained.laid.half_ranges
+    left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
     first, second = np.triu_indices(len(points), k=1)
     # The tensor sums over joints and frames; a mean is what can be read.
     shared = trained.tensor.weight * trained.tensor.values.shape[1]

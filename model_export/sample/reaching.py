@@ -27,8 +27,7 @@ class Motion:
 
     def forward(self) -> tuple[Floats, Floats]:
         """Joint positions (P, J, 3), m, and orientations (P, J, 4)."""
-        translations = np.repeat(self.figure.offsets[None], len(self.rotations), axis=0)
-        translations[:, 0] = self.root_path
+        translations = skeleton.translations(self.figure.offsets, self.root_path)
         return skeleton.forward(self.figure.parents, self.rotations, translations)
 
     def turned(self, turns: dict[str, Floats]) -> "Motion":

@@ -53,9 +53,7 @@ class Clip:
 
 
 def assemble(
-    skeleton: Skeleton, rotations: Floats, root_path: Floats, bone_offsets: Floats, rate: float
+    joints: Skeleton, rotations: Floats, root_path: Floats, bone_offsets: Floats, rate: float
 ) -> Clip:
     """Clip whose bones keep their offsets (J, 3) while the root follows its path (F, 3)."""
-    translations = np.repeat(bone_offsets[None], len(rotations), axis=0)
-    translations[:, 0] = root_path
-    return Clip(skeleton, rotations, translations, rate)
+    return Clip(joints, rotations, skeleton.translations(bone_offsets, root_path), rate)

@@ -48,6 +48,15 @@ class Skeleton:
         return self.names == other.names and self.parents == other.parents
 
 
+def translations(offsets: Floats, root_path: Floats) -> Floats:
+    """Local translations (..., T, J, 3) of bones that keep their offsets (..., J, 3) while the root
+    follows its path (..., T, 3)."""
+    local = np.empty((*root_path.shape[:-1], *offsets.shape[-2:]))
+    local[:] = offsets[..., None, :, :]
+    local[..., 0, :] = root_path
+    return local
+
+
 def forward(
     parents: tuple[int, ...], rotations: Floats, translations: Floats
 ) -> tuple[Floats, Floats]:

@@ -1,5 +1,6 @@
 """The least that a recipe must say, and folders of small motions that it can be followed with."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,31 @@ from model_export.recipe import Recipe
 from service.motion import bvh, quat
 from service.motion.clip import Clip, assemble
 from service.motion.skeleton import Skeleton
+
+TOML = """\
+schema = 1
+name = "tiny"
+description = "Small motions"
+licence = "CC0-1.0"
+[source]
+metres_per_unit = 1.0
+up = "y"
+[clips]
+table = "clips.csv"
+file = "file"
+[[controls]]
+name = "speed"
+column = "v"
+unit = "m/s"
+description = "Mean speed"
+[motion]
+frames = 20
+cyclic = false
+root = "travelling"
+[size]
+rms_budget_cm = 1.0
+"""
+"""The recipe as text."""
 
 SKELETON = Skeleton(
     ("Hips", "Spine", "Head", "LeftArm", "LeftHand"),
@@ -22,17 +48,7 @@ SKELETON = Skeleton(
 
 def plain_recipe() -> dict[str, Any]:
     """A recipe of one control, as its TOML says it."""
-    return {
-        "schema": 1,
-        "name": "tiny",
-        "description": "Small motions",
-        "licence": "CC0-1.0",
-        "source": {"metres_per_unit": 1.0, "up": "y"},
-        "clips": {"table": "clips.csv", "file": "file"},
-        "controls": [{"name": "speed", "column": "v", "unit": "m/s", "description": "Mean speed"}],
-        "motion": {"frames": 20, "cyclic": False, "root": "travelling"},
-        "size": {"rms_budget_cm": 1.0},
-    }
+    return tomllib.loads(TOML)
 
 
 def recipe_with(**sections: Mapping[str, Any]) -> Recipe:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from minimal import plain_recipe, small_clip, write_clips
+from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from model_export import ingest
 from model_export.evaluate import errors, folds, methods, motion, protocol, render, summary
@@ -17,6 +17,10 @@ from service import cli
 from service.motion.errors import TrainingError
 
 CLIPS = 12
+
+LABELLED = TOML.replace('file = "file"\n', 'file = "file"\nperformer = "who"\n').replace(
+    "[size]", '[kriging]\nlabel = "performer"\n[size]'
+)
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +261,7 @@ def run(monkeypatch, *words):
 
 def test_the_command_writes_what_it_prints(tmp_path, folder, monkeypatch, capsys):
     path, found, page = (tmp_path / name for name in ("tiny.toml", "found.json", "found.html"))
-    path.write_text(TOML)
+    path.write_text(LABELLED)
     words = ("evaluate", path, "--data", folder, "--protocol", "performer")
     assert run(monkeypatch, *words, "--json", found, "--report", page) == 0
     facts = json.loads(found.read_text())
@@ -275,7 +279,7 @@ def test_the_command_writes_what_it_prints(tmp_path, folder, monkeypatch, capsys
 )
 def test_what_cannot_be_asked_is_refused_first(tmp_path, folder, monkeypatch, capsys, words, said):
     path = tmp_path / "tiny.toml"
-    path.write_text(TOML)
+    path.write_text(LABELLED)
     assert run(monkeypatch, "evaluate", path, "--data", folder, *words) == 2
     assert said in capsys.readouterr().err
 
@@ -283,37 +287,3 @@ def test_what_cannot_be_asked_is_refused_first(tmp_path, folder, monkeypatch, ca
 def test_a_recipe_or_the_table_must_be_asked_for(monkeypatch, capsys):
     assert run(monkeypatch, "evaluate") == 2
     assert "expected a recipe, or --table1" in capsys.readouterr().err
-
-
-TOML = """
-schema = 1
-name = "tiny"
-description = "Small motions"
-licence = "CC0-1.0"
-
-[source]
-metres_per_unit = 1.0
-up = "y"
-
-[clips]
-table = "clips.csv"
-file = "file"
-performer = "who"
-
-[[controls]]
-name = "speed"
-column = "v"
-unit = "m/s"
-description = "Mean speed"
-
-[motion]
-frames = 20
-cyclic = false
-root = "travelling"
-
-[kriging]
-label = "performer"
-
-[size]
-rms_budget_cm = 1.0
-"""

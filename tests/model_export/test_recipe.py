@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from minimal import TOML
 
 from model_export import recipe
 from model_export.covariance import COVARIANCES
@@ -14,29 +15,7 @@ from service.motion.errors import RecipeError
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
 SHIPPED = ("hdm05_grab_high", "hdm05_deposit_floor", "cmu_walk")
-MINIMAL = """\
-schema = 1
-name = "tiny"
-description = "Small motions"
-licence = "CC0-1.0"
-[source]
-metres_per_unit = 0.01
-up = "y"
-[clips]
-table = "clips.csv"
-file = "file"
-[[controls]]
-name = "speed"
-column = "v"
-unit = "m/s"
-description = "Mean speed"
-[motion]
-frames = 20
-cyclic = false
-root = "travelling"
-[size]
-rms_budget_cm = 1.0
-"""
+MINIMAL = TOML.replace("metres_per_unit = 1.0", "metres_per_unit = 0.01")
 SECOND = """[[controls]]
 name = "speed"
 column = "w"

@@ -7,13 +7,8 @@ import numpy as np
 import pytest
 
 from model_export import cost, fidelity
-from model_export.evaluate import table1, table1_errors, table1_family, table1_measure
+from model_export.evaluate import table1, table1_errors, table1_measure
 from model_export.evaluate import table1_precompute as precompute
-
-
-@pytest.fixture(scope="module")
-def made(trained):
-    return table1_family.of(trained, None, 0.0)
 
 
 @pytest.fixture(scope="module")

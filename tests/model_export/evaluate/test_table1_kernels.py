@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 
 from model_export.decoder import Decoder
-from model_export.evaluate import table1_family, table1_pose, table1_precompute
 from model_export.evaluate import table1_kernels as kernels
+from model_export.evaluate import table1_pose, table1_precompute
 
 RANKS = (12, 5, 10)
 # Sums of a hundred products in another order, in float64.
 EXACT = 1e-9
-
-
-@pytest.fixture(scope="module")
-def made(trained):
-    return table1_family.of(trained, None, 0.0)
 
 
 @pytest.fixture(scope="module")

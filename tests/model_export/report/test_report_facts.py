@@ -112,8 +112,8 @@ def test_nothing_lies_below_the_front(trained, rng):
 
 def test_the_isotropic_variogram_is_that_of_the_first_guess(trained, controls):
     found = variograms.of(trained, controls).directions[-1]
-    hyper, points = trained.pose.hyper, left_out.points(trained)
-    left = variogram.residuals(points, left_out.values(trained), max(hyper.drifts))
+    hyper, points = trained.pose.hyper, trained.laid.half_ranges
+    left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
     expected = variogram.experimental(points * hyper.scales, left)
     shared = trained.tensor.weight * trained.tensor.values.shape[1]
     assert found.mean.distances == pytest.approx(expected.distances)
@@ -125,7 +125,7 @@ def test_the_isotropic_variogram_is_that_of_the_first_guess(trained, controls):
 
 def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
     found = variograms.of(trained, controls).directions
-    points = left_out.points(trained)
+    points = trained.laid.half_ranges
     for axis, direction in enumerate(found[:-1]):
         counted = 0
         for i in range(len(points)):

@@ -78,7 +78,7 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
 
 def test_the_nearest_clip_is_the_nearest(trained, clip):
     pair = figures.compare(trained, clip)
-    points = left_out.points(trained)
+    points = trained.laid.half_ranges
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf
     assert pair.nearest.distance == distances.min()
