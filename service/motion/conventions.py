@@ -11,7 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-"""Every array of numbers in Python is float64; the model file states its own type."""
+"""Arrays of numbers in Python are float64, but for crowds; the model file states its own type."""
+
+Singles = npt.NDArray[np.float32]
+"""Poses of a crowd, as the model answers them: twice the precision is twice the memory."""
 
 Indices = npt.NDArray[np.int64]
 
