@@ -133,9 +133,11 @@ def _card(
         rate=float(np.median([example.clip.rate for example in examples])),
         frames=recipe.motion.frames,
         samples=len(examples),
-        ranks=trained.model.decoder.reduced.core.shape,
+        levels=(),
         durations=(float(durations.min()), float(durations.max())),
         performers=trained.model.bank.performers,
+        examples=tuple(tuple(map(_round, example.controls)) for example in examples),
+        moved_by=tuple(map(int, trained.laid.moved_by)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
     )

@@ -16,13 +16,14 @@ from service.motion.conventions import Floats
 @dataclass(frozen=True)
 class Outputs:
     """rotations (B, S, J, 4), root_position (B, S, 3), bone_offsets (B, J, 3), duration (B,),
-    sigma (B,)."""
+    sigma (B,), travel (B, S, 3)."""
 
     rotations: Floats
     root_position: Floats
     bone_offsets: Floats
     duration: Floats
     sigma: Floats
+    travel: Floats
 
     def positions(self, parents: tuple[int, ...]) -> Floats:
         """Joint positions (B, S, J, 3), m."""
@@ -51,11 +52,12 @@ class Model:
         fields = self.bank.numpy(points)
         duration, place = self.timing.numpy(fields["duration"], fields["warp"], time)
         rotations, root = self.decoder.numpy(fields["pose"], place)
+        gone = np.zeros((*place.shape, 3))
         if self.travel:
-            rotations, root = self.travel.numpy(rotations, root, fields["travel"], place)
+            rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], place)
         offsets = self.proportions.numpy(fields["offsets"])
         sigma = self.spread.numpy(points)
-        return Outputs(rotations, root, offsets, duration, sigma)
+        return Outputs(rotations, root, offsets, duration, sigma, gone)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
         """The same as one graph, with metadata and what the file says of its producer."""
@@ -64,12 +66,15 @@ class Model:
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         rotations, root = self.decoder.onnx(net, fields["pose"], place)
         if self.travel:
-            rotations, root = self.travel.onnx(net, rotations, root, fields["travel"], place)
+            rotations, root, gone = self.travel.onnx(net, rotations, root, fields["travel"], place)
+        else:
+            gone = net("Mul", place, net.weights("no_travel", np.zeros(3)))
         net.named("rotations", rotations)
         net.named("root_position", root)
         net.named("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
         net.named("duration", duration)
         net.named("sigma", self.spread.onnx(net, basis))
+        net.named("travel", gone)
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.performers:
@@ -81,5 +86,6 @@ class Model:
             "bone_offsets": ["batch", joints, 3],
             "duration": ["batch"],
             "sigma": ["batch"],
+            "travel": ["batch", "steps", 3],
         }
         return net.model(inputs, outputs, metadata, about)

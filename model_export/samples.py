@@ -13,6 +13,9 @@ from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
 
 
+EMPTY = np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
 class Samples:
     """Where a field's samples lie.
@@ -34,6 +37,11 @@ class Samples:
     def labelled(self) -> bool:
         """Whether performers are told apart."""
         return self.points.shape[1] > self.controls
+
+    @property
+    def moved_by(self) -> Indices:
+        """Place (n,) of each sample's performer among them; empty where they are not told apart."""
+        return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else EMPTY
 
     def from_mean(self, values: Floats) -> Floats:
         """How far each of values (n, m) lies from the mean of all other groups."""

@@ -66,14 +66,18 @@ class Travel:
 
     def numpy(
         self, rotations: Floats, root: Floats, travel: Floats, place: Floats
-    ) -> tuple[Floats, Floats]:
-        """Rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) put back.
+    ) -> tuple[Floats, Floats, Floats]:
+        """Rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) put back, and how
+        much of it (B, S, 3) that is.
 
         place (B, S): canonical frames.
         """
-        return put_back(rotations, root, travel, place / (self.frames - 1))
+        share = place / (self.frames - 1)
+        return *put_back(rotations, root, travel, share), share[..., None] * travel[:, None]
 
-    def onnx(self, net: Net, rotations: str, root: str, travel: str, place: str) -> tuple[str, str]:
+    def onnx(
+        self, net: Net, rotations: str, root: str, travel: str, place: str
+    ) -> tuple[str, str, str]:
         """The same in a graph; canonical frames are (B, S, 1) there."""
         share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
         gone = net("Mul", share, net("Unsqueeze", travel, net.indices(1)))
@@ -87,4 +91,4 @@ class Travel:
         others = net("Slice", rotations, net.indices(1), net.indices(END), joints)
         across = net("MatMul", own, net.weights("travel_quarter", TURN))
         turned = net("Add", net("Mul", own, net("Cos", half)), net("Mul", across, net("Sin", half)))
-        return net("Concat", turned, others, axis=2), moved
+        return net("Concat", turned, others, axis=2), moved, gone

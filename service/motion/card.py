@@ -6,14 +6,15 @@ under a key that begins with "posefield."; `FORMAT` changes whenever an older re
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from service.motion.detail import Level
 from service.motion.skeleton import Skeleton
 
-FORMAT = 1
+FORMAT = 2
 PREFIX = "posefield."
 
 
@@ -40,9 +41,11 @@ class ModelCard:
 
     cyclic: the last pose leads into the first. root: whether the root travels or stays in place.
     rate: frames a second of the captured clips. frames, samples: T and N of the motion tensor.
-    durations: shortest and longest captured clip, s. performers: who can be asked for by name, in
-    the order of the graph's labels; empty where performers are not told apart. diagnostics: what
-    training measured. provenance: recipe, hashes of the data, versions, licence.
+    levels: of detail, the finest first. durations: shortest and longest captured clip, s.
+    performers: who can be asked for by name, in the order of the graph's labels; empty where
+    performers are not told apart. examples (N, d): controls of the captured clips; moved_by (N,):
+    whose each is, by place among the performers, empty where they are not told apart. diagnostics:
+    what training measured. provenance: recipe, hashes of the data, versions, licence.
     """
 
     name: str
@@ -54,9 +57,11 @@ class ModelCard:
     rate: float
     frames: int
     samples: int
-    ranks: tuple[int, int, int]
+    levels: tuple[Level, ...]
     durations: tuple[float, float]
     performers: tuple[str, ...]
+    examples: tuple[tuple[float, ...], ...]
+    moved_by: tuple[int, ...]
     diagnostics: Mapping[str, Any]
     provenance: Mapping[str, Any]
 
@@ -77,9 +82,11 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
     return {
         **{key: getattr(card, key) for key in _AS_THEY_ARE},
         "controls": [{**vars(c), "values": list(c.values)} for c in card.controls],
-        "ranks": list(card.ranks),
+        "levels": [_plain_level(level) for level in card.levels],
         "durations": list(card.durations),
         "performers": list(card.performers),
+        "examples": [list(point) for point in card.examples],
+        "moved_by": list(card.moved_by),
         "diagnostics": dict(card.diagnostics),
         "provenance": dict(card.provenance),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
@@ -91,6 +98,10 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
             "tip_offsets": np.round(joints.tip_offsets, 6).tolist(),
         },
     }
+
+
+def _plain_level(level: Level) -> dict[str, Any]:
+    return {**asdict(level), "ranks": list(level.ranks), "joints": list(level.joints)}
 
 
 _AS_THEY_ARE = ("name", "description", "cyclic", "root", "rate", "frames", "samples")
@@ -129,10 +140,14 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
             tuple(joints["tip_joints"]),
             np.array(joints["tip_offsets"], dtype=float).reshape(-1, 3),
         ),
-        ranks=tuple(plain["ranks"]),
+        levels=tuple(
+            Level(**{**level, "ranks": tuple(level["ranks"]), "joints": tuple(level["joints"])})
+            for level in plain["levels"]
+        ),
         durations=tuple(plain["durations"]),
-        # Files of before performers were told apart do not have them.
-        performers=tuple(plain.get("performers", ())),
+        performers=tuple(plain["performers"]),
+        examples=tuple(map(tuple, plain["examples"])),
+        moved_by=tuple(plain["moved_by"]),
         diagnostics=plain["diagnostics"],
         provenance=plain["provenance"],
     )

@@ -15,7 +15,14 @@ from service.motion.errors import ModelError
 
 INPUTS = {"controls": 2, "time": 2}
 PERFORMER = "performer"
-OUTPUTS = {"rotations": 4, "root_position": 3, "bone_offsets": 3, "duration": 1, "sigma": 1}
+OUTPUTS = {
+    "rotations": 4,
+    "root_position": 3,
+    "bone_offsets": 3,
+    "duration": 1,
+    "sigma": 1,
+    "travel": 3,
+}
 
 
 @dataclass(frozen=True)

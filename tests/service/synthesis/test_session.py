@@ -115,14 +115,14 @@ def test_a_model_without_its_metadata_is_refused(refused, graph):
     assert refused(graph) == "no posefield metadata: it was not written by posefield"
 
 
-@pytest.mark.parametrize("number", ["2", "0", '"1"', "null"])
+@pytest.mark.parametrize("number", ["1", "0", '"1"', "null"])
 def test_another_format_is_refused(refused, graph, number):
     entry(graph, "format").value = number
     found = json.loads(number)
-    assert refused(graph) == f"model format {found}, this version reads format 1"
+    assert refused(graph) == f"model format {found}, this version reads format 2"
 
 
-@pytest.mark.parametrize("key", ["controls", "skeleton", "durations", "ranks", "name"])
+@pytest.mark.parametrize("key", ["controls", "skeleton", "durations", "levels", "name"])
 def test_an_incomplete_card_is_refused(refused, graph, key):
     graph.metadata_props.remove(entry(graph, key))
     assert refused(graph) == f"incomplete posefield metadata: '{key}'"
@@ -136,7 +136,7 @@ def test_an_incomplete_card_is_refused(refused, graph, key):
         ("controls", "[]"),
         ("skeleton", "[]"),
         ("skeleton", "{"),
-        ("ranks", "null"),
+        ("levels", "null"),
         ("format", "one"),
     ],
 )
