@@ -217,7 +217,7 @@ def _facts(exported: "Exported", output: Path) -> dict[str, Any]:
         "file": str(output),
         "bytes": len(exported.content),
         "clips": card.samples,
-        "ranks": list(card.ranks),
+        "ranks": list(card.levels[0].ranks),
         **card.diagnostics,
     }
 

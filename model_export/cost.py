@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from model_export.field_bank import FieldBank
+from model_export.model import Model
 from model_export.tensor import MotionTensor
 
 
@@ -43,6 +45,36 @@ def operations(own_tensor: MotionTensor, controls: int) -> Price:
     """
     joints, samples = len(own_tensor.chart.means), own_tensor.values.shape[2]
     return Price((4 * joints + 3, 1, samples + controls + 1), pair=1)
+
+
+def read(model: Model, level: int) -> int:
+    """Numbers of the file that a level reads: core, bases, kriging weights and samples."""
+    bank, rung = model.bank, model.decoder.rungs[level]
+    r1, r2, r3 = rung.ranks
+    samples, varies = bank.samples(level), np.any(model.decoder.at(level).unwhiten != 0.0, axis=1)
+    bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
+    asked = samples * len(bank.low) + _precision(bank, level)
+    return int(r1 * r2 * r3 + bases + asked + _weights(bank, level))
+
+
+def _precision(bank: FieldBank, level: int) -> int:
+    return 0 if level else (bank.drift + len(bank.pose.samples)) ** 2
+
+
+def _weights(bank: FieldBank, level: int) -> int:
+    if level:
+        return bank.coarse[level - 1].size
+    return sum(field.dual.size for field in bank.kriged)
+
+
+def work(model: Model, level: int) -> int:
+    """Multiply-adds of one pose of a level, from controls to quaternions."""
+    bank, rung = model.bank, model.decoder.rungs[level]
+    (r1, r2, r3), columns = rung.ranks, bank.columns(level)
+    distances = columns * (2 + 2 * len(bank.low) + len(bank.performers))
+    values = (bank.linear + columns) * sum(bank.sizes(r3))
+    decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3)
+    return distances + values + _precision(bank, level) + decoding
 
 
 PRICES = {"numbers": numbers, "operations": operations}

@@ -1,16 +1,26 @@
 """From reduced coefficients and canonical time to rotations, root position and bone offsets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from model_export.hosvd import Multilinear
+from model_export.ladder import Numbers
 from model_export.net import Net
 from service.motion import quat
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 
 # Added to squared half angles, so that the sine over the angle has a value at zero.
 TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Rung:
+    """What a level of detail keeps: ranks, and joints that move, in order; the others stay at the
+    family's mean."""
+
+    ranks: tuple[int, int, int]
+    joints: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -20,13 +30,31 @@ class Decoder:
     reduced: core (r1, r2, r3) and bases of degrees of freedom, frames and samples, in the metric's
     coordinates. mean (D,): pose vector that the tensor is centred on. unwhiten (D, D'): from the
     metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means (J, 4):
-    rotations about which the rotation vectors are taken.
+    rotations about which the rotation vectors are taken. coarse: ranks and joints of each coarser
+    level of detail.
     """
 
     reduced: Multilinear
     mean: Floats
     unwhiten: Floats
     means: Floats
+    coarse: tuple[Rung, ...] = ()
+
+    @property
+    def rungs(self) -> tuple[Rung, ...]:
+        """Ranks and joints of all levels."""
+        r1, r2, r3 = self.reduced.core.shape
+        return (Rung((r1, r2, r3), tuple(range(len(self.means)))), *self.coarse)
+
+    def at(self, level: int) -> "Decoder":
+        """Decoder of a level: leading parts of core and bases, and joints that do not move."""
+        rung = self.rungs[level]
+        moves = np.zeros((1 + len(self.means), 3))
+        moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
+        unwhiten = self.unwhiten * moves.reshape(-1, 1)
+        return replace(
+            self, reduced=self.reduced.truncated(rung.ranks), unwhiten=unwhiten, coarse=()
+        )
 
     @property
     def directions(self) -> Floats:
@@ -50,36 +78,55 @@ class Decoder:
         time = (1.0 - share) * table[before] + share * table[before + 1]
         return np.einsum("bsr,qrc,bc->bsq", time, self.reduced.core, coefficients, optimize=True)
 
-    def onnx(self, net: Net, coefficients: str, place: str) -> tuple[str, str]:
-        """The same in a graph, from canonical frames (B, S, 1)."""
-        r1, r2, _ = self.reduced.core.shape
-        core = net.weights("core", self.reduced.core.transpose(2, 1, 0).reshape(-1, r2 * r1))
-        motion = net("Reshape", net("MatMul", coefficients, core), net.indices(-1, r2, r1))
-        poses = net("MatMul", self._time(net, place), motion)
-        flat = net("Reshape", poses, net.indices(-1, r1))
+    def entries(self) -> dict[str, list[Numbers]]:
+        """What the decoder's graph asks of a ladder."""
+        ranks, joints = [rung.ranks for rung in self.rungs], [len(r.joints) for r in self.rungs]
+        return {
+            "core": [[r3, r2, r1] for r1, r2, r3 in ranks],
+            "core_rows": [[r3, -1] for _, _, r3 in ranks],
+            "motion": [[-1, r2, r1] for r1, r2, _ in ranks],
+            "flat": [[-1, r1] for r1, _, _ in ranks],
+            "time": [[r2] for _, r2, _ in ranks],
+            "root": [[3, r1] for r1, _, _ in ranks],
+            "turning": [[4 * n, r1] for n, (r1, _, _) in zip(joints, ranks, strict=True)],
+            "joints": [[n] for n in joints],
+            "quaternions": [[4 * n] for n in joints],
+        }
+
+    def onnx(
+        self, net: Net, coefficients: str, place: str, ends: dict[str, str]
+    ) -> tuple[str, str]:
+        """The same in a graph, from canonical frames (B, S, 1); `ends` are a ladder's."""
+        zeros = net.indices(0, 0, 0)
+        whole = net.weights("core", self.reduced.core.transpose(2, 1, 0))
+        core = net("Reshape", net("Slice", whole, zeros, ends["core"]), ends["core_rows"])
+        motion = net("Reshape", net("MatMul", coefficients, core), ends["motion"])
+        poses = net("MatMul", self._time(net, place, ends["time"]), motion)
+        flat = net("Reshape", poses, ends["flat"])
         directions = self._directions(net)
-        zero, three = net.indices(0), net.indices(3)
-        of_root = net("Slice", directions, zero, three, zero)
+        three, end = net.indices(3), net.indices(len(self.mean))
+        of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
         root = net("Gemm", flat, of_root, net.weights("root_mean", self.mean[:3]), transB=1)
         steps = net("Shape", place, start=0, end=2)
         root_shape = net("Concat", steps, net.indices(3), axis=0)
         joint_shape = net("Concat", steps, net.indices(len(self.means), 4), axis=0)
+        of_joints = net("Slice", directions, three, end, net.indices(0))
         return (
-            net("Reshape", self._rotations(net, flat, directions), joint_shape),
+            net("Reshape", self._rotations(net, flat, of_joints, ends), joint_shape),
             net("Reshape", root, root_shape),
         )
 
-    def _time(self, net: Net, place: str) -> str:
+    def _time(self, net: Net, place: str, end: str) -> str:
         """Time coefficients (B, S, r2): two rows of the table, and a line between them."""
         table = net.weights("time_basis", self.reduced.bases[1])
         last = len(self.reduced.bases[1]) - 1
-        zero, one = net.indices(0), net.indices(1)
+        zero, one, two = net.indices(0), net.indices(1), net.indices(2)
         first = net("Slice", table, zero, net.indices(last), zero)
         steps = net("Sub", net("Slice", table, one, net.indices(last + 1), zero), first)
         before = net("Min", net("Floor", place), net.number(last - 1.0))
-        row = net("Cast", net("Squeeze", before, net.indices(2)), to=6)
+        row = net("Cast", net("Squeeze", before, two), to=6)
         rise = net("Mul", net("Gather", steps, row), net("Sub", place, before))
-        return net("Add", net("Gather", first, row), rise)
+        return net("Slice", net("Add", net("Gather", first, row), rise), zero, end, two)
 
     def _directions(self, net: Net) -> str:
         """Directions (D, r1), put together when the session loads: what is zero is not stored."""
@@ -90,17 +137,48 @@ class Decoder:
         row = np.where(varies, np.cumsum(varies) - 1, np.count_nonzero(varies))
         return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
 
-    def _rotations(self, net: Net, flat: str, directions: str) -> str:
+    def _rotations(self, net: Net, flat: str, directions: str, ends: dict[str, str]) -> str:
         """Quaternions (B S, J, 4) of the first mode's coefficients (B S, r1)."""
-        zero, three, end = net.indices(0), net.indices(3), net.indices(len(self.mean))
-        rows = net(
-            "Gemm",
-            turned_onnx(net, self.means, net("Slice", directions, three, end, zero)),
-            flat,
-            net.weights("rotation_mean", turned(self.means, self.mean[3:])[:, None]),
-            transB=1,
+        turning = turned_onnx(net, self.means, directions)
+        offset = turned(self.means, self.mean[3:])
+        if any(len(rung.joints) < len(self.means) for rung in self.rungs):
+            return self._some(net, flat, turning, offset, ends)
+        turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+        means = net.weights("mean_rotations", self.means[:, :, None])
+        constant = net.weights("rotation_mean", offset[:, None])
+        return innermost_joints(
+            net,
+            quaternions(net, net("Gemm", turning, flat, constant, transB=1), means),
+            len(self.means),
         )
-        return quaternions(net, rows, self.means)
+
+    def _some(self, net: Net, flat: str, turning: str, offset: Floats, ends: dict[str, str]) -> str:
+        """The same where some level keeps joints still: those that move longest come first."""
+        order = self._order()
+        joints, zero = len(order), net.indices(0)
+        rows = np.arange(4 * joints).reshape(joints, 4)[order].ravel()
+        turning = net("Gather", turning, net.weights("turning_order", rows))
+        turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+        constant = net.weights("rotation_mean", offset[rows][:, None])
+        constant = net("Slice", constant, zero, ends["quaternions"], zero)
+        ordered = net.weights("mean_rotations", self.means[:, :, None])
+        ordered = net("Gather", ordered, net.weights("joint_order", order))
+        moving = net("Slice", ordered, zero, ends["joints"], zero)
+        found = quaternions(net, net("Gemm", turning, flat, constant, transB=1), moving)
+        still = quat.mul(self.means, quat.exp(self.mean[3:].reshape(-1, 3)))[order][:, :, None]
+        still_ones = net(
+            "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
+        )
+        poses = net("Shape", found, start=2, end=3)
+        shape = net("Concat", net.indices(1, 1), poses, axis=0)
+        both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
+        back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
+        return innermost_joints(net, back, joints)
+
+    def _order(self) -> Indices:
+        """Joints in the order in which coarser levels let go of them, the last first."""
+        kept = [[j in rung.joints for j in range(len(self.means))] for rung in self.coarse]
+        return np.argsort(-np.sum(kept, axis=0), kind="stable")
 
 
 def turned(means: Floats, vectors: Floats) -> Floats:
@@ -126,18 +204,25 @@ def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
     return net("Reshape", columns, net.indices(4 * len(means), -1))
 
 
-def quaternions(net: Net, rows: str, means: Floats) -> str:
-    """Graph's quaternions (P, J, 4) of turned rotation vectors (4 J, P).
+def quaternions(net: Net, rows: str, means: str) -> str:
+    """Graph's quaternions (J, 4, P) of turned rotation vectors (4 J, P) about means (J, 4, 1).
 
-    Poses lie innermost until the end, so that every operation runs over long rows.
+    Poses lie innermost, so that every operation runs over long rows.
     """
-    joints = net("Reshape", rows, net.indices(len(means), 4, -1))
+    joints = net(
+        "Reshape", rows, net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
+    )
     squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
     half = net("Sqrt", net("Add", squares, net.number(TINY)))
-    along = net("Mul", net.weights("mean_rotations", means[:, :, None]), net("Cos", half))
+    along = net("Mul", means, net("Cos", half))
     across = net("Mul", joints, net("Div", net("Sin", half), half))
-    finished = net("Reshape", net("Add", along, across), net.indices(4 * len(means), -1))
-    return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, len(means), 4))
+    return net("Add", along, across)
+
+
+def innermost_joints(net: Net, rotations: str, joints: int) -> str:
+    """Quaternions (P, J, 4) of those with poses innermost (J, 4, P)."""
+    finished = net("Reshape", rotations, net.indices(4 * joints, -1))
+    return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, joints, 4))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost, phase, samples, strangers
+from model_export import cost, levels, phase, samples, strangers
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -20,6 +20,7 @@ from service import __version__
 from service.motion import card
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
+from service.motion.detail import Level
 from service.motion.errors import ExportRefused
 from service.synthesis import session
 from service.synthesis.session import OUTPUTS, Session
@@ -33,8 +34,10 @@ FEW_VALUES = 10
 
 @dataclass(frozen=True)
 class Exported:
-    """A model file's content, its card, and the largest joint error that the gate saw, m."""
+    """A model of all its levels, its file's content and card, and the largest joint error that the
+    gate saw, m."""
 
+    model: Model
     content: bytes
     card: ModelCard
     parity: float
@@ -43,27 +46,30 @@ class Exported:
 def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     """File of a trained model; the same data give the same bytes.
 
-    Raises ExportRefused where onnxruntime answers anything else than the float64 reference does.
+    Raises TrainingError for levels of detail that there cannot be, ExportRefused where onnxruntime
+    answers anything else than the float64 reference does.
     """
     about = {"producer_name": "posefield", "producer_version": __version__}
     notes = [*notes, *samples.notes(recipe, trained.examples)]
+    laddered = levels.build(recipe, trained)
     # The gate's finding is part of the card, so the weights are judged before it is written.
-    draft = _card(recipe, trained, notes, parity=0.0)
-    parity = gate(trained.model, trained.model.onnx(card.dump(draft), about), draft)
-    own_card = _card(recipe, trained, notes, parity)
-    return Exported(trained.model.onnx(card.dump(own_card), about), own_card, parity)
+    draft = _card(recipe, trained, laddered.levels, notes, parity=0.0)
+    parity = gate(laddered.model, laddered.model.onnx(card.dump(draft), about), draft)
+    own_card = _card(recipe, trained, laddered.levels, notes, parity)
+    content = laddered.model.onnx(card.dump(own_card), about)
+    return Exported(laddered.model, content, own_card, parity)
 
 
 def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
-    """Largest joint distance, m, between file and reference over random questions.
+    """Largest joint distance, m, between file and reference over random questions at every level.
 
     Raises ExportRefused where it exceeds what is allowed, and says by how much and where.
     """
     opened = session.open_bytes(content, f"{own_card.name}.onnx")
     rng = np.random.Generator(np.random.PCG64(10_000))
     worst = 0.0
-    for _ in range(POINTS // BATCH):
-        asked = _draw(rng, model, own_card)
+    for question in range(POINTS // BATCH):
+        asked = _draw(rng, model, own_card, question % len(own_card.levels))
         gaps = _gaps(model, opened, asked)
         at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         worst = max(worst, float(gaps[at]))
@@ -79,7 +85,8 @@ def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
 
 @dataclass(frozen=True)
 class _Asked:
-    """Questions of the gate: points (B, d) in the controls' units, times (B, 1), s, labels (B, p).
+    """Questions of the gate: points (B, d) in the controls' units, times (B, 1), s, labels (B, p),
+    and the level of detail.
 
     All are numbers of float32: the graph sees no others, and so must the reference.
     """
@@ -87,6 +94,7 @@ class _Asked:
     points: Floats
     times: Floats
     labels: Floats
+    level: int
 
     def said(self, own_card: ModelCard, row: int) -> str:
         """One of the questions in words."""
@@ -94,10 +102,10 @@ class _Asked:
         point = dict(zip(names, self.points[row].tolist(), strict=True))
         own = np.flatnonzero(self.labels[row])
         who = f"{own_card.performers[own[0]]}, " if len(own) else ""
-        return f"{who}{point}, {self.times[row, 0]:.3f} s"
+        return f"{who}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
 
 
-def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard) -> _Asked:
+def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard, level: int) -> _Asked:
     """Random controls, performers (nobody as often as each of them) and times of their clips."""
     low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
     points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
@@ -105,20 +113,22 @@ def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard) -> _Asked
     labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, BATCH)]
     durations = model.evaluate(points, np.zeros((BATCH, 1)), labels).duration
     times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
-    return _Asked(points, times.astype(np.float32).astype(np.float64), labels)
+    return _Asked(points, times.astype(np.float32).astype(np.float64), labels, level)
 
 
 def _gaps(model: Model, opened: Session, asked: _Asked) -> Floats:
     """Distances (B, 1, J) between the joints of graph and reference, m."""
     question, parents = (asked.points, asked.times), opened.card.skeleton.parents
-    expected = model.evaluate(*question, asked.labels).positions(parents)
-    found = Outputs(*opened.run(*question, *OUTPUTS, labels=asked.labels)).positions(parents)
+    expected = model.evaluate(*question, asked.labels, asked.level).positions(parents)
+    answers = opened.run(*question, *OUTPUTS, labels=asked.labels, level=asked.level)
+    found = Outputs(*answers).positions(parents)
     return np.asarray(np.linalg.norm(found - expected, axis=-1))
 
 
 def _card(
     recipe: Recipe,
     trained: Trained,
+    ladder: tuple[Level, ...],
     notes: list[str],
     parity: float,
 ) -> ModelCard:
@@ -133,7 +143,7 @@ def _card(
         rate=float(np.median([example.clip.rate for example in examples])),
         frames=recipe.motion.frames,
         samples=len(examples),
-        levels=(),
+        levels=ladder,
         durations=(float(durations.min()), float(durations.max())),
         performers=trained.model.bank.performers,
         examples=tuple(tuple(map(_round, example.controls)) for example in examples),

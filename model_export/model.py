@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from model_export import field_graph
 from model_export.decoder import Decoder, Proportions
-from model_export.field_bank import FieldBank, Spread
+from model_export.field_bank import POSE, VARIANCE, FieldBank
+from model_export.ladder import Ladder
 from model_export.net import Net, Shapes
 from model_export.timing import Timing
 from model_export.travel import Travel
@@ -36,35 +38,47 @@ class Model:
     """The stages of a trained model; only that of a cycle travels apart from its poses."""
 
     bank: FieldBank
-    spread: Spread
     timing: Timing
     decoder: Decoder
     proportions: Proportions
     travel: Travel | None
 
-    def evaluate(self, controls: Floats, time: Floats, labels: Floats | None = None) -> Outputs:
-        """Answer to controls (B, d) in their own units and times (B, S), s.
+    def evaluate(
+        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+    ) -> Outputs:
+        """Answer to controls (B, d) in their own units and times (B, S), s, at a level of detail.
 
         labels (B, p): who moves; nobody that was seen, if not said.
         """
         nobody = np.zeros((len(controls), len(self.bank.performers)))
         points = self.bank.points(controls, nobody if labels is None else labels)
-        fields = self.bank.numpy(points)
-        duration, place = self.timing.numpy(fields["duration"], fields["warp"], time)
-        rotations, root = self.decoder.numpy(fields["pose"], place)
-        gone = np.zeros((*place.shape, 3))
+        fields = self.bank.numpy(points, level)
+        _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
+        return self._decoded(fields, place, level)
+
+    def posed(self, controls: Floats, place: Floats, labels: Floats, level: int) -> Outputs:
+        """The same at canonical frames (B, S)."""
+        fields = self.bank.numpy(self.bank.points(controls, labels), level)
+        return self._decoded(fields, place, level)
+
+    def _decoded(self, fields: dict[str, Floats], place: Floats, level: int) -> Outputs:
+        rotations, root = self.decoder.at(level).numpy(fields[POSE], place)
+        gone, duration = np.zeros((*place.shape, 3)), np.exp(fields["duration"][:, 0])
         if self.travel:
             rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], place)
         offsets = self.proportions.numpy(fields["offsets"])
-        sigma = self.spread.numpy(points)
+        sigma = self.bank.sigma(fields[VARIANCE])
         return Outputs(rotations, root, offsets, duration, sigma, gone)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
         """The same as one graph, with metadata and what the file says of its producer."""
         net = Net()
-        basis, fields = self.bank.onnx(net, "controls")
+        ranks = [rung.ranks[2] for rung in self.decoder.rungs]
+        ladder = Ladder({**field_graph.entries(self.bank, ranks), **self.decoder.entries()})
+        ends = ladder.onnx(net)
+        fields = field_graph.onnx(self.bank, net, "controls", ends)
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
-        rotations, root = self.decoder.onnx(net, fields["pose"], place)
+        rotations, root = self.decoder.onnx(net, fields[POSE], place, ends)
         if self.travel:
             rotations, root, gone = self.travel.onnx(net, rotations, root, fields["travel"], place)
         else:
@@ -73,13 +87,14 @@ class Model:
         net.named("root_position", root)
         net.named("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
         net.named("duration", duration)
-        net.named("sigma", self.spread.onnx(net, basis))
+        net.named("sigma", fields["sigma"])
         net.named("travel", gone)
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.performers:
             # Its default is one row: a name for both would promise the runtime what is not so.
             inputs["performer"] = ["batch_or_one", len(self.bank.performers)]
+        inputs["level"] = []
         outputs: Shapes = {
             "rotations": ["batch", "steps", joints, 4],
             "root_position": ["batch", "steps", 3],

@@ -39,7 +39,7 @@ class Net:
     def weights(self, name: str, array: npt.NDArray[Any]) -> str:
         """A named constant, float32 unless it holds integers; a name stands for one content."""
         kind = np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32
-        tensor = numpy_helper.from_array(np.ascontiguousarray(array, dtype=kind), name)
+        tensor = numpy_helper.from_array(np.asarray(array, dtype=kind, order="C"), name)
         if self._constants.setdefault(name, tensor) != tensor:
             raise ValueError(f"two different constants named {name!r}")
         return name
@@ -52,6 +52,10 @@ class Net:
         """A list of whole numbers: a shape, axes, starts or ends."""
         return self.weights("indices_" + "_".join(map(str, values)), np.array(values))
 
+    def _kind(self, name: str) -> int:
+        constant = self._constants.get(name)
+        return constant.data_type if constant else TensorProto.FLOAT
+
     def model(
         self,
         inputs: Shapes,
@@ -59,14 +63,15 @@ class Net:
         metadata: dict[str, str],
         about: dict[str, str],
     ) -> bytes:
-        """The finished file; inputs and outputs map a name to its shape, all float32.
+        """The finished file; inputs and outputs map a name to its shape.
 
-        An input with the name of a constant is optional: the constant is its default.
+        An input with the name of a constant is optional: the constant is its default, and its type.
+        All others are float32.
         """
         graph = helper.make_graph(
             self._nodes,
             "posefield",
-            [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in inputs.items()],
+            [helper.make_tensor_value_info(n, self._kind(n), s) for n, s in inputs.items()],
             [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in outputs.items()],
             list(self._constants.values()),
         )

@@ -53,21 +53,21 @@ def choose(size: Size, full: Multilinear, price: Price, judge: Judge) -> Triple:
     return cheapest(front(full.core, price), strain, aim)
 
 
-def front(core: Floats, price: Price) -> Front:
-    """Front of all triples by cost and exact squared error.
+def front(core: Floats, price: Price, within: Triple | None = None) -> Front:
+    """Front of all triples by cost and exact squared error; of those within a triple, if given.
 
     Every triple is scored, from one cumulative sum of the squared core (Mukai & Kuriyama 2006 left
     the choice open).
     """
-    errors = hosvd.squared_errors(core)
+    errors = hosvd.squared_errors(core)[tuple(map(slice, within or core.shape))]
     # A relative rounding error of the sum is no reason to keep another rank.
     errors[errors <= 1e-12 * float(np.sum(np.square(core)))] = 0.0
-    costs = price.of(*np.ix_(*(np.arange(1, size + 1) for size in core.shape)))
+    costs = price.of(*np.ix_(*(np.arange(1, size + 1) for size in errors.shape)))
     order = np.lexsort((errors.ravel(), costs.ravel()))
     ordered = errors.ravel()[order]
     best_before = np.minimum.accumulate(np.concatenate([[np.inf], ordered[:-1]]))
     places = order[ordered < best_before]
-    triples = np.stack(np.unravel_index(places, core.shape), axis=1) + 1
+    triples = np.stack(np.unravel_index(places, errors.shape), axis=1) + 1
     return Front(triples, errors.ravel()[places])
 
 

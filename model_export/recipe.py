@@ -8,6 +8,7 @@ twice.
 import json
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -173,11 +174,34 @@ class Event(_Part):
     )
 
 
+class Detail(_Part):
+    """A level of detail below the model's own size."""
+
+    times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
+        description="how many times the budgets, or the errors at the ranks given, it may cost"
+    )
+    drop_joints: list[Text] = Field(
+        default=[],
+        description="joints that do not move, nor what hangs below them; their own error is not "
+        "counted against the budgets",
+    )
+
+
+# In pictures 1080 pixels high and 60 degrees wide, one pixel at some 15 m a centimetre of error.
+DETAILS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
+
+
 class Size(_Part):
     """How much of the tensor is kept: ranks, or the errors that leaving out may cost.
 
     Errors are true distances between joints, by forward kinematics; all budgets given are kept.
     """
+
+    levels: list[Detail] | None = Field(
+        default=None,
+        description="coarser levels of detail, each coarser than the one before; three if not "
+        "said, of 2, 4 and 8 times the budgets",
+    )
 
     ranks: (
         Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=3, max_length=3)] | None
@@ -196,6 +220,19 @@ class Size(_Part):
         default="numbers",
         description="what is least within the budgets: numbers stored, or multiply-adds per pose",
     )
+
+    @property
+    def details(self) -> Sequence[Detail]:
+        """The coarser levels of detail."""
+        return DETAILS if self.levels is None else self.levels
+
+    @field_validator("levels")
+    @classmethod
+    def _coarser_and_coarser(cls, levels: list[Detail] | None) -> list[Detail] | None:
+        times = [level.times for level in levels or []]
+        if times != sorted(set(times)):
+            raise ValueError(f"times {times}, expected each larger than the one before")
+        return levels
 
     @property
     def budgets(self) -> dict[str, float]:

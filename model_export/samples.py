@@ -12,7 +12,6 @@ from model_export.recipe import Recipe
 from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
 
-
 EMPTY = np.zeros(0, dtype=np.int64)
 
 

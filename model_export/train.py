@@ -24,7 +24,7 @@ from model_export.align import Aligned
 from model_export.chart import Chart
 from model_export.decoder import Decoder, Proportions
 from model_export.fidelity import Fidelity
-from model_export.field_bank import FieldBank, Spread
+from model_export.field_bank import FieldBank
 from model_export.fields import Fitted
 from model_export.flips import Finding
 from model_export.hosvd import Multilinear
@@ -199,9 +199,9 @@ def _model(
     solved = kriging.solve(fits.pose.hyper, moved.laid.points, reduced.bases[2])
     others = {name: found.field for name, found in fits.beside.items()}
     ends = controls.min(axis=0), controls.max(axis=0)
+    sill = float(np.mean(fits.missed / fits.pose.variances))
     return Model(
-        FieldBank(*ends, moved.performers, solved, others),
-        Spread(solved, float(np.mean(fits.missed / fits.pose.variances))),
+        FieldBank(*ends, moved.performers, solved, others, sill),
         Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
         Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means),
         fits.proportions,

@@ -43,6 +43,7 @@ Extrapolate = Annotated[
 Performer = Annotated[
     str | None, typer.Option(help="who moves, by name; somebody never seen if not said")
 ]
+LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the finest")]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
 # What only the evaluation needs; everything else that can be missing is training's.
@@ -96,10 +97,12 @@ def pose(
     time: Annotated[list[float] | None, typer.Option(help="seconds from the start")] = None,
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
+    level: LevelOfDetail = 0,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
-    answer = synthesizer.pose(numbers(control or []), time or [0.0], extrapolate, performer)
+    asked, times = numbers(control or []), time or [0.0]
+    answer = synthesizer.pose(asked, times, extrapolate, performer, level)
     _warn(answer.trust.warnings)
     typer.echo(poses.json(answer).decode())
 
@@ -114,12 +117,14 @@ def clip(
     end: Annotated[float | None, typer.Option(help="seconds; the whole clip if not said")] = None,
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
+    level: LevelOfDetail = 0,
     json: Json = False,
 ) -> None:
     """Write a clip as usda, usdc, usdz, json or bvh."""
     encode = encoder(output)
     synthesizer = open_model(model)
-    answer = synthesizer.clip(numbers(control or []), fps, extrapolate, start, end, performer)
+    asked = numbers(control or [])
+    answer = synthesizer.clip(asked, fps, extrapolate, start, end, performer, level)
     files.write(encode(answer), output)
     _warn(answer.trust.warnings)
     typer.echo(wrote(output, answer, json))
@@ -208,6 +213,14 @@ def as_json(value: Any) -> str:
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
 
 
+def _level(number: int, level: dict[str, Any]) -> str:
+    return (
+        f"  {number}: ranks {level['ranks']} of {level['samples']} clips, {level['numbers']} "
+        f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
+        f"one joint in a hundred by more than {100 * level['p99']:.1f} cm"
+    )
+
+
 def _summary(plain: dict[str, Any]) -> str:
     """A model card on one screen."""
     diagnostics = plain["diagnostics"]
@@ -216,9 +229,11 @@ def _summary(plain: dict[str, Any]) -> str:
         f"{plain['samples']} clips of {len(plain['skeleton']['names'])} joints, "
         f"{plain['durations'][0]:.2f} to {plain['durations'][1]:.2f} s, {plain['root']}"
         f"{', cyclic' if plain['cyclic'] else ''}",
-        f"ranks {plain['ranks']} of {diagnostics['tensor']}: truncation costs "
+        f"ranks {plain['levels'][0]['ranks']} of {diagnostics['tensor']}: truncation costs "
         f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
         f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+        "levels of detail:",
+        *(_level(number, level) for number, level in enumerate(plain["levels"])),
         "controls:",
         *(
             f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from model_export import export, ingest, recipe, train
+from model_export.export import Exported
 from model_export.ingest import Example
 from model_export.recipe import Recipe
 from model_export.sample import write
@@ -48,15 +49,16 @@ def trained(small_recipe: Recipe, examples: list[Example]) -> Trained:
 
 
 @pytest.fixture(scope="session")
-def model_path(
-    small_recipe: Recipe,
-    examples: list[Example],
-    trained: Trained,
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Path:
+def exported(small_recipe: Recipe, trained: Trained) -> Exported:
+    """The small model with its levels of detail and its file's content."""
+    return export.export(small_recipe, trained, [])
+
+
+@pytest.fixture(scope="session")
+def model_path(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small model as a file, reaching.onnx."""
     path = tmp_path_factory.mktemp("models") / "reaching.onnx"
-    path.write_bytes(export.export(small_recipe, trained, []).content)
+    path.write_bytes(exported.content)
     return path
 
 
@@ -75,12 +77,16 @@ def labelled(labelled_recipe: Recipe, examples: list[Example]) -> Trained:
 
 
 @pytest.fixture(scope="session")
-def labelled_path(
-    labelled_recipe: Recipe, labelled: Trained, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def labelled_exported(labelled_recipe: Recipe, labelled: Trained) -> Exported:
+    """The model that knows its performers with its levels of detail and its file's content."""
+    return export.export(labelled_recipe, labelled, [])
+
+
+@pytest.fixture(scope="session")
+def labelled_path(labelled_exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The model that knows its performers as a file, labelled.onnx."""
     path = tmp_path_factory.mktemp("models") / "labelled.onnx"
-    path.write_bytes(export.export(labelled_recipe, labelled, []).content)
+    path.write_bytes(labelled_exported.content)
     return path
 
 

@@ -9,6 +9,7 @@ from model_export import align, fidelity, naive, samples, travel, variogram
 from model_export.evaluate import motion
 from model_export.evaluate.motion import EVEN, Event, Motion
 from model_export.evaluate.peers import PEERS, Peer
+from model_export.field_bank import VARIANCE
 from model_export.recipe import Recipe
 from model_export.samples import Samples
 from model_export.train import Trained
@@ -54,11 +55,12 @@ class _Values:
 def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
     """Answers of every method, ours first."""
     event = fidelity.moment(recipe, trained.examples)
-    points = trained.model.bank.points(asked.controls, _labels(trained, asked))
+    bank = trained.model.bank
+    points = bank.points(asked.controls, _labels(trained, asked))
     motions = {OURS: _ours(trained, asked, points, event)}
     for name, predict in _methods(trained).items():
         motions[name] = _restore(trained, predict(points), event)
-    return Answers(motions, trained.model.spread.numpy(points))
+    return Answers(motions, bank.sigma(bank.numpy(points)[VARIANCE]))
 
 
 def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:

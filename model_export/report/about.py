@@ -82,7 +82,7 @@ class About:
         return [
             (f"clips of {len(card.skeleton)} joints", str(card.samples)),
             ("model file", f"{len(self.exported.content) / 1000:.1f} kB"),
-            (f"ranks of {_times(told['tensor'])}", _times(card.ranks)),
+            (f"ranks of {_times(told['tensor'])}", _times(card.levels[0].ranks)),
             ("truncation costs", f"{100 * told['truncation_rms_m']:.2f} cm"),
             ("a clip left out lies away", f"{100 * told['leave_one_out_rms_m']:.2f} cm"),
             ("of the motion explained", f"{100 * told['explained']['pose']:.0f} %"),

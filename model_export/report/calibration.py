@@ -97,5 +97,5 @@ def _rank_correlation(a: Floats, b: Floats) -> float:
 
 def of(trained: Trained) -> Calibration:
     """Calibration of a trained model's sigma."""
-    predicted = np.sqrt(trained.model.spread.sill * trained.pose.variances)
+    predicted = np.sqrt(trained.model.bank.sill * trained.pose.variances)
     return Calibration(predicted, np.sqrt(trained.missed))

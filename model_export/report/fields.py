@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from model_export.field_bank import POSE
 from model_export.kriging import Hyper, Kriging
 from model_export.report import plain
 from model_export.report.page import Section, Table
@@ -76,7 +77,7 @@ class Fields:
 
 def of(trained: Trained, controls: tuple[Control, ...]) -> Fields:
     """The fields of a trained model, the pose's first."""
-    bank = trained.model.bank.fields
+    bank = {POSE: trained.model.bank.pose, **trained.model.bank.others}
     found = [
         Field(name, share, own.hyper if isinstance(own := bank[name], Kriging) else None)
         for name, share in trained.explained.items()

@@ -15,7 +15,7 @@ class Trust:
     duration: natural length of the whole clip at these controls, s. sigma: how far a captured
     clip at these controls would lie from this one, as a root-mean-square over joints and frames,
     m. warnings: one sentence for each control outside what was sampled. performer: who was asked
-    for; none for somebody who was never seen.
+    for; none for somebody who was never seen. level: of detail.
     """
 
     model: str
@@ -24,6 +24,7 @@ class Trust:
     sigma: float
     warnings: tuple[str, ...]
     performer: str | None = None
+    level: int = 0
 
     def facts(self) -> dict[str, Any]:
         """The same as plain values, for formats that carry free metadata."""
@@ -31,6 +32,7 @@ class Trust:
             "model": self.model,
             "controls": self.controls,
             "performer": self.performer,
+            "level": self.level,
             "duration": self.duration,
             "sigma": self.sigma,
             "warnings": list(self.warnings),

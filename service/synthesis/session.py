@@ -12,9 +12,10 @@ from service.motion import card as cards
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import ModelError
+from service.synthesis import freeze
 
 INPUTS = {"controls": 2, "time": 2}
-PERFORMER = "performer"
+PERFORMER, LEVEL = "performer", "level"
 OUTPUTS = {
     "rotations": 4,
     "root_position": 3,
@@ -27,23 +28,35 @@ OUTPUTS = {
 
 @dataclass(frozen=True)
 class Session:
-    """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes."""
+    """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
+
+    runtimes: onnxruntime's sessions, one for each level of detail.
+    """
 
     card: ModelCard
     digest: str
-    runtime: Any
+    runtimes: tuple[Any, ...]
 
     def run(
-        self, controls: Floats, time: Floats, *outputs: str, labels: Floats | None = None
-    ) -> list[Floats]:
+        self,
+        controls: Floats,
+        time: Floats,
+        *outputs: str,
+        labels: Floats | None = None,
+        level: int = 0,
+    ) -> list[Any]:
         """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for.
 
         labels (B or 1, p): who moves, of the card's performers; nobody that was seen, if not said.
+        level: of the card's levels of detail.
         """
-        feed = {"controls": controls.astype(np.float32), "time": time.astype(np.float32)}
+        feed = {
+            "controls": controls.astype(np.float32),
+            "time": time.astype(np.float32),
+        }
         if labels is not None and self.card.performers:
             feed[PERFORMER] = labels.astype(np.float32)
-        answers: list[Floats] = self.runtime.run(list(outputs), feed)
+        answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
         return answers
 
 
@@ -63,9 +76,12 @@ def open_bytes(content: bytes, source: str) -> Session:
         card = cards.load(runtime.get_modelmeta().custom_metadata_map)
     except ValueError as fault:
         raise ModelError(source, str(fault)) from fault
-    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtime)
-    _check_ports(session, source)
-    _check_answer(session, source)
+    _check_ports(runtime, card, source)
+    levels = range(len(card.levels))
+    runtimes = tuple(_start(freeze.at_level(content, level), source) for level in levels)
+    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes)
+    for level in levels:
+        _check_answer(session, source, level)
     return session
 
 
@@ -81,31 +97,32 @@ def _start(content: bytes, source: str) -> Any:
         raise ModelError(source, f"onnxruntime cannot load it: {first_line}") from fault
 
 
-def _check_ports(session: Session, source: str) -> None:
-    found = {p.name: len(p.shape) for p in session.runtime.get_inputs()}
+def _check_ports(runtime: Any, card: ModelCard, source: str) -> None:
+    found = {p.name: len(p.shape) for p in runtime.get_inputs()}
     if found != INPUTS:
         raise ModelError(source, f"inputs (name: axes) {found}, expected {INPUTS}")
-    found = {p.name: len(p.shape) for p in session.runtime.get_outputs()}
+    found = {p.name: len(p.shape) for p in runtime.get_outputs()}
     if found != OUTPUTS:
         raise ModelError(source, f"outputs (name: axes) {found}, expected {OUTPUTS}")
-    _check_performers(session, source)
+    _check_options(runtime, card, source)
 
 
-def _check_performers(session: Session, source: str) -> None:
-    """The graph takes as many labels as the card has names."""
-    performers = len(session.card.performers)
+def _check_options(runtime: Any, card: ModelCard, source: str) -> None:
+    """The graph takes a level, and as many labels as the card has names."""
+    performers = len(card.performers)
     # onnxruntime lists inputs that have a default apart from the others.
-    found = {p.name: p.shape[1:] for p in session.runtime.get_overridable_initializers()}
-    expected = {PERFORMER: [performers]} if performers else {}
+    found = {p.name: p.shape[1:] for p in runtime.get_overridable_initializers()}
+    expected: dict[str, list[Any]] = {PERFORMER: [performers]} if performers else {}
+    expected |= {LEVEL: []}
     if found != expected:
         raise ModelError(source, f"optional inputs (name: width) {found}, expected {expected}")
 
 
-def _check_answer(session: Session, source: str) -> None:
+def _check_answer(session: Session, source: str, level: int) -> None:
     """Ask for the pose in the middle: a file whose weights are damaged shows here."""
     middle = np.array([[control.default for control in session.card.controls]])
     try:
-        answers = session.run(middle, np.zeros((1, 1)), *OUTPUTS)
+        answers = session.run(middle, np.zeros((1, 1)), *OUTPUTS, level=level)
     except Exception as fault:
         raise ModelError(source, f"does not run: {str(fault).splitlines()[0]}") from fault
     joints = len(session.card.skeleton)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from service.motion.card import Control
 from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
-from service.synthesis.session import OUTPUTS, Session
+from service.synthesis.session import Session
 
 Policy = Literal["warn", "refuse"]
 """What to do with controls outside what was sampled."""
@@ -21,6 +21,7 @@ RATES = (1.0, 1000.0)
 # A clip this many times longer or shorter than any that was captured is no motion any more.
 FARTHEST = 10.0
 MOST_POSES = 10_000
+ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class _Question:
 
     controls: dict[str, float]
     performer: str | None
+    level: int
     point: Floats
     labels: Floats
     warnings: tuple[str, ...]
@@ -53,14 +55,15 @@ class Synthesizer:
         times: Sequence[float],
         extrapolate: Policy,
         performer: str | None = None,
+        level: int = 0,
     ) -> PoseAnswer:
         """Poses at times (S,), s from the start of the clip, as a performer of the card moves, or
-        somebody who was never seen.
+        somebody who was never seen, at a level of detail.
 
-        Raises InvalidField for a control, time or performer that cannot be used, OutsideSamples
-        where `extrapolate` is "refuse" and a control lies outside its sampled range.
+        Raises InvalidField for a control, time, performer or level that cannot be used,
+        OutsideSamples where `extrapolate` is "refuse" and a control lies outside its sampled range.
         """
-        question = self._door(controls, extrapolate, performer)
+        question = self._door(controls, extrapolate, performer, level)
         if not 1 <= len(times) <= MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
         when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
@@ -77,12 +80,13 @@ class Synthesizer:
         start: float = 0.0,
         end: float | None = None,
         performer: str | None = None,
+        level: int = 0,
     ) -> ClipAnswer:
         """Clip at `rate` frames a second from `start` to `end`, s; by default the whole of it.
 
         Frame i is the pose at start + i / rate. Raises as `pose` does.
         """
-        question = self._door(controls, extrapolate, performer)
+        question = self._door(controls, extrapolate, performer, level)
         _within("fps", _number("fps", rate), *RATES, "frames a second")
         duration = self._duration(question)
         last = duration if end is None else _number("end", end)
@@ -104,27 +108,27 @@ class Synthesizer:
         return ClipAnswer(clip, answer.trust)
 
     def _door(
-        self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None
+        self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> _Question:
         card = self.session.card
         for name in controls:
             if card.control(name) is None:
                 known = ", ".join(c.name for c in card.controls)
                 raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
-        labels = _labels(card.performers, performer)
+        labels, coarsest = _labels(card.performers, performer), len(card.levels) - 1
+        if not 0 <= level <= coarsest:
+            raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         point = np.array([[_required(control, controls) for control in card.controls]])
         warnings = tuple(_outside(c, v) for c, v in zip(card.controls, point[0], strict=True))
         said = tuple(filter(None, warnings))
         if said and extrapolate == "refuse":
             raise OutsideSamples("controls", "; ".join(said))
         given = {name: float(value) for name, value in controls.items()}
-        return _Question(given, performer, point, labels, said)
+        return _Question(given, performer, level, point, labels, said)
 
     def _duration(self, question: _Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
-        start = np.zeros((1, 1))
-        answers = self.session.run(question.point, start, "duration", labels=question.labels)
-        duration = float(answers[0][0])
+        duration = float(self._run(question, np.zeros((1, 1)), "duration")[0][0])
         low, high = self.session.card.durations
         if not low / FARTHEST <= duration <= high * FARTHEST:
             raise OutsideSamples(
@@ -135,7 +139,7 @@ class Synthesizer:
         return duration
 
     def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
-        answers = self.session.run(question.point, when[None], *OUTPUTS, labels=question.labels)
+        answers = self._run(question, when[None], *ANSWERED)
         rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
         trust = Trust(
             self.identity,
@@ -144,8 +148,13 @@ class Synthesizer:
             float(sigma),
             question.warnings,
             question.performer,
+            question.level,
         )
         return PoseAnswer(when, rotations, root, offsets, trust)
+
+    def _run(self, question: _Question, when: Floats, *outputs: str) -> list[Any]:
+        labels, level = question.labels, question.level
+        return self.session.run(question.point, when, *outputs, labels=labels, level=level)
 
 
 def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:

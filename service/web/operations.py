@@ -109,7 +109,11 @@ def _model(service: Service, request: Request) -> Synthesizer:
 
 async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
     answer: PoseAnswer = model.pose(
-        question.controls, question.times, question.extrapolate, question.performer
+        question.controls,
+        question.times,
+        question.extrapolate,
+        question.performer,
+        question.level,
     )
     content = await _made(len(answer.times), poses.json, answer)
     return Response(content, media_type="application/json")
@@ -123,6 +127,7 @@ async def _clip(model: Synthesizer, question: ClipQuestion, encoder: Encoder) ->
         question.start,
         question.end,
         question.performer,
+        question.level,
     )
     content = await _made(len(answer.clip), encoder.encode, answer)
     return answers.file(content, encoder, answer.trust)

@@ -26,18 +26,20 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class PoseQuestion:
-    """Which poses: control values and times, s, and who moves; nobody that was seen for none."""
+    """Which poses: control values and times, s, who moves, nobody that was seen for none, and the
+    level of detail."""
 
     controls: dict[str, float]
     times: list[float]
     extrapolate: Policy
     performer: str | None = None
+    level: int = 0
 
 
 @dataclass(frozen=True)
 class ClipQuestion:
-    """Which clip: control values, frames a second, the part between start and end, s, and who
-    moves; nobody that was seen for none."""
+    """Which clip: control values, frames a second, the part between start and end, s, who moves,
+    nobody that was seen for none, and the level of detail."""
 
     controls: dict[str, float]
     fps: float
@@ -45,6 +47,7 @@ class ClipQuestion:
     end: float | None
     extrapolate: Policy
     performer: str | None = None
+    level: int = 0
 
 
 class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -54,6 +57,7 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     times: list[float]
     extrapolate: Policy = POLICY
     performer: str | None = None
+    level: int = 0
 
 
 class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -65,6 +69,7 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     end: float | None = None
     extrapolate: Policy = POLICY
     performer: str | None = None
+    level: int = 0
 
 
 Body = TypeVar("Body", PoseBody, ClipBody)
@@ -75,21 +80,23 @@ _FLOAT = msgspec.json.Decoder(float)
 
 
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
-    """Question of query parameters: `time` once or more, extrapolate, performer, and one per
-    control."""
+    """Question of query parameters: `time` once or more, extrapolate, performer, level, and one
+    per control."""
     times = [_number(name, text) for name, text in pairs if name == "time"]
     if not times:
         raise _bad_parameter("time", "missing; give seconds from the start of the clip")
     single = _unique([pair for pair in pairs if pair[0] != "time"])
     policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
-    return PoseQuestion(_numbers(single), times, policy, performer)
+    level = _whole("level", single.pop("level", "0"))
+    return PoseQuestion(_numbers(single), times, policy, performer, level)
 
 
 def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
-    """Question of query parameters: fps, start, end, extrapolate, performer, and one per
+    """Question of query parameters: fps, start, end, extrapolate, performer, level, and one per
     control."""
     single = _unique(pairs)
     policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
+    level = _whole("level", single.pop("level", "0"))
     numbers = _numbers(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -98,20 +105,29 @@ def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
         controls=numbers,
         extrapolate=policy,
         performer=performer,
+        level=level,
     )
 
 
 def pose_of_body(content: bytes) -> PoseQuestion:
     """Question of a JSON body."""
     body = _decoded(_POSE, content)
-    return PoseQuestion(_controls(body.controls), body.times, body.extrapolate, body.performer)
+    controls = _controls(body.controls)
+    return PoseQuestion(controls, body.times, body.extrapolate, body.performer, body.level)
 
 
 def clip_of_body(content: bytes) -> ClipQuestion:
     """Question of a JSON body."""
     body = _decoded(_CLIP, content)
-    controls = _controls(body.controls)
-    return ClipQuestion(controls, body.fps, body.start, body.end, body.extrapolate, body.performer)
+    return ClipQuestion(
+        _controls(body.controls),
+        body.fps,
+        body.start,
+        body.end,
+        body.extrapolate,
+        body.performer,
+        body.level,
+    )
 
 
 def _unique(pairs: Pairs) -> dict[str, str]:
@@ -138,6 +154,13 @@ def _number(name: str, text: str) -> float:
     if not math.isfinite(value):
         raise _bad_parameter(name, f"{text!r}, expected a finite number")
     return value
+
+
+def _whole(name: str, text: str) -> int:
+    # No level has ten digits; int would read as many as there are.
+    if not re.fullmatch("[0-9]{1,9}", text, re.ASCII):
+        raise _bad_parameter(name, f"{text!r}, expected a whole number")
+    return int(text)
 
 
 def _bad_parameter(name: str, detail: str) -> RequestFault:

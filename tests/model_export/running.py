@@ -10,13 +10,20 @@ from service.motion.conventions import Floats
 
 
 def outputs(
-    build: Callable[..., str | tuple[str, ...]], axes: tuple[int, ...], **inputs: Floats
+    build: Callable[..., str | tuple[str, ...]],
+    axes: tuple[int, ...],
+    level: int | None = None,
+    **inputs: Floats,
 ) -> list[Floats]:
-    """What `build(net, *names of the inputs)` answers, in float32; axes: how many each has."""
+    """What `build(net, *names of the inputs)` answers, in float32; axes: how many each has.
+
+    level: of detail, for what is built with a ladder; the default of its graph if not said.
+    """
     net = Net()
     built = build(net, *inputs)
     names = [built] if isinstance(built, str) else list(built)
     shapes = {name: [f"{name}_{i}" for i in range(a.ndim)] for name, a in inputs.items()}
+    shapes |= {} if level is None else {"level": []}
     results = {f"result_{i}": [f"axis_{i}_{j}" for j in range(n)] for i, n in enumerate(axes)}
     for result, name in zip(results, names, strict=True):
         net.named(result, name)
@@ -26,4 +33,5 @@ def outputs(
     options.log_severity_level = 4
     session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     feed = {name: array.astype(np.float32) for name, array in inputs.items()}
+    feed |= {} if level is None else {"level": np.array(level)}
     return session.run(list(results), feed)

@@ -7,7 +7,7 @@ import onnx
 import pytest
 from onnx import numpy_helper
 
-from model_export import cost, export
+from model_export import cost
 from model_export.cost import Price
 
 RANKS = (3, 4, 5)
@@ -28,20 +28,35 @@ def test_price_of_arrays_is_that_of_their_entries():
 
 
 @pytest.fixture(scope="module")
-def held(small_recipe, trained):
+def held(exported):
     """Numbers that the file of the small model holds, by name."""
-    content = export.export(small_recipe, trained, []).content
-    graph = onnx.load_from_string(content).graph
+    graph = onnx.load_from_string(exported.content).graph
     return {own.name: numpy_helper.to_array(own) for own in graph.initializer}
 
 
 def test_numbers_are_those_that_the_file_holds(held, trained):
     ranks = trained.model.decoder.reduced.core.shape
     motion = sum(held[name].size for name in ("core", "directions", "time_basis", "pose_weights"))
-    # Drift weights and bias stand side by side for all fields, the pose's first.
-    drift = ranks[2] * (len(held["drift_weights"]) + 1)
+    # Those of one and of the controls stand side by side for all fields.
+    drift = ranks[2] * len(held["drift_weights"])
     assert motion + drift == cost.numbers(trained.tensor, 4).of(*ranks)
     assert motion + drift < sum(own.size for own in held.values()), "sigma's matrix is the largest"
+
+
+def test_levels_read_what_the_file_holds_for_them(held, exported):
+    model, levels = exported.model, exported.card.levels
+    finest = ("core", "directions", "time_basis", "samples", "precision")
+    duals = [f"{name}_weights" for name in ("pose", *model.bank.others)]
+    drift = held["drift_weights"][:, 2:].size
+    whole = sum(held[name].size for name in (*finest, *(n for n in duals if n in held)))
+    assert levels[0].numbers == whole + drift
+    for number, level in enumerate(levels[1:], start=1):
+        r1, r2, r3 = level.ranks
+        bases = r1 * len(held["directions"]) + r2 * len(held["time_basis"])
+        own = held[f"weights_{number}"].size + 4 * level.samples
+        assert level.numbers == r1 * r2 * r3 + bases + own < levels[number - 1].numbers
+        assert level.bytes == 4 * level.numbers
+        assert level.operations < levels[number - 1].operations
 
 
 def test_compression_is_the_raw_tensor_over_what_is_stored(trained):
@@ -74,8 +89,8 @@ def test_operations_are_those_of_the_products_of_one_pose(trained):
     assert cost.operations(trained.tensor, 4).of(*RANKS) == sum(products.values())
 
 
-def test_the_card_tells_the_compression_and_every_distance(small_recipe, trained):
-    told = export.export(small_recipe, trained, []).card.diagnostics
+def test_the_card_tells_the_compression_and_every_distance(exported, trained):
+    told = exported.card.diagnostics
     ranks = trained.model.decoder.reduced.core.shape
     expected = asdict(cost.compression(trained.tensor, ranks, 4))
     assert told["compression"] == pytest.approx(expected, rel=1e-3)

@@ -66,12 +66,12 @@ def opened(model_path):
 
 
 @pytest.fixture(scope="module")
-def asked(trained, opened):
+def asked(exported, opened):
     """Controls (B, d) and times (B, S) all over the model, as the graph sees them."""
     rng = np.random.Generator(np.random.PCG64(5))
     low, high = ([getattr(c, end) for c in opened.card.controls] for end in ("minimum", "maximum"))
     points = rng.uniform(low, high, (50, len(low)))
-    durations = trained.model.evaluate(points, np.zeros((50, 1))).duration
+    durations = exported.model.evaluate(points, np.zeros((50, 1))).duration
     times = rng.uniform(0.0, 1.0, (50, 20)) * durations[:, None]
     return points.astype(np.float32).astype(float), times.astype(np.float32).astype(float)
 
@@ -140,15 +140,15 @@ def test_the_whole_familys_file_opens_as_a_model(full_family):
     assert card.control("turn").values == ()
 
 
-def test_graph_and_reference_agree_at_ten_thousand_points(trained, model_path, opened):
+def test_graph_and_reference_agree_at_ten_thousand_points(exported, model_path, opened):
     assert export.POINTS == 10_000 and export.ALLOWED == GATE
-    worst = export.gate(trained.model, model_path.read_bytes(), opened.card)
+    worst = export.gate(exported.model, model_path.read_bytes(), opened.card)
     assert 0.0 < worst < GATE
     assert opened.card.diagnostics["parity_m"] == float(f"{worst:.1e}")
 
 
-def test_every_output_agrees_with_the_reference(trained, opened, asked):
-    expected = trained.model.evaluate(*asked)
+def test_every_output_agrees_with_the_reference(exported, opened, asked):
+    expected = exported.model.evaluate(*asked)
     found = Outputs(*opened.run(*asked, *OUTPUTS))
     parents = opened.card.skeleton.parents
     gaps = np.linalg.norm(found.positions(parents) - expected.positions(parents), axis=-1)
@@ -159,28 +159,28 @@ def test_every_output_agrees_with_the_reference(trained, opened, asked):
     assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
     assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-2
     # Negative control: a thousandth of the range of one control is seen at that tolerance.
-    low, high = trained.model.bank.low, trained.model.bank.high
+    low, high = exported.model.bank.low, exported.model.bank.high
     nudged = opened.run(asked[0] + 1e-3 * (high - low) * np.eye(4)[2], asked[1], *OUTPUTS)
     assert np.abs(Outputs(*nudged).positions(parents) - expected.positions(parents)).max() > GATE
 
 
-def bent(trained, joint, radians):
+def bent(exported, joint, radians):
     """The model with one joint's mean rotation damaged."""
-    decoder = trained.model.decoder
+    decoder = exported.model.decoder
     means = decoder.means.copy()
     turn = np.array([0.0, 0.0, radians])
     means[joint] = quat.mul(means[joint], quat.exp(turn))
-    return replace(trained.model, decoder=replace(decoder, means=means))
+    return replace(exported.model, decoder=replace(decoder, means=means))
 
 
-def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(trained, model_path, opened):
+def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(exported, model_path, opened):
     names, parents = opened.card.skeleton.names, opened.card.skeleton.parents
     arm = names.index("LeftForeArm")
     hanging = {arm}
     for joint, parent in enumerate(parents):
         hanging |= {joint} if parent in hanging else set()
     with pytest.raises(ExportRefused) as caught:
-        export.gate(bent(trained, arm, 0.01), model_path.read_bytes(), opened.card)
+        export.gate(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
     found = re.match(r"the graph puts (\w+) ([0-9.]+) cm from", str(caught.value))
     assert names.index(found[1]) in hanging - {arm}
     # A forearm with its hand is some 0.4 m long: a hundredth of a radian moves its end by 0.4 cm.
@@ -191,11 +191,11 @@ def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(trained, model_pa
 
 
 @pytest.mark.parametrize(("metres", "refused"), [(2e-4, True), (0.5e-4, False)])
-def test_the_gate_lies_where_it_says(trained, model_path, opened, metres, refused):
-    decoder = trained.model.decoder
+def test_the_gate_lies_where_it_says(exported, model_path, opened, metres, refused):
+    decoder = exported.model.decoder
     mean = decoder.mean.copy()
     mean[1] += metres
-    moved = replace(trained.model, decoder=replace(decoder, mean=mean))
+    moved = replace(exported.model, decoder=replace(decoder, mean=mean))
     if refused:
         with pytest.raises(ExportRefused, match=r"0\.02\d\d cm from where"):
             export.gate(moved, model_path.read_bytes(), opened.card)
@@ -204,22 +204,22 @@ def test_the_gate_lies_where_it_says(trained, model_path, opened, metres, refuse
         assert metres * 0.5 < worst < GATE
 
 
-def test_the_gate_refuses_damaged_weights_of_the_field(trained, model_path, opened):
-    bank = trained.model.bank
+def test_the_gate_refuses_damaged_weights_of_the_field(exported, model_path, opened):
+    bank = exported.model.bank
     dual = bank.pose.dual.copy()
     dual[7] *= 1.01
     damaged = replace(bank, pose=replace(bank.pose, dual=dual))
     with pytest.raises(ExportRefused, match=r"cm from where the reference does"):
-        export.gate(replace(trained.model, bank=damaged), model_path.read_bytes(), opened.card)
+        export.gate(replace(exported.model, bank=damaged), model_path.read_bytes(), opened.card)
 
 
-def test_the_gate_refuses_a_wrong_duration(trained, model_path, opened):
-    bank = trained.model.bank
+def test_the_gate_refuses_a_wrong_duration(exported, model_path, opened):
+    bank = exported.model.bank
     duration = bank.others["duration"]
     slower = replace(duration, dual=duration.dual * 1.05)
     others = bank.others | {"duration": slower}
     with pytest.raises(ExportRefused):
-        model = replace(trained.model, bank=replace(bank, others=others))
+        model = replace(exported.model, bank=replace(bank, others=others))
         export.gate(model, model_path.read_bytes(), opened.card)
 
 
@@ -242,19 +242,25 @@ def test_the_ports_are_those_agreed_and_no_others(graph):
             for p in ports
         }
 
-    assert shapes(graph.graph.input) == {"controls": ["batch", 4], "time": ["batch", "steps"]}
+    assert shapes(graph.graph.input) == {
+        "controls": ["batch", 4],
+        "time": ["batch", "steps"],
+        "level": [],
+    }
     assert shapes(graph.graph.output) == {
         "rotations": ["batch", "steps", 33, 4],
         "root_position": ["batch", "steps", 3],
         "bone_offsets": ["batch", 33, 3],
         "duration": ["batch"],
         "sigma": ["batch"],
+        "travel": ["batch", "steps", 3],
     }
 
 
 def test_all_ports_are_float32(opened):
-    ports = [*opened.runtime.get_inputs(), *opened.runtime.get_outputs()]
-    assert {port.type for port in ports} == {"tensor(float)"}
+    for runtime in opened.runtimes:
+        ports = [*runtime.get_inputs(), *runtime.get_outputs()]
+        assert {port.type for port in ports} == {"tensor(float)"}
 
 
 def test_the_file_is_self_contained_and_of_plain_operators(graph):
@@ -271,7 +277,7 @@ def test_onnxruntime_alone_reads_the_metadata(model_path):
     runtime = onnxruntime.InferenceSession(model_path, providers=["CPUExecutionProvider"])
     entries = runtime.get_modelmeta().custom_metadata_map
     card = {key: json.loads(value) for key, value in entries.items()}
-    assert card["posefield.format"] == 1
+    assert card["posefield.format"] == 2
     assert card["posefield.units"] == {
         "length": "m",
         "time": "s",

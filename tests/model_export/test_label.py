@@ -9,10 +9,11 @@ import pytest
 from numpy.random import PCG64, Generator
 from running import outputs
 
-from model_export import export, kriging
+from model_export import export, field_graph, kriging
 from model_export.covariance import COVARIANCES
-from model_export.field_bank import Constant, FieldBank, Spread
+from model_export.field_bank import Constant, FieldBank
 from model_export.kriging import Hyper
+from model_export.ladder import Ladder
 from model_export.model import Outputs
 from service.motion import card
 from service.motion.errors import ExportRefused, ModelError
@@ -47,7 +48,7 @@ def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=()
         values = own.normal(size=(SAMPLES, size))
         solved = kriging.solve(hyper, samples, values)
         fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
-    return FieldBank(LOW, HIGH, names, fields.pop("pose"), fields)
+    return FieldBank(LOW, HIGH, names, fields.pop("pose"), fields, 0.04)
 
 
 def asked():
@@ -58,19 +59,20 @@ def asked():
     return controls.astype(np.float32).astype(np.float64)
 
 
-def graph_of(bank):
+def graph_of(bank, rank=6):
     """Function of controls, and of labels where they are given, that runs the fields and sigma."""
 
     def build(net, controls, *_):
-        basis, fields = bank.onnx(net, controls)
-        return *fields.values(), Spread(bank.pose, 0.04).onnx(net, basis)
+        ends = Ladder(field_graph.entries(bank, [rank])).onnx(net)
+        return tuple(field_graph.onnx(bank, net, controls, ends).values())
 
     return lambda controls, **labels: outputs(build, (2, 2, 2, 1), controls=controls, **labels)
 
 
 def reference_of(bank, controls, labels):
     points = bank.points(controls, labels)
-    return [*bank.numpy(points).values(), Spread(bank.pose, 0.04).numpy(points)]
+    variance, *values = bank.numpy(points).values()
+    return [*values, bank.sigma(variance)]
 
 
 def apart(found, expected):
@@ -131,7 +133,7 @@ def test_a_batch_of_several_performers_is_each_of_them_alone():
 def test_performers_of_no_distance_are_not_told_apart():
     bank = labelled_bank()
     pose = kriging.solve(replace(bank.pose.hyper, label=0.0), bank.pose.samples, np.eye(SAMPLES))
-    run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)))
+    run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)), SAMPLES)
     assert apart(run(asked()), run(asked(), performer=mixed(len(NAMES)))) < 1e-6
 
 
@@ -144,18 +146,20 @@ def opened(labelled_path):
 
 
 @pytest.fixture(scope="module")
-def question(labelled, opened):
+def question(labelled_exported, opened):
     """Controls, times and labels of everybody all over the model, as the graph sees them."""
-    own, low, high = rng(), labelled.model.bank.low, labelled.model.bank.high
+    own, low, high = rng(), labelled_exported.model.bank.low, labelled_exported.model.bank.high
     points = own.uniform(low, high, (BATCH, len(low)))
     times = own.uniform(0.0, 1.0, (BATCH, 7))
     return *(a.astype(np.float32).astype(float) for a in (points, times)), mixed(3)
 
 
-def test_every_output_of_a_labelled_model_agrees_with_the_reference(labelled, opened, question):
+def test_every_output_of_a_labelled_model_agrees_with_the_reference(
+    labelled_exported, opened, question
+):
     points, times, labels = question
     found = Outputs(*opened.run(points, times, *OUTPUTS, labels=labels))
-    expected = labelled.model.evaluate(points, times, labels)
+    expected = labelled_exported.model.evaluate(points, times, labels)
     parents = opened.card.skeleton.parents
 
     def away(answer):
@@ -164,7 +168,7 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(labelled, op
     assert away(expected) < export.ALLOWED
     assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-3
     assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
-    assert away(labelled.model.evaluate(points, times)) > 10 * export.ALLOWED
+    assert away(labelled_exported.model.evaluate(points, times)) > 10 * export.ALLOWED
     # Of somebody who was seen more is known, as a rule, than of anybody.
     nobody = Outputs(*opened.run(points, times, *OUTPUTS))
     seen = labels.any(axis=1)
@@ -172,17 +176,17 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(labelled, op
     assert np.array_equal(found.sigma[~seen], nobody.sigma[~seen])
 
 
-def test_the_gate_asks_for_performers(labelled, labelled_path, opened):
+def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     content = labelled_path.read_bytes()
-    assert 0.0 < export.gate(labelled.model, content, opened.card) < export.ALLOWED
-    bank = labelled.model.bank
+    assert 0.0 < export.gate(labelled_exported.model, content, opened.card) < export.ALLOWED
+    bank = labelled_exported.model.bank
     # Two performers change places: nobody would notice who asks for controls alone.
     samples = bank.pose.samples.copy()
     samples[:, [4, 5]] = samples[:, [5, 4]]
     swapped = replace(bank, pose=replace(bank.pose, samples=samples))
     points, times, _ = question_of_nobody(opened)
-    model = replace(labelled.model, bank=swapped)
-    before, after = (m.evaluate(points, times).rotations for m in (labelled.model, model))
+    model = replace(labelled_exported.model, bank=swapped)
+    before, after = (m.evaluate(points, times).rotations for m in (labelled_exported.model, model))
     assert np.array_equal(before, after)
     with pytest.raises(ExportRefused, match=r"at (middle|short), \{'stature': "):
         export.gate(model, content, opened.card)
@@ -198,25 +202,30 @@ def test_the_card_names_the_performers_of_the_table(labelled_path, model_path):
     assert session.load(model_path).card.performers == ()
 
 
+def quiet():
+    options = onnxruntime.SessionOptions()
+    # One level above the remark that an input with a default cannot be folded.
+    options.log_severity_level = 3
+    return options
+
+
 def test_the_port_is_optional_and_only_there_where_it_is_needed(labelled_path, model_path):
     def ports(path):
-        runtime = session.load(path).runtime
+        runtime = onnxruntime.InferenceSession(path, quiet(), providers=["CPUExecutionProvider"])
         optional = runtime.get_overridable_initializers()
         return [p.name for p in runtime.get_inputs()], [(p.name, p.shape) for p in optional]
 
     both = ["controls", "time"]
-    assert ports(labelled_path) == (both, [("performer", ["batch_or_one", 3])])
-    assert ports(model_path) == (both, [])
+    level = ("level", [])
+    assert ports(labelled_path) == (both, [("performer", ["batch_or_one", 3]), level])
+    assert ports(model_path) == (both, [level])
     plain = onnx.load(model_path).graph
     assert "OneHot" not in {node.op_type for node in plain.node}
 
 
 def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_path, capfd):
-    options = onnxruntime.SessionOptions()
-    # One level above the remark that an input with a default cannot be folded.
-    options.log_severity_level = 3
     runtime = onnxruntime.InferenceSession(
-        labelled_path, options, providers=["CPUExecutionProvider"]
+        labelled_path, quiet(), providers=["CPUExecutionProvider"]
     )
     middle = [control.default for control in session.load(labelled_path).card.controls]
     for batch in (1, 5, 300):
@@ -229,17 +238,6 @@ def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_pat
     assert capfd.readouterr().err == ""
 
 
-def test_the_labels_have_an_axis_of_their_own(labelled_path, question):
-    """Were it the batch's, onnxruntime would plan one buffer for one row and for many."""
-    points, times, _ = question
-    graph = onnx.load(labelled_path)
-    assert session.open_bytes(graph.SerializeToString(), "own").run(points, times, *OUTPUTS)
-    (port,) = (port for port in graph.graph.input if port.name == "performer")
-    port.type.tensor_type.shape.dim[0].dim_param = "batch"
-    with pytest.raises(Exception, match="Shape mismatch attempting to re-use buffer"):
-        session.open_bytes(graph.SerializeToString(), "shared").run(points, times, *OUTPUTS)
-
-
 def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, labelled_path):
     again = export.export(labelled_recipe, labelled, []).content
     assert again == labelled_path.read_bytes()
@@ -248,12 +246,17 @@ def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, la
     assert export.export(labelled_recipe, replace(labelled, model=renamed), []).content != again
 
 
-def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled):
+def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, labelled_exported):
     weights = {w.name: w for w in onnx.load(labelled_path).graph.initializer}
     whose = onnx.numpy_helper.to_array(weights["whose"])
     assert whose.dtype == np.int64
-    names = [labelled.model.bank.performers[i] for i in whose]
-    assert names == [example.row.performer for example in labelled.examples]
+    told = labelled_exported.model.bank.pose.samples
+    d = len(labelled.model.bank.low)
+    # In the order in which samples say most of the others, each with the controls that it had.
+    assert np.array_equal(np.argmax(told[:, d:], axis=1), whose)
+    points = labelled.laid.points.tolist()
+    names = [labelled.examples[points.index(own)].row.performer for own in told.tolist()]
+    assert names == [labelled.model.bank.performers[i] for i in whose]
 
 
 # --- files that do not fit ------------------------------------------------------------------------
@@ -271,7 +274,7 @@ def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_pat
     entries = card.dump(replace(opened.card, performers=names))
     del graph.metadata_props[:]
     onnx.helper.set_model_props(graph, entries)
-    width = {"performer": [len(names)]} if names else {}
+    width = {**({"performer": [len(names)]} if names else {}), "level": []}
     assert refusal(graph) == (
-        f"optional inputs (name: width) {{'performer': [3]}}, expected {width}"
+        f"optional inputs (name: width) {{'performer': [3], 'level': []}}, expected {width}"
     )

@@ -7,12 +7,13 @@ import pytest
 from numpy.random import PCG64, Generator
 from running import outputs
 
-from model_export import hosvd, kriging
+from model_export import field_graph, hosvd, kriging, thin
 from model_export.covariance import COVARIANCES
-from model_export.decoder import Decoder, Proportions
-from model_export.field_bank import Constant, FieldBank, Spread
+from model_export.decoder import Decoder, Proportions, Rung
+from model_export.field_bank import VARIANCE, Constant, FieldBank
 from model_export.hosvd import Multilinear
 from model_export.kriging import Hyper
+from model_export.ladder import Ladder
 from model_export.timing import Timing
 from model_export.travel import Travel
 from model_export.warp import WarpBasis
@@ -55,7 +56,7 @@ def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
         solved = kriging.solve(hyper, samples, values)
         fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
     pose = fields.pop("pose")
-    return FieldBank(LOW, HIGH, (), pose, fields)
+    return FieldBank(LOW, HIGH, (), pose, fields, 0.04)
 
 
 def asked():
@@ -72,33 +73,60 @@ def points(own, controls):
     return own.points(controls, np.zeros((len(controls), 0)))
 
 
+def graph_of(own, ranks):
+    """Function that builds the fields of a bank, the pose last, and sigma behind it."""
+
+    def build(net, controls):
+        ends = Ladder(field_graph.entries(own, ranks)).onnx(net)
+        return tuple(field_graph.onnx(own, net, controls, ends).values())
+
+    return build
+
+
 def field_bank(**given):
     own, controls = bank(**given), asked()
-    found = outputs(lambda net, c: tuple(own.onnx(net, c)[1].values()), (2,) * 4, controls=controls)
+    found = outputs(graph_of(own, [6]), (2, 2, 2, 2, 1), controls=controls)
     expected = own.numpy(points(own, controls))
-    assert list(expected) == ["pose", "offsets", "duration", "warp"]
+    assert list(expected) == [VARIANCE, "offsets", "duration", "warp", "pose"]
     other = own.numpy(points(replace(own, high=HIGH * 1.05), controls))
     # At a sample the distance is a root of what rounding leaves, where these have their kink.
     kinked = given.get("covariance") in ("exponential", "spherical")
     allowed = 2e-3 if kinked else 2e-4
-    return Case(found, list(expected.values()), list(other.values()), allowed)
+    return Case(found[:-1], list(expected.values())[1:], list(other.values())[1:], allowed)
 
 
-def basis_of_bank():
-    own, controls = bank(), asked()
-    found = outputs(lambda net, c: own.onnx(net, c)[0], (2,), controls=controls)
-    at = points(own, controls)
-    near = [kriging.covariances(field.hyper, at, field.samples) for field in own.kriged]
-    return Case(found, [np.hstack([at, *near])], [np.hstack([at, *near[::-1]])], 2e-5)
+LEVELS = ((5, 4), (SAMPLES, 3), (3 * SAMPLES, 3), (4 * SAMPLES, 6))
+
+
+def coarse_bank():
+    """A bank of coarser levels that ask some samples, all of them, and further fields."""
+    own = thin.ordered(bank())
+    weights = tuple(thin.weights(own, columns, rank, 0.1) for columns, rank in LEVELS)
+    return replace(own, coarse=weights)
+
+
+def level_of_bank(level):
+    own, controls = coarse_bank(), asked()
+    ranks = [6, *(rank for _, rank in LEVELS)]
+    found = outputs(graph_of(own, ranks), (2, 2, 2, 2, 1), level=level, controls=controls)
+
+    def answers(at):
+        variance, *values = own.numpy(points(own, controls), at).values()
+        return [*values, own.sigma(variance)]
+
+    other = answers(level - 1 or 2)
+    other[-2] = np.resize(other[-2], found[-2].shape)
+    return Case(found, answers(level), other, 2e-3)
 
 
 def spread(covariance, drifts):
     own, controls = bank(covariance, drifts), asked()
-    stage = Spread(own.pose, 0.04)
-    found = outputs(lambda net, c: stage.onnx(net, own.onnx(net, c)[0]), (1,), controls=controls)
+    found = outputs(graph_of(own, [6]), (2, 2, 2, 2, 1), controls=controls)[-1:]
     at = points(own, controls)
     without_nugget = np.sqrt(0.04 * own.pose.variance(at))
-    return Case(found, [stage.numpy(at)], [without_nugget], 1e-4)
+    # As above: two questions are samples, where these have their kink.
+    allowed = 5e-4 if covariance in ("exponential", "spherical") else 1e-4
+    return Case(found, [own.sigma(own.numpy(at)[VARIANCE])], [without_nugget], allowed)
 
 
 def timing(knots=6):
@@ -149,11 +177,38 @@ def decoder(stage):
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
     def build(net, coefficients, place):
-        return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)))
+        ends = Ladder(stage.entries()).onnx(net)
+        return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)
 
     found = outputs(build, (4, 3), coefficients=coefficients, place=place)
     nearest = stage.numpy(coefficients, np.rint(place))
     return Case(found, list(stage.numpy(coefficients, place)), list(nearest), 2e-5)
+
+
+RUNGS = (
+    Rung((5, 4, 3), (0, 1, 2, 3)),
+    Rung((5, 3, 3), (0, 1, 3)),
+    Rung((1, 1, 1), (0,)),
+)
+
+
+def level_of_decoder(level):
+    """Coarser levels, of which some keep joints still; a joint in the middle goes first."""
+    own = rng()
+    stage = replace(decoder_stage(), coarse=RUNGS)
+    coefficients = own.normal(size=(BATCH, stage.rungs[level].ranks[2]))
+    place = own.uniform(0.0, 19.0, (BATCH, STEPS))
+    coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
+
+    def build(net, coefficients, place):
+        ends = Ladder(stage.entries()).onnx(net)
+        return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)
+
+    found = outputs(build, (4, 3), level=level, coefficients=coefficients, place=place)
+    moving = replace(stage, coarse=(*RUNGS[:-1], Rung((1, 1, 1), (0, 1))))
+    other = stage.at(level) if level < 3 else moving.at(level)
+    nearest = other.numpy(coefficients, np.rint(place))
+    return Case(found, list(stage.at(level).numpy(coefficients, place)), list(nearest), 2e-5)
 
 
 def poses_at_the_means():
@@ -163,7 +218,8 @@ def poses_at_the_means():
     nothing = np.zeros((3, 6))
 
     def build(net, coefficients, place):
-        return still.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)))[0]
+        ends = Ladder(still.entries()).onnx(net)
+        return still.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)[0]
 
     found = outputs(build, (4,), coefficients=nothing, place=np.zeros((3, 2)))
     expected = np.broadcast_to(still.means, (3, 2, 4, 4))
@@ -193,7 +249,7 @@ def travel():
         steps = net("Unsqueeze", place, net.indices(2))
         return stage.onnx(net, rotations, root, travel, steps)
 
-    found = outputs(build, (4, 3), **given)
+    found = outputs(build, (4, 3, 3), **given)
     wrong = stage.numpy(**{**given, "travel": given["travel"] * [1.0, 1.0, -1.0]})
     return Case(found, list(stage.numpy(**given)), list(wrong), 2e-6)
 
@@ -220,13 +276,14 @@ CASES = {
         for offsets in DRIFTS
         if drifts != offsets
     },
-    "basis of the fields": (basis_of_bank, {}),
     **{
         f"spread, {name}, drifts {drifts}": (spread, {"covariance": name, "drifts": drifts})
         for name in COVARIANCES
         for drifts in DRIFTS
     },
     **{f"timing, {knots} knots": (timing, {"knots": knots}) for knots in (3, 4, 6, 12, 24)},
+    **{f"bank, level {n}": (level_of_bank, {"level": n}) for n in (1, 2, 3, 4)},
+    **{f"decoder, level {n}": (level_of_decoder, {"level": n}) for n in (0, 1, 2, 3)},
     "decoder": (decoder, {"stage": decoder_stage()}),
     "decoder with stiff axes": (decoder, {"stage": stiff_stage()}),
     "decoder at the means": (poses_at_the_means, {}),
@@ -268,9 +325,9 @@ def test_labels_stand_behind_the_controls():
 
 def test_spread_at_a_sample_is_never_less_than_the_nugget():
     own = bank()
-    found = Spread(own.pose, 0.04).numpy(own.pose.samples)
+    found = own.sigma(own.numpy(own.pose.samples)[VARIANCE])
     assert np.all(found >= np.sqrt(0.04 * own.pose.hyper.nugget))
-    away = Spread(own.pose, 0.04).numpy(np.full((1, CONTROLS), 5.0))
+    away = own.sigma(own.numpy(np.full((1, CONTROLS), 5.0))[VARIANCE])
     assert away > 2.0 * found.max()
 
 

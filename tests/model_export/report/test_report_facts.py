@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import spearmanr
 
 from model_export import variogram
+from model_export.field_bank import VARIANCE
 from model_export.report import (
     calibration,
     clips,
@@ -46,7 +47,7 @@ def test_the_numbers_are_those_of_the_card(facts, exported, trained, steps):
     assert about["provenance"] == card.provenance and about["diagnostics"] == card.diagnostics
     assert about["bytes"] == len(exported.content)
     assert about["steps"] == [{"step": s.name, "seconds": s.seconds} for s in steps]
-    assert facts["sizes"]["chosen"]["ranks"] == list(card.ranks)
+    assert facts["sizes"]["chosen"]["ranks"] == list(card.levels[0].ranks)
     explained = {name: own["explained"] for name, own in facts["fields"].items()}
     assert explained == pytest.approx(trained.explained, rel=DIGITS)
     assert facts["clips"]["rms_m"] == pytest.approx(card.diagnostics["leave_one_out_rms_m"], 1e-3)
@@ -197,8 +198,9 @@ def test_sigma_is_right_on_average_by_construction(trained):
 
 def test_sigma_of_a_captured_point_is_the_graphs(trained):
     """Where the clip itself is known, and so less than where it is left out."""
-    points = trained.model.bank.pose.samples
-    assert np.all(trained.model.spread.numpy(points) < calibration.of(trained).predicted)
+    bank = trained.model.bank
+    sigma = bank.sigma(bank.numpy(bank.pose.samples)[VARIANCE])
+    assert np.all(sigma < calibration.of(trained).predicted)
 
 
 def test_calibration_measures(rng):

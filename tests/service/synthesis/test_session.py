@@ -56,7 +56,7 @@ def test_the_same_graph_written_again_still_opens(graph):
 
 
 def test_a_model_runs_on_one_thread_and_the_cpu(model_path):
-    runtime = session.load(model_path).runtime
+    runtime = session.load(model_path).runtimes[0]
     options = runtime.get_session_options()
     assert (options.intra_op_num_threads, options.inter_op_num_threads) == (1, 1)
     assert runtime.get_providers() == ["CPUExecutionProvider"]
@@ -181,7 +181,7 @@ def test_a_port_of_another_name_is_refused(refused, graph, port):
 
 
 def test_a_port_too_many_is_refused(refused, graph):
-    extra = helper.make_tensor_value_info("level", TensorProto.FLOAT, ["batch", "levels"])
+    extra = helper.make_tensor_value_info("style", TensorProto.FLOAT, ["batch", "styles"])
     graph.graph.input.append(extra)
     assert refused(graph).startswith("inputs (name: axes) {")
 

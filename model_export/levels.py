@@ -1,0 +1,146 @@
+"""The ladder of levels of detail: what each leaves out, and what that does to its answers.
+
+Core and bases of a level are leading parts of the finer one's. Ranks are chosen from the exact
+error table, samples by the answers.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model_export import cost, exams, fidelity, ranks, thin
+from model_export.decoder import Rung
+from model_export.exams import Exam
+from model_export.fidelity import Judge
+from model_export.model import Model
+from model_export.ranks import Triple
+from model_export.recipe import Detail, Recipe
+from model_export.train import Trained
+from service.motion.detail import Level
+from service.motion.errors import TrainingError
+
+# Truncation may take so much of a budget, and the samples that are not asked the rest; where these
+# need more, it takes less.
+TRUNCATION = (0.85, 0.7, 0.5)
+SAMPLES = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
+
+
+@dataclass(frozen=True)
+class Laddered:
+    """A model of several levels of detail, and what each of them is; the finest comes first."""
+
+    model: Model
+    levels: tuple[Level, ...]
+
+
+def build(recipe: Recipe, trained: Trained) -> Laddered:
+    """Model with the levels that a recipe asks for below its own size.
+
+    Raises TrainingError for joints to keep still that there are not, and for the root.
+    """
+    exam = exams.of(recipe, trained)
+    model = replace(trained.model, bank=thin.ordered(trained.model.bank))
+    judge = fidelity.judge(recipe, trained.examples, trained.tensor)
+    budgets = recipe.size.budgets or {"rms": trained.fidelity.rms}
+    for detail in recipe.size.details:
+        allowed = {name: detail.times * budget for name, budget in budgets.items()}
+        joints = _joints(trained, model.decoder.rungs[-1], detail)
+        model = _with_level(trained, judge, exam, model, joints, allowed)
+    every = range(len(model.decoder.rungs))
+    return Laddered(model, tuple(_level(exam, model, level) for level in every))
+
+
+def _level(exam: Exam, model: Model, level: int) -> Level:
+    rung, numbers = model.decoder.rungs[level], cost.read(model, level)
+    found = exam.errors(model, level, range(len(model.decoder.means)))
+    effector = exam.effector(model, level)
+    return Level(
+        rung.ranks,
+        model.bank.samples(level),
+        rung.joints,
+        numbers,
+        4 * numbers,
+        cost.work(model, level),
+        rms=_short(found.rms),
+        p99=_short(found.p99),
+        max=_short(found.max),
+        effector=None if effector is None else _short(effector),
+    )
+
+
+def _short(length: float) -> float:
+    return float(f"{length:.4g}")
+
+
+def _with_level(
+    trained: Trained,
+    judge: Judge,
+    exam: Exam,
+    model: Model,
+    joints: tuple[int, ...],
+    allowed: dict[str, float],
+) -> Model:
+    """Model with one more level of the least work whose answers keep what is allowed, or nearly."""
+    within, made = model.decoder.rungs[-1].ranks, []
+    for share in TRUNCATION:
+        parts = {name: share * most for name, most in allowed.items()}
+        rung = Rung(_ranks(trained, judge, within, parts), joints)
+        made.append(_thinned(model, rung, exam, allowed))
+    kept = [laddered for laddered in made if exam.keeps(laddered, allowed)] or made[-1:]
+    return _with_own_error(exam, min(kept, key=lambda m: cost.work(m, len(m.bank.coarse))))
+
+
+def _with_own_error(exam: Exam, model: Model) -> Model:
+    """Model whose last level counts in its sigma how far it lies from the whole model."""
+    bank, last = model.bank, len(model.bank.coarse)
+    error = exam.errors(model, last, range(len(model.decoder.means))).rms
+    rank = model.decoder.rungs[last].ranks[2]
+    weights = thin.weights(bank, bank.columns(last), rank, error)
+    return replace(model, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
+
+
+def _ranks(trained: Trained, judge: Judge, within: Triple, allowed: dict[str, float]) -> Triple:
+    """Fewest multiply-adds within a finer level's ranks whose true errors are allowed."""
+
+    def strain(triple: Triple) -> float:
+        found = judge.of(trained.full.truncated(triple))
+        return max(getattr(found, name) / most for name, most in allowed.items())
+
+    price = cost.operations(trained.tensor, trained.laid.controls)
+    places = trained.tensor.weight * np.prod(judge.whole.shape[:2])
+    aim = min(allowed.values()) ** 2 * float(places)
+    return ranks.cheapest(ranks.front(trained.full.core, price, within), strain, aim)
+
+
+def _joints(trained: Trained, finer: Rung, detail: Detail) -> tuple[int, ...]:
+    """Joints that a level moves: those of the finer one but what it drops and what hangs on it."""
+    names, parents = trained.skeleton.names, trained.skeleton.parents
+    unknown = sorted(set(detail.drop_joints) - set(names[1:]))
+    if unknown:
+        raise TrainingError(
+            f"size.levels.drop_joints {unknown}, expected some of {', '.join(names[1:])}"
+        )
+    still = [name in detail.drop_joints for name in names]
+    for joint, parent in enumerate(parents[1:], start=1):
+        still[joint] |= still[parent]
+    return tuple(joint for joint in finer.joints if not still[joint])
+
+
+def _thinned(model: Model, rung: Rung, exam: Exam, allowed: dict[str, float]) -> Model:
+    """Model with one more level, of the fewest covariances whose answers are near enough."""
+    bank, decoder = model.bank, model.decoder
+    decoder = replace(decoder, coarse=(*decoder.coarse, rung))
+    for columns in _columns(model):
+        weights = thin.weights(bank, columns, rung.ranks[2], error=0.0)
+        tried = replace(model, bank=replace(bank, coarse=(*bank.coarse, weights)), decoder=decoder)
+        if exam.keeps(tried, allowed):
+            break
+    return tried
+
+
+def _columns(model: Model) -> list[int]:
+    """Numbers of covariances to try for a level below the last: some of the pose's, or all of one
+    field after the other."""
+    bank, n = model.bank, len(model.bank.pose.samples)
+    some = [*(m for m in SAMPLES if m < n), *(n * (f + 1) for f in range(len(bank.kriged)))]
+    return [m for m in some if m <= bank.columns(len(bank.coarse))]

@@ -1,0 +1,81 @@
+"""Kriging thinned out for coarser levels of detail.
+
+What the finest level costs at every pose is mostly distances and covariances, which no truncation
+of the tensor saves. A coarser level asks fewer samples, those that say most, of the pose's field
+alone, and has all fields of them by the weights whose answers come nearest to what all fields say.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from model_export import kriging
+from model_export.field_bank import VARIANCE, Constant, Field, FieldBank
+from model_export.kriging import Kriging
+from service.motion.conventions import Floats, Indices
+
+QUESTIONS = 2_000
+# Weights are fitted somewhat beyond the samples, so that they are held there too.
+BEYOND = 1.25
+# Directions of the basis below this share of the largest would need weights that float32 spoils.
+FAINTEST = 1e-5
+
+
+def ordered(bank: FieldBank) -> FieldBank:
+    """The same bank with its samples in the order in which they say most of the pose."""
+    order = spread_order(bank.pose)
+    others = {name: _reordered(field, order) for name, field in bank.others.items()}
+    return replace(bank, pose=_permuted(bank.pose, order), others=others)
+
+
+def spread_order(pose: Kriging) -> Indices:
+    """Samples (n,) each of which the ones before it say least of (pivoted Cholesky)."""
+    left = kriging.covariances(pose.hyper, pose.samples, pose.samples)
+    taken: list[int] = []
+    for _ in range(len(left)):
+        unknown = np.diagonal(left).copy()
+        unknown[taken] = -1.0
+        # Rounded, so that ties are not broken by an ulp.
+        chosen = int(np.argmax(np.round(unknown, 9)))
+        taken.append(chosen)
+        if unknown[chosen] > FAINTEST:
+            left = left - np.outer(left[chosen], left[chosen]) / unknown[chosen]
+    return np.array(taken)
+
+
+def _reordered(field: Field, order: Indices) -> Field:
+    return field if isinstance(field, Constant) else _permuted(field, order)
+
+
+def _permuted(field: Kriging, order: Indices) -> Kriging:
+    rows = np.concatenate([order, np.arange(len(order), len(field.dual))])
+    return Kriging(
+        field.hyper,
+        field.samples[order],
+        field.dual[rows],
+        field.weighing[np.ix_(rows, order)],
+        field.form[np.ix_(rows, rows)],
+    )
+
+
+def questions(bank: FieldBank, reach: float) -> Floats:
+    """Random points (Q, d + p) within so many half-ranges; nobody moves as often as each performer
+    does."""
+    rng = np.random.Generator(np.random.PCG64(QUESTIONS))
+    controls = rng.uniform(-reach, reach, (QUESTIONS, len(bank.low)))
+    performers = len(bank.performers)
+    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, QUESTIONS)]
+    return np.hstack([controls, labels])
+
+
+def weights(bank: FieldBank, columns: int, rank: int, error: float) -> Floats:
+    """Weights (p + 1 + d + m, M) of the first m covariances for a pose of so many coefficients.
+
+    error: of the level's own, m; its variance counts it in.
+    """
+    points = np.vstack([questions(bank, BEYOND), bank.pose.samples])
+    basis, exact = bank.basis(points, columns), bank.numpy(points)
+    exact[VARIANCE] = np.log(exact[VARIANCE] + error**2 / bank.sill)
+    values = np.hstack(list(exact.values()))
+    kept = values.shape[1] - (bank.pose.dual.shape[1] - rank)
+    return np.asarray(np.linalg.lstsq(basis, values[:, :kept], rcond=FAINTEST)[0], np.float64)

@@ -1,0 +1,208 @@
+"""The ladder of levels: nested, coarser and coarser, each within what it may cost."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from model_export import exams, kriging, levels, thin
+from model_export.field_bank import VARIANCE
+from model_export.recipe import Detail
+from service.motion import skeleton
+from service.motion.errors import TrainingError
+from service.synthesis import freeze, session
+from service.synthesis.session import OUTPUTS
+
+HAND = "LeftHand"
+
+
+def with_levels(recipe, *details):
+    return recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": details})})
+
+
+@pytest.fixture(scope="module")
+def exam(small_recipe, trained):
+    return exams.of(small_recipe, trained)
+
+
+@pytest.fixture(scope="module")
+def still(small_recipe, trained):
+    """Levels of which the coarser ones keep a hand, and then a whole arm, still."""
+    details = Detail(times=2.0, drop_joints=[HAND]), Detail(times=8.0, drop_joints=["LeftArm"])
+    return levels.build(with_levels(small_recipe, *details), trained)
+
+
+def test_every_level_is_a_leading_part_of_the_one_before(exported):
+    ladder = exported.card.levels
+    assert len(ladder) == 4
+    for finer, coarser in pairwise(ladder):
+        assert all(low <= high for low, high in zip(coarser.ranks, finer.ranks, strict=True))
+        assert coarser.samples <= finer.samples
+        assert set(coarser.joints) <= set(finer.joints)
+    whole, last = exported.model.decoder.reduced, exported.model.decoder.at(3).reduced
+    r1, r2, r3 = ladder[3].ranks
+    assert np.array_equal(last.core, whole.core[:r1, :r2, :r3])
+    assert not np.array_equal(last.core, whole.core[-r1:, -r2:, -r3:])
+
+
+def test_errors_keep_the_budgets_times_what_the_level_may_cost(small_recipe, exported):
+    budgets = small_recipe.size.budgets
+    for times, level in zip((1, 2, 4, 8), exported.card.levels, strict=True):
+        for name, budget in budgets.items():
+            assert getattr(level, name) <= times * budget
+        # Negative control: half of it would not do.
+        assert level.rms > 0.5 * times * budgets["rms"]
+        assert level.rms < level.p99 < level.max
+
+
+def test_a_finer_level_is_nearer_to_the_whole_model(exported):
+    errors = [level.rms for level in exported.card.levels]
+    assert errors == sorted(errors)
+
+
+def test_the_card_says_what_an_exam_of_other_questions_finds(exported, exam, trained, small_recipe):
+    """Errors are those of the level, not of the questions: half of them tell nearly the same."""
+    half = slice(None, None, 2)
+    fewer = replace(
+        exam,
+        controls=exam.controls[half],
+        labels=exam.labels[half],
+        times=exam.times[half],
+        whole=exam.whole[half],
+        at_event=exam.at_event[half],
+    )
+    every = range(len(trained.skeleton))
+    for number, level in enumerate(exported.card.levels):
+        found = fewer.errors(exported.model, number, every)
+        assert found.rms == pytest.approx(level.rms, rel=0.15)
+    assert exported.card.levels[0].rms < 0.7 * exported.card.levels[1].rms
+
+
+def test_samples_are_asked_in_the_order_in_which_they_say_most(trained):
+    bank = thin.ordered(trained.model.bank)
+    own = bank.pose
+    matrix = kriging.covariances(own.hyper, own.samples, own.samples)
+
+    def unsaid(first):
+        known = matrix[first][:, first]
+        across = matrix[:, first]
+        return np.trace(matrix - across @ np.linalg.lstsq(known, across.T, rcond=1e-9)[0])
+
+    for count in (4, 8, 16):
+        assert unsaid(np.arange(count)) < unsaid(np.arange(len(matrix))[-count:])
+
+
+def test_the_order_of_samples_changes_no_answer(trained, rng):
+    bank = trained.model.bank
+    points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
+    before, after = bank.numpy(points), thin.ordered(bank).numpy(points)
+    for name, values in before.items():
+        assert np.abs(after[name] - values).max() < 1e-9
+    other = replace(bank, pose=replace(bank.pose, samples=bank.pose.samples[::-1]))
+    assert np.abs(other.numpy(points)["pose"] - before["pose"]).max() > 1e-3
+
+
+def test_as_many_covariances_as_there_are_answer_exactly(trained, rng):
+    """Least squares over the whole basis finds the weights of kriging again."""
+    bank = thin.ordered(trained.model.bank)
+    rank = bank.pose.dual.shape[1]
+    points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
+    exact = bank.numpy(points)
+
+    def away(columns):
+        own = replace(bank, coarse=(thin.weights(bank, columns, rank, 0.0),)).numpy(points, 1)
+        return max(np.abs(own[name] - exact[name]).max() for name in exact if name != VARIANCE)
+
+    assert away(bank.columns(0)) < 2e-3
+    assert away(8) > 1e-2
+
+
+def test_sigma_of_a_coarser_level_counts_its_own_error(exported, rng):
+    bank = exported.model.bank
+    points = rng.uniform(-1.0, 1.0, (200, len(bank.low)))
+    sigma = [np.mean(bank.sigma(bank.numpy(points, at)[VARIANCE])) for at in range(4)]
+    assert sigma == sorted(sigma)
+    coarsest = exported.card.levels[3].rms
+    assert sigma[3] > coarsest > sigma[0] / 2
+
+
+def test_joints_that_a_level_drops_do_not_move(still, trained):
+    names, parents = trained.skeleton.names, trained.skeleton.parents
+    arm, hand = names.index("LeftArm"), names.index(HAND)
+    below = np.flatnonzero(skeleton.descendants(parents)[arm])
+    assert hand in below
+    dropped = [set(range(len(names))) - set(level.joints) for level in still.levels]
+    assert dropped[0] == set()
+    assert hand in dropped[1] and arm not in dropped[1]
+    assert dropped[2] == set(below.tolist()) > dropped[1]
+    low, high = still.model.bank.low, still.model.bank.high
+    points = np.linspace(low, high, 20)
+    for level in range(3):
+        turns = still.model.evaluate(points, np.full((20, 1), 0.5), level=level).rotations[:, 0]
+        moved = np.flatnonzero(np.ptp(turns, axis=0).max(axis=-1) > 1e-6)
+        assert not set(moved) & dropped[level]
+        assert arm in moved or level == 2
+
+
+def test_what_a_still_hand_costs_is_counted(still, exported):
+    assert still.levels[1].rms > exported.card.levels[1].rms
+    assert still.levels[1].operations < exported.card.levels[1].operations
+
+
+@pytest.mark.parametrize("joint", ["Hips", "Tail"])
+def test_joints_that_cannot_be_dropped_are_named(small_recipe, trained, joint):
+    asked = with_levels(small_recipe, Detail(times=2.0, drop_joints=[joint]))
+    with pytest.raises(TrainingError, match=rf"drop_joints \['{joint}'\], expected some of "):
+        levels.build(asked, trained)
+
+
+def test_a_model_of_one_level_has_one(small_recipe, trained):
+    found = levels.build(with_levels(small_recipe), trained)
+    assert len(found.levels) == 1 and found.model.bank.coarse == ()
+
+
+# --- the file -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def question(exported):
+    rng = np.random.Generator(np.random.PCG64(3))
+    low, high = exported.model.bank.low, exported.model.bank.high
+    return rng.uniform(low, high, (20, len(low))).astype("f4"), rng.uniform(0, 1, (20, 3)).astype(
+        "f4"
+    )
+
+
+def test_a_level_fed_to_the_file_is_the_level_of_the_service(model_path, question):
+    """The service makes the level a constant; the file itself takes it as an input."""
+    opened, plain = session.load(model_path), session._start(model_path.read_bytes(), "plain")
+    feed = dict(zip(("controls", "time"), question, strict=True))
+    for level in range(4):
+        fed = plain.run(list(OUTPUTS), {**feed, "level": np.array(level)})
+        found = opened.run(*question, *OUTPUTS, level=level)
+        other = opened.run(*question, *OUTPUTS, level=(level + 1) % 4)
+        # Weights laid out beforehand are summed in another order.
+        assert max(np.abs(a - b).max() for a, b in zip(fed, found, strict=True)) < 1e-5
+        assert max(np.abs(a - b).max() for a, b in zip(fed, other, strict=True)) > 1e-3
+
+
+def test_who_feeds_no_level_gets_the_finest(model_path, question):
+    plain = session._start(model_path.read_bytes(), "plain")
+    feed = dict(zip(("controls", "time"), question, strict=True))
+    silent = plain.run(None, feed)
+    finest = plain.run(None, {**feed, "level": np.array(0)})
+    assert all(np.array_equal(a, b) for a, b in zip(silent, finest, strict=True))
+
+
+def test_a_frozen_file_has_no_level_to_feed(model_path):
+    content = model_path.read_bytes()
+    frozen = session._start(freeze.at_level(content, 2), "frozen")
+    assert [port.name for port in frozen.get_overridable_initializers()] == []
+    assert frozen.get_modelmeta().custom_metadata_map  # all else is still there
+
+
+@pytest.mark.parametrize("cut", [1, 100, 10_000])
+def test_half_a_file_cannot_be_frozen(model_path, cut):
+    with pytest.raises((ValueError, IndexError)):
+        freeze.at_level(model_path.read_bytes()[:-cut], 0)
