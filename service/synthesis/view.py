@@ -113,6 +113,17 @@ def see(ladder: Ladder, scale: Floats, view: View) -> Choice:
     return fit(ladder, scale, view.budget, view.previous)
 
 
+def warnings(choice: Choice, ladder: Ladder, view: View) -> tuple[str, ...]:
+    """A sentence where the budget decided, and not the pixels that were asked for."""
+    if view.budget is None or choice.limit == view.pixels:
+        return ()
+    budget = f"the budget of {1e3 * view.budget:g} ms"
+    if choice.limit is None:
+        least = 1e3 * _seconds(choice.levels, ladder)
+        return (f"at the coarsest level the poses take {least:.3g} ms, more than {budget}",)
+    return (f"{budget} asks for errors of up to {choice.limit:.3g} pixels, not {view.pixels:g}",)
+
+
 def choose(errors: Floats, scale: Floats, limit: float, previous: Indices | None = None) -> Indices:
     """Coarsest levels (N,) whose errors (L,), m, cover at most `limit` pixels at a scale (N,),
     pixels a metre; the finest where none does.

@@ -15,6 +15,9 @@ from service.synthesis.view import HYSTERESIS, Camera, Ladder, View
 ERRORS = np.array([0.0, 0.002, 0.01, 0.01, 0.05])
 COSTS = np.array([4.0, 3.0, 2.0, 1.0, 0.5]) * 1e-6
 LADDER = Ladder(ERRORS, COSTS)
+STEEP = Ladder(np.array([0, 2, 5, 10, 20, 50]) * 1e-3, np.array([4, 3, 2, 1.5, 1, 0.5]) * 1e-6)
+# Halfway between sums of costs, so that no rounding decides.
+ROUNDING = 0.25e-6
 
 
 @st.composite
@@ -128,6 +131,32 @@ def test_without_the_levels_before_it_does():
     assert switches(trembling(holds=False)) > 20
 
 
+def budgeted(rng, holds):
+    """How often any of 300 characters changes level while the camera wavers by 20 cm and a budget
+    allows for half of what everybody at the finest level costs."""
+    centres = np.column_stack([rng.uniform(-30, 30, 300), np.ones(300), rng.uniform(0, 60, 300)])
+    before, changes = None, 0
+    for i in range(40):
+        place = np.array([0, 2, -5]) + 0.2 * np.sin(np.array([2.1, 1.3, 0.7]) * i)
+        camera = Camera(place, 1.0, 1080.0)
+        asked = View(camera, 0.1, 300 * 2.2e-6 + ROUNDING, before if holds else None)
+        scale = view.pixels_per_metre(camera, centres, 1.0)
+        found = view.see(STEEP, scale, asked)
+        assert STEEP.costs[found.levels].sum() <= asked.budget
+        changes += 0 if before is None else np.count_nonzero(found.levels != before)
+        before = found.levels
+    return changes
+
+
+def test_nor_does_a_budget_make_them_flicker(rng):
+    assert budgeted(rng, holds=True) <= 3
+
+
+def test_without_the_levels_before_a_budget_does(rng):
+    """Negative control of the test above."""
+    assert budgeted(rng, holds=False) > 30
+
+
 def test_hysteresis_never_holds_what_the_limit_forbids(rng):
     scale, held = rng.uniform(1, 1000, 500), rng.integers(0, len(ERRORS), 500)
     levels = view.choose(ERRORS, scale, 1.0, held)
@@ -178,8 +207,26 @@ def test_a_camera_that_cannot_be_is_refused(position, fov, height, field):
 def test_a_hundred_thousand_characters_are_chosen_for(rng):
     """The sizes that a loop is too slow for, by the property that defines the answer."""
     scale = rng.uniform(1, 1000, 100_000)
-    found = view.fit(LADDER, scale, 0.2)
+    found = view.fit(LADDER, scale, 0.2 + ROUNDING)
     assert found.limit is not None
-    assert COSTS[found.levels].sum() <= 0.2
+    assert COSTS[found.levels].sum() <= 0.2 + ROUNDING
     below = view.choose(ERRORS, scale, np.nextafter(found.limit, 0.0))
-    assert COSTS[below].sum() > 0.2
+    assert COSTS[below].sum() > 0.2 + ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("budget", "sentences"),
+    [
+        (None, ()),
+        (1.0, ()),
+        (0.00025, ("the budget of 0.25 ms asks for errors of up to 0.9 pixels, not 0.5",)),
+        (
+            0.00004,
+            ("at the coarsest level the poses take 0.05 ms, more than the budget of 0.04 ms",),
+        ),
+    ],
+)
+def test_a_budget_that_decides_says_so(budget, sentences):
+    asked = View(Camera(np.zeros(3), 1.0, 1080.0), 0.5, budget, None)
+    found = view.see(LADDER, np.full(100, 90.0), asked)
+    assert view.warnings(found, LADDER, asked) == sentences
