@@ -132,14 +132,14 @@ def test_without_the_levels_before_it_does():
 
 
 def budgeted(rng, holds):
-    """How often any of 300 characters changes level while the camera wavers by 20 cm and a budget
+    """How often any of 1,000 characters changes level while the camera wavers by 20 cm and a budget
     allows for half of what everybody at the finest level costs."""
-    centres = np.column_stack([rng.uniform(-30, 30, 300), np.ones(300), rng.uniform(0, 60, 300)])
+    centres = np.column_stack([rng.uniform(-30, 30, 1000), np.ones(1000), rng.uniform(0, 60, 1000)])
     before, changes = None, 0
     for i in range(40):
         place = np.array([0, 2, -5]) + 0.2 * np.sin(np.array([2.1, 1.3, 0.7]) * i)
         camera = Camera(place, 1.0, 1080.0)
-        asked = View(camera, 0.1, 300 * 2.2e-6 + ROUNDING, before if holds else None)
+        asked = View(camera, 0.1, 1000 * 2.2e-6 + ROUNDING, before if holds else None)
         scale = view.pixels_per_metre(camera, centres, 1.0)
         found = view.see(STEEP, scale, asked)
         assert STEEP.costs[found.levels].sum() <= asked.budget
