@@ -49,6 +49,31 @@ class Motions:
 
 
 @dataclass(frozen=True)
+class CrowdPoses:
+    """One pose of each of N characters, where each stands in the world.
+
+    model: name@contenthash. rotations (N, J, 4), the root's in the world; root_position (N, 3), m,
+    in the world; bone_offsets (N, J, 3), m. levels (N,): level of detail of each. error_px (N,):
+    pixels that the level's error covers; none where no camera was given. duration (N,), s: of each
+    character's clip. sigma (N,), m: as in Trust. warnings: sentences on the crowd as a whole.
+    """
+
+    model: str
+    skeleton: Skeleton
+    rotations: Singles
+    root_position: Singles
+    bone_offsets: Singles
+    levels: Indices
+    error_px: Singles | None
+    duration: Singles
+    sigma: Singles
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+
+@dataclass(frozen=True)
 class CrowdClip:
     """A moving crowd: N characters that play M motions of so many frames at a rate.
 

@@ -53,12 +53,15 @@ class UsdError(FileError):
 
 
 class QueryError(MotionError):
-    """A question that has no answer; `field` is the path of what is wrong with it."""
+    """A question that has no answer; `field` is the path of what is wrong with it, and `index` its
+    place where the field holds many."""
 
-    def __init__(self, field: str, message: str) -> None:
-        super().__init__(f"{field}: {message}")
+    def __init__(self, field: str, message: str, index: int | None = None) -> None:
+        where = field if index is None else f"{field}/{index}"
+        super().__init__(f"{where}: {message}")
         self.field = field
         self.message = message
+        self.index = index
 
 
 class UnknownModel(QueryError):

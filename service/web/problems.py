@@ -81,7 +81,7 @@ async def of_fault(request: Request, fault: Exception) -> Response:
 async def of_query_error(request: Request, error: Exception) -> Response:
     """Answer to a question that has none."""
     assert isinstance(error, QueryError)
-    place = _place(error.field, in_body=request.method == "POST")
+    place = _place(error, in_body=request.method == "POST")
     errors = [{**place, "detail": error.message}]
     return _answer(request, TABLE[type(error)], str(error), errors)
 
@@ -91,13 +91,14 @@ def internal(request: Request) -> Response:
     return _answer(request, INTERNAL, "see the service's log under the id in `instance`", [])
 
 
-def _place(field: str, in_body: bool) -> dict[str, str]:
+def _place(error: QueryError, in_body: bool) -> dict[str, str]:
     """Where a field of a question stands in the request that asked it."""
-    head, _, rest = field.partition("/")
-    if field in _IN_THE_PATH:
-        return {"parameter": field}
+    head, _, rest = error.field.partition("/")
+    if error.field in _IN_THE_PATH:
+        return {"parameter": error.field}
     if in_body:
-        return {"pointer": pointer(head, rest) if rest else pointer(head)}
+        index = "" if error.index is None else str(error.index)
+        return {"pointer": pointer(*filter(None, (head, rest, index)))}
     if head == "times":
         return {"parameter": "time"}
     return {"parameter": rest or head}

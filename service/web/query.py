@@ -8,12 +8,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar, cast, get_args
+from typing import cast, get_args
 
 import msgspec
 
 from service.synthesis.synthesizer import Policy
-from service.web.problems import BAD_BODY, BAD_PARAMETER, RequestFault, pointer
+from service.web import decoding
+from service.web.problems import BAD_PARAMETER, RequestFault, pointer
 
 FPS = 30.0
 POLICY: Policy = "warn"
@@ -72,8 +73,6 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     level: int = 0
 
 
-Body = TypeVar("Body", PoseBody, ClipBody)
-
 _POSE = msgspec.json.Decoder(PoseBody)
 _CLIP = msgspec.json.Decoder(ClipBody)
 _FLOAT = msgspec.json.Decoder(float)
@@ -111,14 +110,14 @@ def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
 
 def pose_of_body(content: bytes) -> PoseQuestion:
     """Question of a JSON body."""
-    body = _decoded(_POSE, content)
+    body = decoding.decoded(_POSE, content)
     controls = _controls(body.controls)
     return PoseQuestion(controls, body.times, body.extrapolate, body.performer, body.level)
 
 
 def clip_of_body(content: bytes) -> ClipQuestion:
     """Question of a JSON body."""
-    body = _decoded(_CLIP, content)
+    body = decoding.decoded(_CLIP, content)
     return ClipQuestion(
         _controls(body.controls),
         body.fps,
@@ -167,17 +166,6 @@ def _bad_parameter(name: str, detail: str) -> RequestFault:
     return RequestFault(BAD_PARAMETER, f"{name}: {detail}", {"parameter": name})
 
 
-def _decoded(decoder: msgspec.json.Decoder[Body], content: bytes) -> Body:
-    try:
-        return decoder.decode(content)
-    except msgspec.ValidationError as fault:
-        raise _bad_body(str(fault), _pointer(str(fault))) from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
-        raise _bad_body(f"expected UTF-8 JSON; {fault}", "") from None
-    except RecursionError:
-        raise _bad_body("nested too deeply", "") from None
-
-
 def _controls(raw: dict[str, msgspec.Raw]) -> dict[str, float]:
     """Values of the controls; decoded one by one because msgspec does not name a key at fault."""
     values = {}
@@ -186,17 +174,7 @@ def _controls(raw: dict[str, msgspec.Raw]) -> dict[str, float]:
             values[name] = _FLOAT.decode(text)
         except msgspec.ValidationError as fault:
             where = pointer("controls", name)
-            raise _bad_body(f"{fault} - at `{where}`, expected a finite number", where) from None
+            raise decoding.bad_body(
+                f"{fault} - at `{where}`, expected a finite number", where
+            ) from None
     return values
-
-
-def _pointer(message: str) -> str:
-    """JSON pointer to what a message of msgspec complains of; "" is the whole body."""
-    field = re.search(r"field `(.*)`", message)
-    path = re.search(r"at `\$(.*)`", message)
-    steps = re.findall(r"[^.\[\]]+", path[1]) if path else []
-    return pointer(*steps, *([field[1]] if field else []))
-
-
-def _bad_body(detail: str, where: str) -> RequestFault:
-    return RequestFault(BAD_BODY, detail, {"pointer": where})

@@ -13,18 +13,24 @@ PREFIX = "POSEFIELD_"
 class Settings:
     """Settings of the service; each is read from POSEFIELD_ and its name in capitals.
 
-    host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body.
-    grace: seconds that open requests get to finish after SIGTERM.
+    host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
+    crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd. grace:
+    seconds that open requests get to finish after SIGTERM.
     """
 
     host: str = "127.0.0.1"
     port: int = 8000
     body_limit: int = 64 * 1024
+    # A character with six controls, none rounded, takes 250 bytes.
+    crowd_body_limit: int = 32 * 1024 * 1024
+    crowd_limit: int = 100_000
     grace: int = 10
 
     def __post_init__(self) -> None:
         _within("port", self.port, 0, 65535)
         _within("body_limit", self.body_limit, 1, 64 * 1024 * 1024)
+        _within("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
+        _within("crowd_limit", self.crowd_limit, 1, 10_000_000)
         _within("grace", self.grace, 0, 600)
 
 

@@ -1,8 +1,12 @@
 """Every error of the domain that a client can cause has a status, and no two kinds one name."""
 
-import pytest
+import asyncio
+import json
 
-from service.motion.errors import QueryError
+import pytest
+from starlette.requests import Request
+
+from service.motion.errors import InvalidField, QueryError
 from service.web import problems
 
 
@@ -31,3 +35,17 @@ def test_no_two_kinds_share_a_name():
 )
 def test_pointers_escape_what_rfc_6901_says(parts, expected):
     assert problems.pointer(*parts) == expected
+
+
+@pytest.mark.parametrize(
+    ("error", "where"),
+    [
+        (InvalidField("controls/a/b", "1e9, expected less", 17), "/controls/a~1b/17"),
+        (InvalidField("time", "-1, expected more", 0), "/time/0"),
+        (InvalidField("time", "none"), "/time"),
+    ],
+)
+def test_one_of_many_is_pointed_at(error, where):
+    request = Request({"type": "http", "method": "POST", "state": {"request_id": "x"}})
+    answer = asyncio.run(problems.of_query_error(request, error))
+    assert json.loads(answer.body)["errors"][0]["pointer"] == where

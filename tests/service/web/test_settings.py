@@ -16,15 +16,25 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_HOST": "::1",
         "POSEFIELD_PORT": "9000",
         "POSEFIELD_BODY_LIMIT": "10",
+        "POSEFIELD_CROWD_BODY_LIMIT": "30",
+        "POSEFIELD_CROWD_LIMIT": "2",
         "POSEFIELD_GRACE": "0",
     }
-    expected = Settings(host="::1", port=9000, body_limit=10, grace=0)
+    expected = Settings("::1", 9000, body_limit=10, crowd_body_limit=30, crowd_limit=2, grace=0)
     assert settings.read(environ=given) == expected
 
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [("PORT", "http"), ("PORT", "-1"), ("PORT", "65536"), ("BODY_LIMIT", "0"), ("GRACE", "1.5")],
+    [
+        ("CROWD_LIMIT", "0"),
+        ("CROWD_BODY_LIMIT", "-1"),
+        ("PORT", "http"),
+        ("PORT", "-1"),
+        ("PORT", "65536"),
+        ("BODY_LIMIT", "0"),
+        ("GRACE", "1.5"),
+    ],
 )
 def test_a_variable_that_cannot_be_used_is_named(name, text):
     with pytest.raises(InvalidField, match=f"POSEFIELD_{name}: .*expected"):

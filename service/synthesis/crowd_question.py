@@ -1,0 +1,93 @@
+"""What is asked of a crowd: a row a character, checked where it is made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from service.motion.conventions import Floats, Indices, Singles
+from service.motion.crowd import Placement
+from service.motion.errors import InvalidField
+from service.synthesis.view import FARTHEST, View
+
+Truths = npt.NDArray[np.bool_]
+Root = Literal["travelling", "in_place"]
+"""Whether characters walk away from where they were placed."""
+
+
+@dataclass(frozen=True)
+class CrowdQuestion:
+    """One pose of each of N characters.
+
+    controls: (N,) by name, in their units. times (N,): s from the start of each character's clip.
+    performers: who is asked for, each once, None for somebody who was never seen; performer (N,):
+    which of them each character is. detail: levels of detail (N,), or the view to choose them by.
+    extrapolate: what to do with controls outside what was sampled.
+
+    Raises InvalidField, with the index of the first character at fault, for rows that are missing
+    or too many, numbers that are not finite, and places farther than float32 can tell.
+    """
+
+    controls: Mapping[str, Floats]
+    times: Floats
+    placement: Placement
+    performers: tuple[str | None, ...]
+    performer: Indices
+    detail: Indices | View
+    root: Root
+    extrapolate: Literal["warn", "refuse"]
+
+    def __post_init__(self) -> None:
+        for field, column in self._columns().items():
+            if len(column) != len(self):
+                raise InvalidField(field, f"{len(column)} characters, expected {len(self)}")
+            _check(field, column, np.isfinite(column), "a finite number")
+        near = np.abs(self.placement.positions) <= FARTHEST
+        _check("position", self.placement.positions, near, f"at most {FARTHEST:g} m")
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def _columns(self) -> dict[str, Floats | Indices]:
+        seen = isinstance(self.detail, View)
+        levels = self.detail.previous if isinstance(self.detail, View) else self.detail
+        return {
+            **{f"controls/{name}": values for name, values in self.controls.items()},
+            "time": self.times,
+            "position": self.placement.positions,
+            "heading": self.placement.headings,
+            "performer": self.performer,
+            **({} if levels is None else {"previous_level" if seen else "level": levels}),
+        }
+
+
+def check_levels(question: CrowdQuestion, count: int) -> None:
+    """InvalidField for the first character at a level that a model of so many does not have."""
+    if isinstance(question.detail, View):
+        field, levels = "previous_level", question.detail.previous
+    else:
+        field, levels = "level", question.detail
+    if levels is not None:
+        _check(field, levels, (levels >= 0) & (levels < count), f"0 to {count - 1}")
+
+
+def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
+    """Labels (N, p) of the performers asked for, of those that a model knows: all zero for nobody
+    that was seen. InvalidField for the first character of whom it knows nothing."""
+    for index, name in enumerate(question.performers):
+        if name is not None and name not in known:
+            first = int(np.argmax(question.performer == index))
+            those = f"one of {', '.join(known)}" if known else "none: this model knows none"
+            raise InvalidField("performer", f"{name!r}, expected {those}", first)
+    rows = [[name == other for other in known] for name in question.performers]
+    return np.array(rows, dtype=np.float32)[question.performer]
+
+
+def _check(field: str, column: Floats | Indices, good: Truths, expected: str) -> None:
+    """InvalidField for the first character of whom not everything is good."""
+    bad = np.flatnonzero(~good.reshape(len(column), -1).all(axis=1))
+    if len(bad):
+        first = int(bad[0])
+        raise InvalidField(field, f"{column[first].tolist()}, expected {expected}", first)

@@ -1,0 +1,143 @@
+"""The crowd question as it travels: columns of JSON numbers to arrays.
+
+All lists have one length, the number of characters; what is no list holds for each of them. Where
+nothing is a list there is one character.
+"""
+
+from itertools import chain
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+
+from service.motion.conventions import Floats, Indices
+from service.motion.crowd import Placement
+from service.motion.errors import InvalidField
+from service.synthesis.crowd_question import CrowdQuestion, Root
+from service.synthesis.synthesizer import Policy
+from service.synthesis.view import Camera, View
+from service.web import decoding
+from service.web.problems import pointer
+
+PIXELS = 1.0
+Level = Annotated[int, msgspec.Meta(ge=0, le=127)]
+Numbers = float | list[float]
+
+
+class CameraBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Schema Camera of the contract."""
+
+    position: tuple[float, float, float]
+    fov: float
+    height: float
+
+
+class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Schema CrowdQuestion of the contract."""
+
+    controls: dict[str, msgspec.Raw]
+    time: Numbers
+    position: list[tuple[float, float, float]] | None = None
+    heading: Numbers = 0.0
+    performer: str | list[str | None] | None = None
+    level: Level | list[Level] | Literal["auto"] = 0
+    previous_level: list[Level] | None = None
+    camera: CameraBody | None = None
+    pixels: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
+    root: Root = "travelling"
+    extrapolate: Policy = "warn"
+
+
+_CROWD = msgspec.json.Decoder(CrowdBody)
+_NUMBERS: msgspec.json.Decoder[Numbers] = msgspec.json.Decoder(Numbers)
+
+
+def of_body(content: bytes, most: float) -> CrowdQuestion:
+    """Question of a JSON body, of at most so many characters.
+
+    RequestFault where it breaks the contract's form, InvalidField where it has no answer.
+    """
+    body = decoding.decoded(_CROWD, content)
+    controls = {name: _control(name, raw) for name, raw in body.controls.items()}
+    count = _count(controls, body, most)
+    performers, performer = _performers(body.performer, count)
+    return CrowdQuestion(
+        {name: _column(values, count) for name, values in controls.items()},
+        _column(body.time, count),
+        Placement(_positions(body.position, count), _column(body.heading, count)),
+        performers,
+        performer,
+        _detail(body, count),
+        body.root,
+        body.extrapolate,
+    )
+
+
+def _control(name: str, raw: msgspec.Raw) -> Numbers:
+    """Values of a control; decoded one by one because msgspec does not name a key at fault."""
+    try:
+        return _NUMBERS.decode(raw)
+    except msgspec.ValidationError as fault:
+        where = pointer("controls", name, *decoding.steps(str(fault)))
+        raise decoding.bad_body(f"{fault}, expected finite numbers", where) from None
+
+
+def _count(controls: dict[str, Numbers], body: CrowdBody, most: float) -> int:
+    """How many characters all lists are for."""
+    fields = {f"controls/{name}": values for name, values in controls.items()} | {
+        name: getattr(body, name)
+        for name in ("time", "position", "heading", "performer", "level", "previous_level")
+    }
+    sizes = {name: len(values) for name, values in fields.items() if isinstance(values, list)}
+    first, count = next(iter(sizes.items()), ("", 1))
+    for name, size in sizes.items():
+        if not 1 <= size <= most:
+            raise InvalidField(name, f"{size} characters, expected 1 to {most:.0f}")
+        if size != count:
+            raise InvalidField(name, f"{size} characters, expected {count} as in {first}")
+    return count
+
+
+def _column(values: Numbers, count: int) -> Floats:
+    return np.array(values) if isinstance(values, list) else np.full(count, values)
+
+
+def _positions(given: list[tuple[float, float, float]] | None, count: int) -> Floats:
+    if given is None:
+        return np.zeros((count, 3))
+    # Half the time that np.array takes with tuples.
+    return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3)
+
+
+def _performers(
+    given: str | list[str | None] | None, count: int
+) -> tuple[tuple[str | None, ...], Indices]:
+    """Everybody who is asked for, once, and which of them each character is."""
+    if not isinstance(given, list):
+        return (given,), np.zeros(count, dtype=np.int64)
+    places = {name: place for place, name in enumerate(dict.fromkeys(given))}
+    return tuple(places), np.fromiter(map(places.__getitem__, given), np.int64, len(given))
+
+
+def _detail(body: CrowdBody, count: int) -> Indices | View:
+    if body.level == "auto":
+        return _view(body)
+    for name in ("previous_level", "camera", "pixels", "budget_ms"):
+        if getattr(body, name) is not None:
+            raise InvalidField(name, 'given without level "auto", expected only with it')
+    given = body.level
+    return np.array(given) if isinstance(given, list) else np.full(count, given)
+
+
+def _view(body: CrowdBody) -> View:
+    if body.camera is None:
+        raise InvalidField("camera", 'missing; level "auto" needs one')
+    lens = body.camera
+    previous = body.previous_level
+    return View(
+        Camera(np.array(lens.position), lens.fov, lens.height),
+        PIXELS if body.pixels is None else body.pixels,
+        None if body.budget_ms is None else body.budget_ms / 1000.0,
+        None if previous is None else np.array(previous),
+    )

@@ -1,0 +1,163 @@
+"""Crowd poses in every format, read back by what clients read them with."""
+
+import dataclasses
+import io
+import json
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import orjson
+import pyarrow as pa
+import pytest
+
+from service.encode import CROWD_ENCODERS
+from service.motion import quat
+from service.motion.crowd import CrowdPoses
+
+TENSORS = ("rotations", "root_position", "bone_offsets")
+NUMBERS = ("duration", "sigma", "levels", "error_px")
+UNITS = ("length", "time", "rotation", "up", "frame", "error_px")
+
+
+def crowd(skeleton, characters):
+    rng = np.random.default_rng(11)
+
+    def singles(*shape):
+        return rng.normal(size=(characters, *shape)).astype(np.float32)
+
+    joints = len(skeleton)
+    return CrowdPoses(
+        model="walk@0123abcd",
+        skeleton=skeleton,
+        rotations=quat.normalize(singles(joints, 4)),
+        root_position=singles(3),
+        bone_offsets=singles(joints, 3),
+        levels=rng.integers(0, 6, characters),
+        error_px=np.abs(singles()),
+        duration=np.abs(singles()),
+        sigma=np.abs(singles()),
+        warnings=("speed lies outside what was sampled for 3 characters, of whom 7 is the first",),
+    )
+
+
+@pytest.fixture(scope="module")
+def poses(walk):
+    return crowd(walk.clip.skeleton, 23)
+
+
+@pytest.fixture(scope="module")
+def unseen(poses):
+    """The same without a camera and without warnings."""
+    return dataclasses.replace(poses, error_px=None, warnings=())
+
+
+def by_arrow(poses):
+    reader = pa.ipc.open_stream(CROWD_ENCODERS["arrow"].encode(poses))
+    (batch,) = reader
+    batch.validate(full=True)
+    found = {name: batch.column(name) for name in batch.schema.names}
+    for name in TENSORS:
+        found[name] = found[name].to_numpy_ndarray()
+    columns = {name: np.asarray(column) for name, column in found.items()}
+    metadata = {key.decode(): json.loads(text) for key, text in batch.schema.metadata.items()}
+    return columns, {key.removeprefix("posefield."): value for key, value in metadata.items()}
+
+
+def by_npz(poses):
+    with np.load(io.BytesIO(CROWD_ENCODERS["npz"].encode(poses)), allow_pickle=False) as archive:
+        arrays = dict(archive)
+    known = ("model", "names", "parents", "units", "warnings")
+    facts = {name: arrays.pop(name).tolist() for name in known}
+    return arrays, facts | {"units": json.loads(facts["units"])}
+
+
+def by_json(poses):
+    content = orjson.loads(CROWD_ENCODERS["json"].encode(poses))
+    facts = {name: content.pop(name) for name in ("model", "names", "parents", "units", "warnings")}
+    types = dict.fromkeys(content, np.float32) | {"levels": np.int8}
+    return {name: np.array(rows, types[name]) for name, rows in content.items()}, facts
+
+
+READERS = {"arrow": by_arrow, "npz": by_npz, "json": by_json}
+
+
+def test_every_format_has_a_reader_here():
+    assert CROWD_ENCODERS.keys() == READERS.keys()
+    assert all(encoder.extension == key for key, encoder in CROWD_ENCODERS.items())
+
+
+@pytest.mark.parametrize("extension", READERS)
+def test_every_bit_comes_back(extension, poses):
+    columns, _ = READERS[extension](poses)
+    assert columns.keys() == {*TENSORS, *NUMBERS}
+    for name in (*TENSORS, *NUMBERS):
+        assert np.array_equal(columns[name], getattr(poses, name)), name
+        assert columns[name].dtype == (np.int8 if name == "levels" else np.float32), name
+    assert not np.array_equal(columns["rotations"][::-1], poses.rotations)
+
+
+@pytest.mark.parametrize("extension", READERS)
+def test_a_block_says_what_it_is(extension, poses):
+    _, facts = READERS[extension](poses)
+    assert facts["model"] == poses.model
+    assert tuple(facts["names"]) == poses.skeleton.names
+    assert tuple(facts["parents"]) == poses.skeleton.parents
+    assert tuple(facts["warnings"]) == poses.warnings
+    assert facts["units"]["rotation"].startswith("unit quaternion w x y z")
+    assert set(UNITS) < set(facts["units"])
+
+
+@pytest.mark.parametrize("extension", READERS)
+def test_without_a_camera_there_are_no_pixels(extension, unseen):
+    columns, facts = READERS[extension](unseen)
+    assert columns.keys() == {*TENSORS, *NUMBERS} - {"error_px"}
+    assert facts["warnings"] == []
+
+
+def test_arrow_has_the_canonical_tensors_of_every_row(poses):
+    schema = pa.ipc.open_stream(CROWD_ENCODERS["arrow"].encode(poses)).schema
+    joints = len(poses.skeleton)
+    shapes = {"rotations": [joints, 4], "root_position": [3], "bone_offsets": [joints, 3]}
+    for name, shape in shapes.items():
+        assert schema.field(name).type == pa.fixed_shape_tensor(pa.float32(), shape)
+    assert schema.field("levels").type == pa.int8()
+    assert not any(field.nullable for field in schema)
+
+
+def test_arrow_is_read_without_a_copy(poses):
+    """The numbers that a client gets lie in the bytes that it received."""
+    content = pa.py_buffer(CROWD_ENCODERS["arrow"].encode(poses))
+    (batch,) = pa.ipc.open_stream(content)
+    for name in TENSORS:
+        address = batch.column(name).to_numpy_ndarray().ctypes.data
+        assert content.address <= address < content.address + content.size
+
+
+def test_npz_is_stored_and_open_to_all(poses):
+    with zipfile.ZipFile(io.BytesIO(CROWD_ENCODERS["npz"].encode(poses))) as archive:
+        assert archive.testzip() is None
+        for member in archive.infolist():
+            assert member.compress_type == zipfile.ZIP_STORED
+            assert member.external_attr >> 16 == 0o644
+            assert member.date_time[0] == 1980
+
+
+@pytest.mark.parametrize("extension", READERS)
+def test_arrays_in_any_order_of_memory_are_the_same_bytes(extension, poses):
+    turned = dataclasses.replace(
+        poses,
+        rotations=np.asfortranarray(poses.rotations),
+        root_position=np.repeat(poses.root_position, 2, axis=0)[::2],
+    )
+    encode = CROWD_ENCODERS[extension].encode
+    assert encode(turned) == encode(poses)
+
+
+@pytest.mark.parametrize("extension", READERS)
+def test_threads_write_the_same_bytes(extension, poses):
+    encode, other = CROWD_ENCODERS[extension].encode, crowd(poses.skeleton, 24)
+    expected = [encode(poses), encode(other)] * 8
+    assert expected[0] != expected[1]
+    with ThreadPoolExecutor(max_workers=4) as pool:
+        assert list(pool.map(encode, [poses, other] * 8)) == expected

@@ -1,0 +1,250 @@
+"""The crowd question: columns and scalars become arrays, and whoever is at fault is named."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.motion.errors import InvalidField
+from service.synthesis import crowd_question
+from service.synthesis.view import View
+from service.web import crowd_query
+from service.web.problems import RequestFault
+
+CAMERA = {"position": [0, 1.7, -5], "fov": 1.0, "height": 1080}
+WHOLE = {
+    "controls": {"speed": [1.0, 1.5, 2], "turn": 0.25},
+    "time": [0, 0.5, 1],
+    "position": [[0, 0, 0], [1, 0, 2], [3, 0, 4.5]],
+    "heading": [0, 1.5, 3],
+    "performer": ["ada", None, "ada"],
+    "level": [0, 2, 1],
+    "root": "in_place",
+    "extrapolate": "refuse",
+}
+FOUND = (RequestFault, InvalidField)
+
+
+def asked(most=100, **body):
+    return crowd_query.of_body(json.dumps(body).encode(), most)
+
+
+def changed(**body):
+    """A small right question but for some fields; what is None is left out."""
+    whole = {"controls": {"speed": [1.0, 2.0]}, "time": 0.0} | body
+    return {key: value for key, value in whole.items() if value is not None}
+
+
+def test_every_field_becomes_an_array_of_its_unit():
+    found = asked(**WHOLE)
+    assert len(found) == 3
+    assert {name: v.tolist() for name, v in found.controls.items()} == {
+        "speed": [1.0, 1.5, 2.0],
+        "turn": [0.25] * 3,
+    }
+    assert found.times.tolist() == [0.0, 0.5, 1.0]
+    assert found.placement.positions.tolist() == WHOLE["position"]
+    assert found.placement.headings.tolist() == [0.0, 1.5, 3.0]
+    assert [found.performers[i] for i in found.performer] == ["ada", None, "ada"]
+    assert found.detail.tolist() == [0, 2, 1]
+    assert (found.root, found.extrapolate) == ("in_place", "refuse")
+
+
+def test_what_is_left_out_has_a_default():
+    found = asked(controls={"speed": [1.0, 2.0]}, time=0)
+    assert found.placement.positions.tolist() == [[0.0] * 3] * 2
+    assert found.placement.headings.tolist() == found.detail.tolist() == [0, 0]
+    assert [found.performers[i] for i in found.performer] == [None, None]
+    assert (found.root, found.extrapolate) == ("travelling", "warn")
+
+
+def test_a_scalar_says_the_same_of_everybody():
+    one = asked(**changed(time=0.5, heading=1, performer="ada", level=2))
+    many = asked(**changed(time=[0.5] * 2, heading=[1] * 2, performer=["ada"] * 2, level=[2] * 2))
+    for a, b in ((one.times, many.times), (one.detail, many.detail)):
+        assert a.tolist() == b.tolist()
+    assert one.placement.headings.tolist() == many.placement.headings.tolist()
+    assert one.performers == many.performers == ("ada",)
+
+
+@pytest.mark.parametrize(
+    ("body", "count"),
+    [
+        ({"position": [[0, 0, 0]] * 4, "controls": {"speed": 1}}, 4),
+        ({"performer": [None] * 5, "controls": {}}, 5),
+        ({"controls": {"speed": 1}}, 1),
+    ],
+)
+def test_any_list_gives_the_count_and_none_is_one_character(body, count):
+    assert len(asked(**changed(**body))) == count
+
+
+def test_auto_is_a_view():
+    view = asked(
+        **changed(level="auto", camera=CAMERA, budget_ms=5, previous_level=[0, 3], pixels=2)
+    ).detail
+    assert isinstance(view, View)
+    assert view.camera.position.tolist() == [0.0, 1.7, -5.0]
+    assert (view.camera.fov, view.camera.height) == (1.0, 1080.0)
+    assert (view.pixels, view.budget, view.previous.tolist()) == (2.0, 0.005, [0, 3])
+    plain = asked(**changed(level="auto", camera=CAMERA)).detail
+    assert (plain.pixels, plain.budget, plain.previous) == (1.0, None, None)
+
+
+@pytest.mark.parametrize(
+    ("body", "where"),
+    [
+        ({"time": [0, "1"]}, "/time/1"),
+        ({"time": None}, "/time"),
+        ({"controls": {"speed": [1, None]}}, "/controls/speed/1"),
+        ({"controls": {"a/b": [1, True]}}, "/controls/a~1b/1"),
+        ({"controls": {"speed": "1"}}, "/controls/speed"),
+        ({"position": [[0, 0, 0], [0, 0]]}, "/position/1"),
+        ({"position": [[0, 0, 0], [0, "y", 0]]}, "/position/1/1"),
+        ({"performer": ["ada", 7]}, "/performer/1"),
+        ({"level": [0, -1]}, "/level/1"),
+        ({"level": [0, 128]}, "/level/1"),
+        ({"level": "finest"}, "/level"),
+        ({"level": 10**30}, "/level"),
+        ({"level": "auto", "camera": {"position": [0, 0, 0], "fov": 1}}, "/camera/height"),
+        ({"level": "auto", "camera": CAMERA | {"roll": 1}}, "/camera/roll"),
+        ({"level": "auto", "camera": CAMERA, "pixels": -1}, "/pixels"),
+        ({"level": "auto", "camera": CAMERA, "budget_ms": 0}, "/budget_ms"),
+        ({"root": "floating"}, "/root"),
+        ({"extrapolate": "clamp"}, "/extrapolate"),
+        ({"times": [0]}, "/times"),
+        ({"a` - b": [0]}, "/a` - b"),
+    ],
+)
+def test_what_breaks_the_form_is_pointed_at(body, where):
+    with pytest.raises(RequestFault) as caught:
+        asked(**changed(**body))
+    assert caught.value.kind.status == 400
+    assert caught.value.place == {"pointer": where}
+
+
+@pytest.mark.parametrize("number", ["1e999", "-1e999"])
+@pytest.mark.parametrize(
+    ("body", "where"),
+    [
+        ('{"controls": {"speed": [1, %s]}, "time": 0}', "/controls/speed/1"),
+        ('{"controls": {"speed": [1, 2]}, "time": [0, %s]}', "/time/1"),
+        ('{"controls": {}, "time": 0, "position": [[0, 0, 0], [0, %s, 0]]}', "/position/1/1"),
+        ('{"controls": {}, "time": 0, "heading": %s}', "/heading"),
+    ],
+)
+def test_a_number_too_large_to_be_finite_is_pointed_at(number, body, where):
+    with pytest.raises(RequestFault) as caught:
+        crowd_query.of_body((body % number).encode(), 100)
+    assert caught.value.place == {"pointer": where}
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "index"),
+    [
+        ({"time": []}, "time", None),
+        ({"controls": {"speed": []}}, "controls/speed", None),
+        ({"time": [0] * 101}, "time", None),
+        ({"time": [0] * 3}, "time", None),
+        ({"heading": [0] * 3}, "heading", None),
+        ({"performer": [None]}, "performer", None),
+        ({"level": [0]}, "level", None),
+        ({"controls": {"speed": [1, 2], "turn": [1, 2, 3]}}, "controls/turn", None),
+        ({"position": [[0, 0, 0], [0, 0, -1.1e6]]}, "position", 1),
+        ({"level": "auto"}, "camera", None),
+        ({"camera": CAMERA}, "camera", None),
+        ({"pixels": 1}, "pixels", None),
+        ({"budget_ms": 1}, "budget_ms", None),
+        ({"previous_level": [0, 0]}, "previous_level", None),
+        ({"level": "auto", "camera": CAMERA, "previous_level": [0]}, "previous_level", None),
+        ({"level": "auto", "camera": CAMERA | {"fov": 0}}, "camera/fov", None),
+        ({"level": "auto", "camera": CAMERA | {"fov": math.pi}}, "camera/fov", None),
+        ({"level": "auto", "camera": CAMERA | {"height": 0}}, "camera/height", None),
+    ],
+)
+def test_what_has_no_answer_names_the_field_and_the_character(body, field, index):
+    with pytest.raises(InvalidField, match=r"expected|needs") as caught:
+        asked(**changed(**body))
+    assert (caught.value.field, caught.value.index) == (field, index)
+
+
+def test_of_lists_that_differ_the_second_is_at_fault():
+    with pytest.raises(InvalidField, match="time: 3 characters, expected 2 as in controls/speed"):
+        asked(**changed(time=[0] * 3))
+
+
+def test_the_largest_crowd_is_answered():
+    assert len(asked(most=100, **changed(controls={}, time=[0] * 100))) == 100
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_in_python_too_every_number_is_finite(number):
+    right = asked(**WHOLE)
+    wrong = right.controls | {"speed": np.array([1.0, number, number])}
+    with pytest.raises(InvalidField) as caught:
+        crowd_question.CrowdQuestion(**vars(right) | {"controls": wrong})
+    assert (caught.value.field, caught.value.index) == ("controls/speed", 1)
+
+
+def test_a_performer_is_a_row_of_zeros_with_a_one():
+    found = asked(**changed(controls={}, performer=["bo", None, "ada", "bo"]))
+    rows = crowd_question.labels(found, ("ada", "bo"))
+    assert rows.tolist() == [[0, 1], [0, 0], [1, 0], [0, 1]]
+    assert rows.dtype == np.float32
+
+
+def test_a_model_that_knows_nobody_has_labels_without_width():
+    assert crowd_question.labels(asked(**changed()), ()).shape == (2, 0)
+
+
+@pytest.mark.parametrize("known", [(), ("ada", "bo")])
+def test_the_first_character_of_whom_nothing_is_known_is_named(known):
+    found = asked(**changed(controls={}, performer=[None, None, "eve", "ivan", "eve"]))
+    with pytest.raises(InvalidField, match="performer/2: 'eve', expected ") as caught:
+        crowd_question.labels(found, known)
+    assert caught.value.index == 2
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"level": [2, 3]}, "level"),
+        ({"level": "auto", "camera": CAMERA, "previous_level": [2, 3]}, "previous_level"),
+    ],
+)
+def test_a_level_that_a_model_does_not_have_is_named(body, field):
+    found = asked(**changed(**body))
+    crowd_question.check_levels(found, 4)
+    with pytest.raises(InvalidField, match="3, expected 0 to 2") as caught:
+        crowd_question.check_levels(found, 3)
+    assert (caught.value.field, caught.value.index) == (field, 1)
+
+
+def test_nobody_is_at_a_level_before_the_first_answer():
+    crowd_question.check_levels(asked(**changed(level="auto", camera=CAMERA)), 1)
+
+
+@given(st.binary())
+def test_any_bytes_are_a_question_or_refused(content):
+    with pytest.raises(RequestFault):
+        crowd_query.of_body(content, 100)
+
+
+JSONS = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=6,
+)
+
+
+@given(st.sampled_from([*WHOLE, "camera", "pixels", "budget_ms", "previous_level"]), JSONS)
+def test_any_value_in_any_field_is_a_question_or_refused(name, value):
+    try:
+        found = asked(**WHOLE | {"level": "auto", "camera": CAMERA} | {name: value})
+    except FOUND:
+        return
+    assert len(found) == 3
+    assert np.isfinite(found.times).all()
