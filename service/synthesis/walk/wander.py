@@ -1,0 +1,96 @@
+"""Ways that nobody prescribed: each character's own, within what was sampled.
+
+All that is random of a character is one row of a table that is drawn row by row: it hangs on the
+seed and the character's number alone, not on how many others there are or for how long they walk.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion.conventions import Floats, Indices
+from service.synthesis.walk import paths
+from service.synthesis.walk.gait import Gait
+from service.synthesis.walk.paths import Paths
+from service.synthesis.walk.plane import Plane
+
+# Characters stand this far apart at first, in a grid, each up to so far from its place, m.
+SPACING, JITTER = 2.0, 0.5
+# Turning and speed rise and fall over these lengths of the way, m, with these weights.
+WAVES, WEIGHTS = np.array([23.0, 11.0, 6.1]), np.array([0.5, 0.3, 0.2])
+# The share of the turning sampled at a speed that is used, and how far a speed varies.
+BEND, HASTE = 0.8, 0.15
+
+
+@dataclass(frozen=True)
+class Cast:
+    """N characters with ways of their own.
+
+    who (N,): their performers by place on the card, -1 where none are told apart. phases (N,): of
+    the cycle, at the beginning.
+    """
+
+    paths: Paths
+    who: Indices
+    phases: Floats
+
+
+def cast(gait: Gait, count: int, seconds: float, seed: int) -> Cast:
+    """Characters that wander for a time, on ways long enough for the fastest."""
+    rng = np.random.Generator(np.random.PCG64(seed))
+    drawn = rng.random((count, _COLUMNS))
+    spot, heading, person, pace, phase = drawn[:, :2], *drawn[:, 2:6].T
+    waves = 2.0 * np.pi * drawn[:, 6:].reshape(count, 2, len(WAVES))
+    card = gait.session.card
+    performers = len(card.performers)
+    who = (person * performers).astype(np.int64) if performers else np.full(count, -1)
+    places = int(np.ceil(gait.region.speeds[1] * seconds / paths.STEP)) + 3
+    along = np.arange(places) * paths.STEP
+    speeds = _speeds(gait, pace, _wave(along, waves[:, 0]))
+    bends = _bends(gait, speeds, _wave(along, waves[:, 1]))
+    # The trapezoidal rule: the bend of a step is the mean of those at its ends.
+    turns = np.cumsum(0.5 * paths.STEP * (bends[:, 1:] + bends[:, :-1]), axis=1)
+    headings = 2.0 * np.pi * heading[:, None] + np.pad(turns, ((0, 0), (1, 0)))
+    lengths = np.full(count, along[-1])
+    return Cast(Paths(_starts(spot), headings, speeds, lengths), who, phase)
+
+
+_COLUMNS = 6 + 2 * len(WAVES)
+
+
+def _starts(spot: Floats) -> Plane:
+    """Starts (N,), m: a grid whose places are numbered in growing squares, so that a character's
+    does not hang on how many follow."""
+    number = np.arange(len(spot))
+    ring = np.sqrt(number).astype(np.int64)
+    on = number - ring**2
+    across, ahead = np.minimum(on, ring), np.minimum(2 * ring - on, ring)
+    moved = JITTER * (2.0 * spot - 1.0)
+    return (SPACING * ahead + moved[:, 0]) + 1j * (SPACING * across + moved[:, 1])
+
+
+def _wave(along: Floats, phases: Floats) -> Floats:
+    """Values (N, K) from -1 to 1 that rise and fall along (K,) m."""
+    angles = 2.0 * np.pi * along[:, None] / WAVES + phases[:, None]
+    return np.sin(angles) @ WEIGHTS
+
+
+def _speeds(gait: Gait, pace: Floats, wave: Floats) -> Floats:
+    """Speeds (N, K): each character's varies about that of one of the captured clips."""
+    usual = gait.rates[(pace * len(gait.rates)).astype(np.int64), 0][:, None]
+    low, high = gait.region.speeds
+    slower = np.maximum((1.0 - HASTE) * usual, low)
+    faster = np.minimum((1.0 + HASTE) * usual, high)
+    return _swung(wave, slower, usual, faster)
+
+
+def _bends(gait: Gait, speeds: Floats, wave: Floats) -> Floats:
+    """Curvatures (N, K), 1/m: straight at rest of the wave where that was sampled."""
+    low, high = gait.region.turning(speeds)
+    middle = np.clip(0.0, low, high)
+    turning = _swung(BEND * wave, low, middle, high)
+    return turning / speeds
+
+
+def _swung(wave: Floats, low: Floats, middle: Floats, high: Floats) -> Floats:
+    return middle + np.where(wave < 0.0, middle - low, high - middle) * wave
