@@ -26,7 +26,8 @@ class Gait:
 
     rates (N, 2): speed, m/s, and rate of turning, rad/s, of each captured clip, as the model
     walks it. slopes (3, d): regression of controls on 1 and rates. manners (p + 1, d): what each
-    performer does otherwise, and nobody in particular at the end. region: of the rates.
+    performer does otherwise, and nobody in particular at the end. region: of the rates, with
+    straight on at all their speeds.
     """
 
     session: Session
@@ -47,12 +48,11 @@ class Gait:
     def controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
         """The same, moved along the regression until the model does what was wanted."""
         labels = stride.labels(self.session, who)
-        asked = np.column_stack([speeds, turning])
-        wanted = asked.copy()
+        speed, turn = speeds, turning
         for _ in range(ROUNDS):
-            done = stride.strides(self.session, self.typical(*asked.T, who), labels)
-            asked += wanted - np.column_stack([done.speeds, done.turning])
-        return self.typical(*asked.T, who)
+            done = stride.strides(self.session, self.typical(speed, turn, who), labels)
+            speed, turn = speed + speeds - done.speeds, turn + turning - done.turning
+        return self.typical(speed, turn, who)
 
 
 def of(session: Session) -> Gait:
@@ -72,7 +72,14 @@ def of(session: Session) -> Gait:
         )
     slopes = np.linalg.lstsq(_design(*rates.T), controls, rcond=None)[0]
     manners = _manners(controls - _design(*rates.T) @ slopes, who, len(card.performers))
-    return Gait(session, rates, slopes, manners, region.hull(rates))
+    return Gait(session, rates, slopes, manners, region.hull(_with_straight(rates)))
+
+
+def _with_straight(rates: Floats) -> Floats:
+    """Rates and straight on at the slowest and the fastest: a stride cut from a straight walk turns
+    by a few degrees either way, which nobody would take for the least that the walker can turn."""
+    ends = np.array([rates[:, 0].min(), rates[:, 0].max()])
+    return np.vstack([rates, np.column_stack([ends, np.zeros(2)])])
 
 
 def _design(speeds: Floats, turning: Floats) -> Floats:
@@ -80,7 +87,7 @@ def _design(speeds: Floats, turning: Floats) -> Floats:
 
 
 def _manners(residuals: Floats, who: Indices, performers: int) -> Floats:
-    """Mean residuals (p + 1, d) of performers, shrunk as if one clip more were usual; then zeros."""
+    """Mean residuals (p + 1, d) of performers, as if one clip more were usual; zeros at the end."""
     theirs = np.arange(performers)[:, None] == who
     means = theirs @ residuals / (theirs.sum(axis=1, keepdims=True) + 1.0)
     return np.vstack([means, np.zeros(residuals.shape[1])])

@@ -34,7 +34,7 @@ class Paths:
     def places(self) -> Plane:
         """Where the ways are known (N, K)."""
         turns = np.diff(self.headings, axis=1)
-        steps = plane.facing(self.headings[:, :-1]) * plane.arc(np.array(STEP + 0j), turns)
+        steps = plane.facing(self.headings[:, :-1]) * plane.arc(np.array(STEP), turns)
         return self.starts[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
     def at(self, gone: Floats) -> tuple[Plane, Floats]:
@@ -42,7 +42,7 @@ class Paths:
         before, share = self._between(gone)
         turns = share * np.take_along_axis(np.diff(self.headings, axis=1), before, axis=1)
         first = np.take_along_axis(self.headings, before, axis=1)
-        along = plane.facing(first) * plane.arc(STEP * share + 0j, turns)
+        along = plane.facing(first) * plane.arc(STEP * share, turns)
         return np.take_along_axis(self.places, before, axis=1) + along, first + turns
 
     def along(self, values: Floats, gone: Floats) -> Floats:

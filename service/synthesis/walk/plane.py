@@ -28,7 +28,7 @@ def facing(headings: Floats) -> Plane:
     return np.exp(1j * headings)
 
 
-def arc(way: Plane, turn: Floats) -> Plane:
+def arc(way: Plane | Floats, turn: Floats) -> Plane:
     """Where one gets to who goes a way of constant speed and turns evenly by `turn`, rad.
 
     The exponential map of rigid motion in the plane: a straight line where nothing turns, else an
@@ -48,5 +48,6 @@ def _bent(turn: Floats) -> Plane:
 
 
 def turned(rotations: Floats, headings: Floats) -> Floats:
-    """Rotations (..., 4) turned on by headings (...) about +Y."""
-    return quat.mul(quat.about(UP, headings), rotations)
+    """Rotations (..., J, 4) of bodies whose roots are turned on by headings (...) about +Y."""
+    root = quat.mul(quat.about(UP, headings), rotations[..., 0, :])
+    return np.concatenate([root[..., None, :], rotations[..., 1:, :]], axis=-2)

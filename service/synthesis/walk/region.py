@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from service.motion.conventions import Floats
 
@@ -19,20 +20,20 @@ class Region:
     limits: Floats
     speeds: tuple[float, float]
 
-    def holds(self, speeds: Floats, turning: Floats) -> np.ndarray:
+    def holds(self, speeds: Floats, turning: Floats) -> npt.NDArray[np.bool_]:
         """Whether pairs (...) lie within."""
         pairs = np.stack(np.broadcast_arrays(speeds, turning), axis=-1)
         return np.all(pairs @ self.normals.T <= self.limits + SLACK, axis=-1)
 
     def turning(self, speeds: Floats) -> tuple[Floats, Floats]:
         """Least and most rate of turning (...) at speeds (...) within the region."""
-        room = self.limits - speeds[..., None] * self.normals[:, 0]
-        across = self.normals[:, 1]
-        with np.errstate(divide="ignore"):
-            ends = room / across
-        low = np.where(across < 0.0, ends, -np.inf).max(axis=-1)
-        high = np.where(across > 0.0, ends, np.inf).min(axis=-1)
-        return low, high
+        right, left = self.normals[:, 1] < 0.0, self.normals[:, 1] > 0.0
+        return self._ends(speeds, right).max(axis=-1), self._ends(speeds, left).min(axis=-1)
+
+    def _ends(self, speeds: Floats, edges: npt.NDArray[np.bool_]) -> Floats:
+        """Rates of turning (..., E) at which some edges are met at speeds (...)."""
+        along, across = self.normals[edges].T
+        return (self.limits[edges] - speeds[..., None] * along) / across
 
 
 def hull(pairs: Floats) -> Region:

@@ -56,7 +56,7 @@ class Poses:
     """K poses in frames that go along: rotations (K, J, 4), heights (K,), m, of the root, and where
     it is (K,) over the floor."""
 
-    rotations: Singles
+    rotations: Floats
     heights: Floats
     places: Plane
 
@@ -77,10 +77,9 @@ def poses(session: Session, controls: Floats, labels: Floats, phases: Floats) ->
     rotations, roots = _ask(session, controls, times, labels, "rotations", "root_position")
     turned = phases * own.turns
     gone = plane.of(roots[:, 0]) - own.starts - plane.arc(phases * own.ways, turned)
-    rotations = rotations[:, 0]
-    rotations[:, 0] = plane.turned(rotations[:, 0], -turned)
-    places = gone * plane.facing(-turned)
-    return Poses(rotations.astype(np.float32), roots[:, 0, 1], places)
+    return Poses(
+        plane.turned(rotations[:, 0], -turned), roots[:, 0, 1], gone * plane.facing(-turned)
+    )
 
 
 def bones(session: Session, controls: Floats, labels: Floats) -> Singles:

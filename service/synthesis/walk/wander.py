@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.motion.conventions import Floats, Indices
-from service.synthesis.walk import paths
 from service.synthesis.walk.gait import Gait
-from service.synthesis.walk.paths import Paths
+from service.synthesis.walk.paths import STEP, Paths
 from service.synthesis.walk.plane import Plane
 
 # Characters stand this far apart at first, in a grid, each up to so far from its place, m.
@@ -24,38 +23,39 @@ BEND, HASTE = 0.8, 0.15
 
 @dataclass(frozen=True)
 class Cast:
-    """N characters with ways of their own.
+    """N characters.
 
     who (N,): their performers by place on the card, -1 where none are told apart. phases (N,): of
-    the cycle, at the beginning.
+    the cycle, at the beginning. drawn (N, columns): numbers from 0 to 1 for their ways.
     """
 
-    paths: Paths
     who: Indices
     phases: Floats
+    drawn: Floats
 
 
-def cast(gait: Gait, count: int, seconds: float, seed: int) -> Cast:
-    """Characters that wander for a time, on ways long enough for the fastest."""
+def cast(gait: Gait, count: int, seed: int) -> Cast:
+    """Characters of a seed."""
     rng = np.random.Generator(np.random.PCG64(seed))
-    drawn = rng.random((count, _COLUMNS))
-    spot, heading, person, pace, phase = drawn[:, :2], *drawn[:, 2:6].T
-    waves = 2.0 * np.pi * drawn[:, 6:].reshape(count, 2, len(WAVES))
-    card = gait.session.card
-    performers = len(card.performers)
-    who = (person * performers).astype(np.int64) if performers else np.full(count, -1)
-    places = int(np.ceil(gait.region.speeds[1] * seconds / paths.STEP)) + 3
-    along = np.arange(places) * paths.STEP
-    speeds = _speeds(gait, pace, _wave(along, waves[:, 0]))
+    table = rng.random((count, 6 + 2 * len(WAVES)))
+    performers = len(gait.session.card.performers)
+    who = (table[:, 0] * performers).astype(np.int64) if performers else np.full(count, -1)
+    return Cast(who, table[:, 1], table[:, 2:])
+
+
+def paths(gait: Gait, characters: Cast, seconds: float) -> Paths:
+    """Ways on which characters wander for a time, long enough for the fastest."""
+    spot, (heading, pace) = characters.drawn[:, :2], characters.drawn[:, 2:4].T
+    waves = 2.0 * np.pi * characters.drawn[:, 4:].reshape(len(spot), 2, len(WAVES))
+    places = int(np.ceil(gait.region.speeds[1] * seconds / STEP)) + 3
+    along = np.linspace(0.0, (places - 1) * STEP, places)
+    usual = _usual(gait, characters.who, pace)
+    speeds = _speeds(gait, usual, _wave(along, waves[:, 0]))
     bends = _bends(gait, speeds, _wave(along, waves[:, 1]))
     # The trapezoidal rule: the bend of a step is the mean of those at its ends.
-    turns = np.cumsum(0.5 * paths.STEP * (bends[:, 1:] + bends[:, :-1]), axis=1)
+    turns = np.cumsum(0.5 * STEP * (bends[:, 1:] + bends[:, :-1]), axis=1)
     headings = 2.0 * np.pi * heading[:, None] + np.pad(turns, ((0, 0), (1, 0)))
-    lengths = np.full(count, along[-1])
-    return Cast(Paths(_starts(spot), headings, speeds, lengths), who, phase)
-
-
-_COLUMNS = 6 + 2 * len(WAVES)
+    return Paths(_starts(spot), headings, speeds, np.full(len(spot), along[-1]))
 
 
 def _starts(spot: Floats) -> Plane:
@@ -75,9 +75,17 @@ def _wave(along: Floats, phases: Floats) -> Floats:
     return np.sin(angles) @ WEIGHTS
 
 
-def _speeds(gait: Gait, pace: Floats, wave: Floats) -> Floats:
-    """Speeds (N, K): each character's varies about that of one of the captured clips."""
-    usual = gait.rates[(pace * len(gait.rates)).astype(np.int64), 0][:, None]
+def _usual(gait: Gait, who: Indices, drawn: Floats) -> Floats:
+    """Speeds (N, 1) of captured clips, each of the character's own performer."""
+    moved_by = np.array(gait.session.card.moved_by or [-1] * len(gait.rates))
+    order = np.argsort(moved_by, kind="stable")
+    first, after = (np.searchsorted(moved_by[order], who, side) for side in ("left", "right"))
+    clips = order[first + (drawn * (after - first)).astype(np.int64)]
+    return gait.rates[clips, :1]
+
+
+def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
+    """Speeds (N, K) that vary about the usual ones (N, 1)."""
     low, high = gait.region.speeds
     slower = np.maximum((1.0 - HASTE) * usual, low)
     faster = np.minimum((1.0 + HASTE) * usual, high)
@@ -85,11 +93,9 @@ def _speeds(gait: Gait, pace: Floats, wave: Floats) -> Floats:
 
 
 def _bends(gait: Gait, speeds: Floats, wave: Floats) -> Floats:
-    """Curvatures (N, K), 1/m: straight at rest of the wave where that was sampled."""
+    """Curvatures (N, K), 1/m: straight at rest of the wave."""
     low, high = gait.region.turning(speeds)
-    middle = np.clip(0.0, low, high)
-    turning = _swung(BEND * wave, low, middle, high)
-    return turning / speeds
+    return _swung(BEND * wave, low, np.zeros(1), high) / speeds
 
 
 def _swung(wave: Floats, low: Floats, middle: Floats, high: Floats) -> Floats:
