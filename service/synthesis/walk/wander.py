@@ -19,6 +19,8 @@ SPACING, JITTER = 2.0, 0.5
 WAVES, WEIGHTS = np.array([23.0, 11.0, 6.1]), np.array([0.5, 0.3, 0.2])
 # The share of the turning sampled at a speed that is used, and how far a speed varies.
 BEND, HASTE = 0.8, 0.15
+# This share of the speeds sampled is left out at either end, where next to no turning was.
+MARGIN = 0.05
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,12 @@ def _usual(gait: Gait, who: Indices, drawn: Floats) -> Floats:
 
 def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
     """Speeds (N, K) that vary about the usual ones (N, 1)."""
-    low, high = gait.region.speeds
-    slower = np.maximum((1.0 - HASTE) * usual, low)
-    faster = np.minimum((1.0 + HASTE) * usual, high)
-    return _swung(wave, slower, usual, faster)
+    ends = np.array(gait.region.speeds)
+    low, high = ends + MARGIN * (ends[::-1] - ends)
+    middle = np.clip(usual, low, high)
+    slower = np.maximum((1.0 - HASTE) * middle, low)
+    faster = np.minimum((1.0 + HASTE) * middle, high)
+    return _swung(wave, slower, middle, faster)
 
 
 def _bends(gait: Gait, speeds: Floats, wave: Floats) -> Floats:
