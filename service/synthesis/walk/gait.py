@@ -14,7 +14,7 @@ from service.synthesis.session import Session
 from service.synthesis.walk import region, stride
 from service.synthesis.walk.region import Region
 
-# Slower than this nothing travels, m/s.
+# Slower than this nothing travels, and speeds nearer than this are one, m/s.
 STILL = 0.05
 # Rounds of correcting what is asked by what came of it.
 ROUNDS = 3
@@ -56,7 +56,7 @@ class Gait:
 
 
 def of(session: Session) -> Gait:
-    """Gait of a model; InvalidField where it is not of a cycle, or stays in place."""
+    """Gait of a model; InvalidField where it is not of a cycle, stays in place or has one speed."""
     card = session.card
     if not card.cyclic:
         raise InvalidField("model", f"{card.name} is no cycle, expected one that can be repeated")
@@ -66,13 +66,19 @@ def of(session: Session) -> Gait:
     who = np.array(card.moved_by or [-1] * len(controls))
     own = stride.strides(session, controls, stride.labels(session, who))
     rates = np.column_stack([own.speeds, own.turning])
-    if rates[:, 0].max() < STILL:
-        raise InvalidField(
-            "model", f"{card.name} goes {rates[:, 0].max():.3f} m/s, expected one that travels"
-        )
+    _refuse_one_speed(card.name, rates[:, 0])
     slopes = np.linalg.lstsq(_design(*rates.T), controls, rcond=None)[0]
     manners = _manners(controls - _design(*rates.T) @ slopes, who, len(card.performers))
     return Gait(session, rates, slopes, manners, region.hull(_with_straight(rates)))
+
+
+def _refuse_one_speed(name: str, speeds: Floats) -> None:
+    low, high = speeds.min(), speeds.max()
+    if low < STILL or high - low < STILL:
+        raise InvalidField(
+            "model",
+            f"{name} goes {low:.3f} to {high:.3f} m/s, expected one that travels at several speeds",
+        )
 
 
 def _with_straight(rates: Floats) -> Floats:

@@ -84,7 +84,8 @@ def follow(
     wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
     labels = stride.labels(gait.session, everyone)
     speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
-    gone = _gone(speeds, paths.lengths, frames, rate)
+    gone = _gone(speeds, frames, rate)
+    _refuse_short(paths, gone, (frames - 1) / rate)
     controls = paths.along(wanted.reshape(*known, -1), gone)
     own = _strides(gait, controls, who)
     places, tangents = paths.at(gone)
@@ -122,10 +123,9 @@ def _phases(own: Strides, first: Floats, rate: float) -> Floats:
     return (first[:, None] + _summed(_steps(1.0 / own.durations, rate))) % 1.0
 
 
-def _gone(speeds: Floats, lengths: Floats, frames: int, rate: float) -> Floats:
-    """Metres (N, F) gone along ways of lengths (N,) at whose known places one has speeds (N, K)."""
+def _gone(speeds: Floats, frames: int, rate: float) -> Floats:
+    """Metres (N, F) gone along ways at whose known places one has speeds (N, K), or to the end."""
     arrived = _summed(0.5 * STEP * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
-    _refuse_short(arrived, lengths, (frames - 1) / rate)
     # One interpolation for all: each row's times come after those of the row before.
     apart = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
     ways = np.tile(STEP * np.arange(speeds.shape[1]), len(speeds))
@@ -133,12 +133,10 @@ def _gone(speeds: Floats, lengths: Floats, frames: int, rate: float) -> Floats:
     return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
 
 
-def _refuse_short(arrived: Floats, lengths: Floats, seconds: float) -> None:
-    places = np.minimum((lengths / STEP).astype(np.int64), arrived.shape[1] - 1)
-    lasts = np.take_along_axis(arrived, places[:, None], axis=1)[:, 0]
-    for index in np.flatnonzero(lasts < seconds)[:1]:
+def _refuse_short(paths: Paths, gone: Floats, seconds: float) -> None:
+    for index in np.flatnonzero(gone[:, -1] >= paths.lengths)[:1]:
         raise InvalidField(
             f"paths/{index}",
-            f"{lengths[index]:.2f} m long, which is walked in {lasts[index]:.2f} s, "
-            f"expected a way for {seconds:g} s",
+            f"{paths.lengths[index]:.2f} m long, which is walked in less than {seconds:g} s, "
+            "expected a longer way or a shorter time",
         )

@@ -85,6 +85,12 @@ def test_a_model_that_stays_in_place_does_not_walk(opened):
         gait.of(still)
 
 
+def test_a_model_of_one_speed_does_not_walk(opened):
+    once = replace(opened.card, examples=opened.card.examples[:2], moved_by=(0, 0))
+    with pytest.raises(InvalidField, match=r"model: stroll goes 0\.\d+ to 0\.\d+ m/s, expected"):
+        gait.of(replace(opened, card=once))
+
+
 def test_nobody_in_particular_walks_too(opened):
     assert stride.labels(opened, np.array([0, 1, NOBODY])).tolist() == [[1, 0], [0, 1], [0, 0]]
     assert opened.card.performers == ("ann", "ben")

@@ -173,5 +173,5 @@ def test_a_straight_route_is_walked_at_its_speed(own):
 
 def test_a_way_that_ends_too_soon_is_refused(own):
     ways = given.through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
-    with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* in (2\.9|3\.0)\d s"):
+    with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
         march.follow(own, ways, ANN, np.zeros(1), 121, RATE)
