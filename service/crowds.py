@@ -93,10 +93,9 @@ class _Feet:
     def facts(self) -> dict[str, float]:
         if not self.seen:
             return {}
-        strides = skating.of_strides(self.gait, self.rate)
         return {
             "skate_cm_per_s": round(100.0 * float(np.concatenate(self.seen).mean()), 2),
-            "skate_strides_cm_per_s": round(100.0 * float(strides.mean()), 2),
+            "skate_strides_cm_per_s": round(100.0 * skating.usual(self.gait, self.rate), 2),
         }
 
 

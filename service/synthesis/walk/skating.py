@@ -40,3 +40,10 @@ def of_strides(gait: Gait, rate: float) -> Floats:
     held = np.repeat(controls[:, None], length, axis=1)
     plan = march.roam(gait, held, who, nowhere, (origin, nowhere), rate)
     return of(card, company.motions(gait.session, plan, np.arange(len(controls))), rate)
+
+
+def usual(gait: Gait, rate: float) -> float:
+    """Mean of the model's own strides, m/s, every performer counting alike, as a crowd has them."""
+    speeds = of_strides(gait, rate)[:, 0]
+    moved_by = np.array(gait.session.card.moved_by or [-1] * len(speeds))
+    return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))

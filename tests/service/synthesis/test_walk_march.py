@@ -141,7 +141,10 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     plan = wandering(own, 60)
     made = company.motions(own.session, plan, np.arange(60))
     found = skating.of(own.session.card, made, RATE).mean()
-    strides = skating.of_strides(own, RATE).mean()
+    strides = skating.usual(own, RATE)
+    each = skating.of_strides(own, RATE)[:, 0]
+    who = np.array(own.session.card.moved_by)
+    assert strides == pytest.approx(0.5 * (each[who == 0].mean() + each[who == 1].mean()))
     assert 0.0 < found < 1.2 * strides < 0.05
     # Negative control: a root that goes on a tenth too fast.
     fast = replace(plan, places=plan.places + 0.1 * (plan.places - plan.places[:, :1]))
