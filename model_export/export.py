@@ -148,6 +148,7 @@ def _card(
         performers=trained.model.bank.performers,
         examples=tuple(tuple(map(_round, example.controls)) for example in examples),
         moved_by=tuple(map(int, trained.laid.moved_by)),
+        feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
     )

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import orjson
 import typer
 
-from service import __version__
+from service import __version__, crowds
 from service.encode import ENCODERS, poses
 from service.motion import card as cards
 from service.motion import files
@@ -128,6 +128,29 @@ def clip(
     files.write(encode(answer), output)
     _warn(answer.trust.warnings)
     typer.echo(wrote(output, answer, json))
+
+
+@app.command()
+def crowd(
+    model: ModelPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="the .npz file to write")],
+    count: Annotated[
+        int | None, typer.Option(help="characters, each on a way of its own; 500 if not said")
+    ] = None,
+    paths: Annotated[
+        Path | None,
+        typer.Option(
+            help='JSON instead: [{"waypoints": [[x, z], ...], "speed": v}, ...], m and m/s'
+        ),
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="how long they walk")] = 10.0,
+    fps: Annotated[float, typer.Option(help="frames a second")] = 30.0,
+    seed: Annotated[int, typer.Option(help="of all that is random")] = 0,
+    json: Json = False,
+) -> None:
+    """Write a crowd that walks, each character on its own way at its own changing speed."""
+    facts = crowds.write(model, crowds.Order(count, paths, seconds, fps, seed), output)
+    typer.echo(as_json(facts) if json else crowds.said(facts))
 
 
 @app.command()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import walker
 
 from model_export import export, ingest, recipe, train
 from model_export.export import Exported
@@ -87,6 +88,22 @@ def labelled_path(labelled_exported: Exported, tmp_path_factory: pytest.TempPath
     """The model that knows its performers as a file, labelled.onnx."""
     path = tmp_path_factory.mktemp("models") / "labelled.onnx"
     path.write_bytes(labelled_exported.content)
+    return path
+
+
+@pytest.fixture(scope="session")
+def strides(tmp_path_factory: pytest.TempPathFactory) -> list[Example]:
+    """Strides of the procedural walk."""
+    folder = walker.write(tmp_path_factory.mktemp("strides"))
+    return ingest.ingest(walker.recipe(), folder)[0]
+
+
+@pytest.fixture(scope="session")
+def walk_path(strides: list[Example], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small model of the procedural walk as a file, stroll.onnx."""
+    trained = train.train(walker.recipe(), strides, lambda _: None)
+    path = tmp_path_factory.mktemp("walk") / "stroll.onnx"
+    path.write_bytes(export.export(walker.recipe(), trained, []).content)
     return path
 
 

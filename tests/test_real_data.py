@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_export import export, ingest, recipe, samples, train
-from service.motion import quat
+from model_export import align, export, ingest, recipe, samples, train
+from service.motion import ground, quat
 from service.motion.conventions import UP
 from service.synthesis import session
 from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.walk import company, gait, march, skating
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
 CLIPS = {"hdm05_grab_high": 29, "hdm05_deposit_floor": 32, "cmu_walk": 78}
@@ -144,3 +145,41 @@ def test_a_walk_closes_its_loop(made, model):
     assert len(clip) == 101
     assert away[-1] < 1e-4
     assert away[50] > 0.3
+
+
+def source_skate(clips, feet, rate):
+    """Sliding speeds of captured clips' feet, m/s, at a rate."""
+    speeds = []
+    for clip in clips:
+        frames = round(clip.duration * rate) + 1
+        joints = clip.positions()[:, list(feet)].reshape(len(clip), -1)
+        even = align.at(joints, np.linspace(0.0, 1.0, frames)).reshape(frames, -1, 3)
+        speeds.append(ground.skate(even, (frames - 1) / clip.duration))
+    return np.array(speeds)
+
+
+def mean_walker(values, who, count):
+    """Mean over performers of each one's mean: a crowd draws them alike."""
+    return np.mean([values[who == one].mean() for one in range(count)])
+
+
+@pytest.mark.parametrize("made", ["cmu_walk"], indirect=True)
+def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
+    _, examples, _, exported = made
+    card, rate = exported.card, 30.0
+    walk = gait.of(model.session)
+    plan = company.wandering(walk, 150, 10.0, rate, 0)
+    feet = skating.of(card, company.motions(walk.session, plan, np.arange(150)), rate)
+    count = len(card.performers)
+    crowd = mean_walker(feet.mean(axis=1), plan.who, count)
+    moved_by = np.array(card.moved_by)
+    source = source_skate([example.clip for example in examples], card.feet, rate)
+    strides = skating.of_strides(walk, rate)[:, 0]
+    assert crowd < 1.2 * mean_walker(source, moved_by, count)
+    assert crowd < 1.1 * mean_walker(strides, moved_by, count)
+    # The path costs nothing: left to itself the model's feet slide as much.
+    starts = plan.places[:, 0], plan.headings[:, 0]
+    free = march.roam(walk, plan.controls, plan.who, plan.phases[:, 0], starts, rate)
+    assert np.abs(free.places - plan.places).max() < 0.3
+    left = skating.of(card, company.motions(walk.session, free, np.arange(150)), rate)
+    assert left.mean() == pytest.approx(feet.mean(), rel=0.01)

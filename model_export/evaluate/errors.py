@@ -8,10 +8,8 @@ import numpy as np
 
 from model_export import align, dtw
 from model_export.evaluate.motion import FRAMES, Motion
-from service.motion.conventions import UP, Floats
-
-# A foot within this of its lowest is on the ground, m.
-PLANTED = 0.02
+from service.motion import ground
+from service.motion.conventions import Floats
 
 
 @dataclass(frozen=True)
@@ -110,18 +108,8 @@ def _acceleration(points: Floats) -> float:
 
 
 def skate(motion: Motion, feet: tuple[int, ...]) -> float:
-    """Mean horizontal speed, m/s, of feet while they are within 2 cm of their lowest.
-
-    Each motion's own heights say when that is: what the eye takes for a foot on the ground.
-    """
-    if not feet:
-        return 0.0
-    steps = np.diff(motion.joints[:, feet], axis=0) * (FRAMES - 1) / motion.duration
-    speeds = np.linalg.norm(steps * (1.0 - UP), axis=-1)
-    heights = motion.joints[:, feet] @ UP
-    down = heights < heights.min(axis=0) + PLANTED
-    planted = down[1:] & down[:-1]
-    return float(speeds[planted].mean()) if planted.any() else 0.0
+    """Mean horizontal speed, m/s, of feet while they are on the ground; 0 without feet."""
+    return float(ground.skate(motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration))
 
 
 def mean(errors: Sequence[Errors]) -> Errors:

@@ -119,7 +119,7 @@ def _compared(
     found: Answers,
     captured: Sequence[Motion],
 ) -> _Part:
-    feet = tuple(trained.skeleton.names.index(name) for name in recipe.motion.feet)
+    feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
     compared = {
         name: [errors.compare(own, true, feet) for own, true in zip(made, captured, strict=True)]
         for name, made in found.motions.items()

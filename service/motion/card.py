@@ -44,8 +44,9 @@ class ModelCard:
     levels: of detail, the finest first. durations: shortest and longest captured clip, s.
     performers: who can be asked for by name, in the order of the graph's labels; empty where
     performers are not told apart. examples (N, d): controls of the captured clips; moved_by (N,):
-    whose each is, by place among the performers, empty where they are not told apart. diagnostics:
-    what training measured. provenance: recipe, hashes of the data, versions, licence.
+    whose each is, by place among the performers, empty where they are not told apart. feet: indices
+    of the joints that stand on the ground, empty where nobody said. diagnostics: what training
+    measured. provenance: recipe, hashes of the data, versions, licence.
     """
 
     name: str
@@ -62,6 +63,7 @@ class ModelCard:
     performers: tuple[str, ...]
     examples: tuple[tuple[float, ...], ...]
     moved_by: tuple[int, ...]
+    feet: tuple[int, ...]
     diagnostics: Mapping[str, Any]
     provenance: Mapping[str, Any]
 
@@ -87,6 +89,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "performers": list(card.performers),
         "examples": [list(point) for point in card.examples],
         "moved_by": list(card.moved_by),
+        "feet": list(card.feet),
         "diagnostics": dict(card.diagnostics),
         "provenance": dict(card.provenance),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
@@ -148,6 +151,7 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         performers=tuple(plain["performers"]),
         examples=tuple(map(tuple, plain["examples"])),
         moved_by=tuple(plain["moved_by"]),
+        feet=tuple(plain["feet"]),
         diagnostics=plain["diagnostics"],
         provenance=plain["provenance"],
     )

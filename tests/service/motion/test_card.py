@@ -38,6 +38,7 @@ CARD = ModelCard(
     performers=("ada", "bob"),
     examples=((1.6, -60.0), (1.75, 0.1), (1.9, 60.0)),
     moved_by=(0, 1, 0),
+    feet=(1,),
     diagnostics={"truncation_rms_m": 0.005, "notes": ["one"], "explained": {"pose": 0.9}},
     provenance={"licence": "CC0", "clips": 92},
 )

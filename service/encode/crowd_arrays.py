@@ -1,0 +1,44 @@
+"""A crowd as plain arrays in one .npz file, every character where it stands in the world."""
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from service.motion import files, quat
+from service.motion.conventions import Singles
+from service.motion.crowd import CrowdClip
+
+
+def write(crowd: CrowdClip, path: Path) -> None:
+    """Write rotations (N, F, J, 4), root_position (N, F, 3), m, bone_offsets (N, J, 3), m, rate and
+    joints; raises FileError where that cannot be."""
+    made = list(crowd.batches)
+    rotations, roots, bones = (
+        np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
+        for part in _PARTS
+    )
+    turned, moved = _placed(crowd, rotations, roots)
+    content = BytesIO()
+    np.savez(
+        content,
+        rotations=turned,
+        root_position=moved,
+        bone_offsets=bones,
+        rate=crowd.rate,
+        joints=np.array(crowd.skeleton.names),
+    )
+    files.write(content.getvalue(), path)
+
+
+_PARTS = ("rotations", "root_position", "bone_offsets")
+
+
+def _placed(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:
+    """Rotations and roots of all characters in the world."""
+    turns = crowd.placement.turns[:, None]
+    own = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
+    moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
+    placed = rotations.copy()
+    placed[:, :, 0] = own
+    return placed, moved.astype(np.float32)

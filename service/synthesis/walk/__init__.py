@@ -1,0 +1,1 @@
+"""Characters that walk their own ways through a model of a cycle that travels."""

@@ -1,0 +1,142 @@
+"""Many walkers over time: first where each is, in which phase and with which controls, then poses.
+
+Planning is cheap, and made for all characters and frames at once. Posing is asked for whichever
+pairs of character and frame are wanted.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from service.motion.conventions import Floats, Indices
+from service.motion.errors import InvalidField
+from service.synthesis.session import Session
+from service.synthesis.walk import plane, stride
+from service.synthesis.walk.gait import Gait
+from service.synthesis.walk.paths import STEP, Paths
+from service.synthesis.walk.plane import Plane
+from service.synthesis.walk.stride import Poses, Strides
+
+Numbers = TypeVar("Numbers", Floats, Plane)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What N characters do at F frames of a rate, all but their poses.
+
+    controls (N, F, d), who (N,): performers by place on the card or -1, phases (N, F): of the
+    cycle, in [0, 1). places (N, F), headings (N, F), rad: of the frames that go along with them.
+    """
+
+    controls: Floats
+    who: Indices
+    phases: Floats
+    places: Plane
+    headings: Floats
+    rate: float
+
+    @property
+    def roots(self) -> Floats:
+        """Points (N, F, 3), m, on the floor under the characters."""
+        return plane.at_height(self.places, np.zeros(self.places.shape))
+
+    def at_home(self) -> "Plan":
+        """The same, each character in the frame that it begins in."""
+        first, facing = self.places[:, :1], self.headings[:, :1]
+        places = (self.places - first) * plane.facing(-facing)
+        return replace(self, places=places, headings=self.headings - facing)
+
+
+def roam(
+    gait: Gait,
+    controls: Floats,
+    who: Indices,
+    phases: Floats,
+    starts: tuple[Plane, Floats],
+    rate: float,
+) -> Plan:
+    """Plan of controls (N, F, d): the way is what the model makes of them.
+
+    phases (N,), starts: places (N,) and headings (N,), rad, at the first frame.
+    """
+    own = _strides(gait, controls, who)
+    turns = _steps(own.turning, rate)
+    ways = _steps(own.ways / own.durations, rate)
+    headings = starts[1][:, None] + _summed(turns)
+    steps = plane.facing(headings[:, :-1]) * plane.arc(ways, turns)
+    places = starts[0][:, None] + _summed(steps)
+    return Plan(controls, who, _phases(own, phases, rate), places, headings, rate)
+
+
+def follow(
+    gait: Gait, paths: Paths, who: Indices, phases: Floats, frames: int, rate: float
+) -> Plan:
+    """Plan of paths: each character goes along its own at the speed that the model makes of the
+    controls, turned as the path is.
+
+    phases (N,): of the cycle, at the first frame. Raises InvalidField for a path that ends too
+    soon.
+    """
+    known = paths.speeds.shape
+    everyone = np.repeat(who, known[1])
+    turning = (paths.speeds * paths.bends).ravel()
+    wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
+    labels = stride.labels(gait.session, everyone)
+    speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
+    gone = _gone(speeds, frames, rate)
+    _refuse_short(paths, gone, (frames - 1) / rate)
+    controls = paths.along(wanted.reshape(*known, -1), gone)
+    own = _strides(gait, controls, who)
+    places, tangents = paths.at(gone)
+    return Plan(controls, who, _phases(own, phases, rate), places, tangents - own.drifts, rate)
+
+
+def pose(session: Session, plan: Plan, who: Indices, frames: Indices) -> Poses:
+    """Poses of K pairs of a character (K,) and a frame (K,), where the plan has them."""
+    performers = stride.labels(session, plan.who[who])
+    pair = who, frames
+    own = stride.poses(session, plan.controls[pair], performers, plan.phases[pair])
+    headings = plan.headings[pair]
+    places = plan.places[pair] + own.places * plane.facing(headings)
+    return Poses(plane.turned(own.rotations, headings), own.heights, places)
+
+
+def _strides(gait: Gait, controls: Floats, who: Indices) -> Strides:
+    """Cycles whose fields are (N, F), of controls (N, F, d)."""
+    frames = controls.shape[:2]
+    labels = stride.labels(gait.session, np.repeat(who, frames[1]))
+    own = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
+    return Strides(*(value.reshape(frames) for value in vars(own).values()))
+
+
+def _steps(paces: Numbers, rate: float) -> Numbers:
+    """What is done between frames (N, F - 1) at paces (N, F) a second, by the trapezoidal rule."""
+    return 0.5 * (paces[:, 1:] + paces[:, :-1]) / rate
+
+
+def _summed(steps: Numbers) -> Numbers:
+    return np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
+
+
+def _phases(own: Strides, first: Floats, rate: float) -> Floats:
+    return (first[:, None] + _summed(_steps(1.0 / own.durations, rate))) % 1.0
+
+
+def _gone(speeds: Floats, frames: int, rate: float) -> Floats:
+    """Metres (N, F) gone along ways at whose known places one has speeds (N, K), or to the end."""
+    arrived = _summed(0.5 * STEP * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
+    # One interpolation for all: each row's times come after those of the row before.
+    apart = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
+    ways = np.tile(STEP * np.arange(speeds.shape[1]), len(speeds))
+    when = np.arange(frames) / rate
+    return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
+
+
+def _refuse_short(paths: Paths, gone: Floats, seconds: float) -> None:
+    for index in np.flatnonzero(gone[:, -1] >= paths.lengths)[:1]:
+        raise InvalidField(
+            f"paths/{index}",
+            f"{paths.lengths[index]:.2f} m long, which is walked in less than {seconds:g} s, "
+            "expected a longer way or a shorter time",
+        )

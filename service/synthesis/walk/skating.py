@@ -1,0 +1,49 @@
+"""How fast the feet of walkers slide on the ground, a stride at a time."""
+
+import numpy as np
+
+from service.motion import ground, skeleton
+from service.motion.card import ModelCard
+from service.motion.conventions import Floats
+from service.motion.crowd import Motions
+from service.synthesis.walk import company, march, plane
+from service.synthesis.walk.gait import Gait
+
+
+def of(card: ModelCard, motions: Motions, rate: float) -> Floats:
+    """Mean sliding speed (M, strides), m/s, of motions cut into lengths of a usual stride.
+
+    A stride's own lowest height says where the ground is, as it does for a captured clip: what is
+    left over at the end is not looked at, but for a motion shorter than a stride. The card names
+    feet.
+    """
+    frames = motions.rotations.shape[1]
+    length = min(round(float(np.mean(card.durations)) * rate) + 1, frames)
+    bones, roots, rotations = (
+        part.astype(np.float64)
+        for part in (motions.bone_offsets, motions.root_position, motions.rotations)
+    )
+    local = skeleton.translations(bones, roots)
+    joints, _ = skeleton.forward(card.skeleton.parents, rotations, local)
+    feet = joints[:, : frames // length * length, list(card.feet)]
+    return ground.skate(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
+
+
+def of_strides(gait: Gait, rate: float) -> Floats:
+    """The same (N, 1) of one stride at the controls and performer of each captured clip."""
+    card = gait.session.card
+    controls = np.array(card.examples)
+    length = round(float(np.mean(card.durations)) * rate) + 1
+    who = np.array(card.moved_by or [-1] * len(controls))
+    nowhere = np.zeros(len(controls))
+    origin = plane.of(np.zeros((len(controls), 3)))
+    held = np.repeat(controls[:, None], length, axis=1)
+    plan = march.roam(gait, held, who, nowhere, (origin, nowhere), rate)
+    return of(card, company.motions(gait.session, plan, np.arange(len(controls))), rate)
+
+
+def usual(gait: Gait, rate: float) -> float:
+    """Mean of the model's own strides, m/s, every performer counting alike, as a crowd has them."""
+    speeds = of_strides(gait, rate)[:, 0]
+    moved_by = np.array(gait.session.card.moved_by or [-1] * len(speeds))
+    return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))

@@ -1,0 +1,109 @@
+"""What a model does in one cycle, and its poses apart from where they take place.
+
+A cycle carries its walker along an arc: a way of constant speed and direction in his own axes while
+his heading turns evenly. Poses are given in a frame that goes along that arc evenly in time. In
+that frame a cycle ends in the very pose that it begins with, whichever way it goes, and all that
+sways about the arc is left in the pose.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion.conventions import Floats, Indices, Singles
+from service.synthesis.session import Session
+from service.synthesis.walk import plane
+from service.synthesis.walk.plane import Plane
+
+# Of more, onnxruntime's buffers outgrow the caches and each costs up to eight times as much.
+BATCH = 1000
+# The graph takes a time after the end for the end, s.
+AFTER = 1e9
+
+
+@dataclass(frozen=True)
+class Strides:
+    """One cycle each of B walkers.
+
+    durations (B,), s. ways (B,): covered in a cycle, m, in the walker's own axes. turns (B,):
+    change of heading, rad. starts (B,): where the model puts the root at the beginning.
+    """
+
+    durations: Floats
+    ways: Plane
+    turns: Floats
+    starts: Plane
+
+    @property
+    def speeds(self) -> Floats:
+        """Speed (B,) along the arc, m/s."""
+        return np.abs(self.ways) / self.durations
+
+    @property
+    def turning(self) -> Floats:
+        """Rate of turning (B,) to the left, rad/s."""
+        return self.turns / self.durations
+
+    @property
+    def drifts(self) -> Floats:
+        """Angle (B,) to the left of the heading at which the walker goes, rad."""
+        return np.angle(self.ways)
+
+
+@dataclass(frozen=True)
+class Poses:
+    """K poses in frames that go along: rotations (K, J, 4), heights (K,), m, of the root, and where
+    it is (K,) over the floor."""
+
+    rotations: Floats
+    heights: Floats
+    places: Plane
+
+
+def strides(session: Session, controls: Floats, labels: Floats) -> Strides:
+    """Cycles of controls (B, d) as performers of labels (B, p) walk them."""
+    ends = np.tile([0.0, AFTER], (len(controls), 1))
+    asked = ("duration", "travel", "root_position")
+    durations, travel, roots = _ask(session, controls, ends, labels, *asked)
+    gap, turns = travel[:, 1, 1] + 1j * travel[:, 1, 0], travel[:, 1, 2]
+    return Strides(durations, plane.straightened(gap, turns), turns, plane.of(roots[:, 0]))
+
+
+def poses(session: Session, controls: Floats, labels: Floats, phases: Floats) -> Poses:
+    """Poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, from 0 to 1."""
+    own = strides(session, controls, labels)
+    times = (phases * own.durations)[:, None]
+    rotations, roots = _ask(session, controls, times, labels, "rotations", "root_position")
+    turned = phases * own.turns
+    gone = plane.of(roots[:, 0]) - own.starts - plane.arc(phases * own.ways, turned)
+    return Poses(
+        plane.turned(rotations[:, 0], -turned), roots[:, 0, 1], gone * plane.facing(-turned)
+    )
+
+
+def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
+    """Bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
+    begin = np.zeros((len(controls), 1))
+    return _ask(session, controls, begin, labels, "bone_offsets")[0].astype(np.float32)
+
+
+def labels(session: Session, who: Indices) -> Floats:
+    """Labels (..., p) of performers by their place on the card; all zero at -1, for nobody."""
+    performers = len(session.card.performers)
+    return np.vstack([np.eye(performers), np.zeros(performers)])[who]
+
+
+def _ask(
+    session: Session, controls: Floats, times: Floats, labels: Floats, *outputs: str
+) -> list[Floats]:
+    """Outputs for any number of rows, a batch at a time."""
+    answers = [
+        session.run(controls[rows], times[rows], *outputs, labels=labels[rows])
+        for rows in _batches(len(controls))
+    ]
+    return [np.concatenate(parts).astype(np.float64) for parts in zip(*answers, strict=True)]
+
+
+def _batches(rows: int) -> Iterator[slice]:
+    return (slice(first, first + BATCH) for first in range(0, rows, BATCH))

@@ -1,0 +1,106 @@
+"""Ways that nobody prescribed: each character's own, within what was sampled.
+
+All that is random of a character is one row of a table that is drawn row by row: it hangs on the
+seed and the character's number alone, not on how many others there are or for how long they walk.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion.conventions import Floats, Indices
+from service.synthesis.walk.gait import Gait
+from service.synthesis.walk.paths import STEP, Paths
+from service.synthesis.walk.plane import Plane
+
+# Characters stand this far apart at first, in a grid, each up to so far from its place, m.
+SPACING, JITTER = 2.0, 0.5
+# Turning and speed rise and fall over these lengths of the way, m, with these weights.
+WAVES, WEIGHTS = np.array([23.0, 11.0, 6.1]), np.array([0.5, 0.3, 0.2])
+# The share of the turning sampled at a speed that is used, and how far a speed varies.
+BEND, HASTE = 0.8, 0.15
+# This share of the speeds sampled is left out at either end, where next to no turning was.
+MARGIN = 0.05
+
+
+@dataclass(frozen=True)
+class Cast:
+    """N characters.
+
+    who (N,): their performers by place on the card, -1 where none are told apart. phases (N,): of
+    the cycle, at the beginning. drawn (N, columns): numbers from 0 to 1 for their ways.
+    """
+
+    who: Indices
+    phases: Floats
+    drawn: Floats
+
+
+def cast(gait: Gait, count: int, seed: int) -> Cast:
+    """Characters of a seed."""
+    rng = np.random.Generator(np.random.PCG64(seed))
+    table = rng.random((count, 6 + 2 * len(WAVES)))
+    performers = len(gait.session.card.performers)
+    who = (table[:, 0] * performers).astype(np.int64) if performers else np.full(count, -1)
+    return Cast(who, table[:, 1], table[:, 2:])
+
+
+def paths(gait: Gait, characters: Cast, seconds: float) -> Paths:
+    """Ways on which characters wander for a time, long enough for the fastest."""
+    spot, (heading, pace) = characters.drawn[:, :2], characters.drawn[:, 2:4].T
+    waves = 2.0 * np.pi * characters.drawn[:, 4:].reshape(len(spot), 2, len(WAVES))
+    places = int(np.ceil(gait.region.speeds[1] * seconds / STEP)) + 3
+    along = np.linspace(0.0, (places - 1) * STEP, places)
+    usual = _usual(gait, characters.who, pace)
+    speeds = _speeds(gait, usual, _wave(along, waves[:, 0]))
+    bends = _bends(gait, speeds, _wave(along, waves[:, 1]))
+    # The trapezoidal rule: the bend of a step is the mean of those at its ends.
+    turns = np.cumsum(0.5 * STEP * (bends[:, 1:] + bends[:, :-1]), axis=1)
+    headings = 2.0 * np.pi * heading[:, None] + np.pad(turns, ((0, 0), (1, 0)))
+    return Paths(_starts(spot), headings, speeds, np.full(len(spot), along[-1]))
+
+
+def _starts(spot: Floats) -> Plane:
+    """Starts (N,), m: a grid whose places are numbered in growing squares, so that a character's
+    does not hang on how many follow."""
+    number = np.arange(len(spot))
+    ring = np.sqrt(number).astype(np.int64)
+    on = number - ring**2
+    across, ahead = np.minimum(on, ring), np.minimum(2 * ring - on, ring)
+    moved = JITTER * (2.0 * spot - 1.0)
+    return (SPACING * ahead + moved[:, 0]) + 1j * (SPACING * across + moved[:, 1])
+
+
+def _wave(along: Floats, phases: Floats) -> Floats:
+    """Values (N, K) from -1 to 1 that rise and fall along (K,) m."""
+    angles = 2.0 * np.pi * along[:, None] / WAVES + phases[:, None]
+    return np.sin(angles) @ WEIGHTS
+
+
+def _usual(gait: Gait, who: Indices, drawn: Floats) -> Floats:
+    """Speeds (N, 1) of captured clips, each of the character's own performer."""
+    moved_by = np.array(gait.session.card.moved_by or [-1] * len(gait.rates))
+    order = np.argsort(moved_by, kind="stable")
+    first, after = (np.searchsorted(moved_by[order], who, side) for side in ("left", "right"))
+    clips = order[first + (drawn * (after - first)).astype(np.int64)]
+    return gait.rates[clips, :1]
+
+
+def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
+    """Speeds (N, K) that vary about the usual ones (N, 1)."""
+    ends = np.array(gait.region.speeds)
+    low, high = ends + MARGIN * (ends[::-1] - ends)
+    middle = np.clip(usual, low, high)
+    slower = np.maximum((1.0 - HASTE) * middle, low)
+    faster = np.minimum((1.0 + HASTE) * middle, high)
+    return _swung(wave, slower, middle, faster)
+
+
+def _bends(gait: Gait, speeds: Floats, wave: Floats) -> Floats:
+    """Curvatures (N, K), 1/m: straight at rest of the wave."""
+    low, high = gait.region.turning(speeds)
+    return _swung(BEND * wave, low, np.zeros(1), high) / speeds
+
+
+def _swung(wave: Floats, low: Floats, middle: Floats, high: Floats) -> Floats:
+    return middle + np.where(wave < 0.0, middle - low, high - middle) * wave

@@ -1,0 +1,102 @@
+"""Crowds of walkers: the same from the same seed, in their own frames, made some at a time."""
+
+import re
+
+import numpy as np
+import pytest
+
+from service.motion import quat
+from service.motion.errors import InvalidField
+from service.synthesis import session
+from service.synthesis.walk import company, gait, march, plane
+
+RATE = 30.0
+
+
+@pytest.fixture(scope="module")
+def own(walk_path):
+    return gait.of(session.load(walk_path))
+
+
+def made(own, count, seed=3, seconds=1.0):
+    """A crowd that wanders, and its motions."""
+    crowd = company.crowd(own.session, company.wandering(own, count, seconds, RATE, seed))
+    return crowd, list(crowd.batches)
+
+
+def joined(motions, part):
+    return np.concatenate([getattr(one, part) for one in motions])
+
+
+PARTS = ("rotations", "root_position", "bone_offsets", "levels")
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_others(own):
+    once, again, other = (made(own, 6, seed)[1] for seed in (3, 3, 4))
+    for part in PARTS:
+        assert np.array_equal(joined(once, part), joined(again, part))
+    assert not np.array_equal(joined(once, "rotations"), joined(other, "rotations"))
+
+
+def test_fewer_characters_are_the_first_of_more(own):
+    few, many = made(own, 5), made(own, 10)
+    assert np.array_equal(few[0].placement.positions, many[0].placement.positions[:5])
+    for part in PARTS:
+        # The runtime's sums may go in another order in a batch of another size.
+        gap = np.abs(joined(few[1], part) - joined(many[1], part)[:5])
+        assert gap.max() < 2e-6
+    assert few[0].facts["performers"] == many[0].facts["performers"][:5]
+
+
+def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
+    plan = company.wandering(own, 4, 2.0, RATE, 0)
+    crowd = company.crowd(own.session, plan)
+    motions = next(iter(crowd.batches))
+    at_home = motions.root_position[:, 0] * [1.0, 0.0, 1.0]
+    # A pelvis sways about the way, no farther.
+    assert np.abs(at_home).max() < 0.1
+    who, frames = np.repeat(np.arange(4), 61), np.tile(np.arange(61), 4)
+    posed = march.pose(own.session, plan, who, frames)
+    turns = crowd.placement.turns[:, None]
+    roots = quat.rotate(turns, motions.root_position) + crowd.placement.positions[:, None]
+    expected = plane.at_height(posed.places, posed.heights).reshape(4, 61, 3)
+    assert np.abs(roots - expected).max() < 1e-5
+    turned = quat.mul(turns, motions.rotations[:, :, 0]).reshape(-1, 4)
+    assert np.abs(turned - posed.rotations[:, 0]).max() < 1e-5
+    assert (
+        np.abs(posed.rotations[:, 1:] - motions.rotations[:, :, 1:].reshape(-1, 6, 4)).max() < 1e-6
+    )
+
+
+def test_motions_are_made_some_at_a_time(own):
+    crowd, motions = made(own, company.TOGETHER + 3, seconds=0.1)
+    assert [len(some) for some in motions] == [company.TOGETHER, 3]
+    assert not crowd.shared
+    assert crowd.frames == 4
+    assert motions[0].rotations.dtype == np.float32
+    assert motions[1].levels.shape == (3, 4)
+    assert np.linalg.norm(motions[0].rotations, axis=-1) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_phases_and_walkers_differ(own):
+    plan = company.wandering(own, 100, 1.0, RATE, 0)
+    assert np.ptp(plan.phases[:, 0]) > 0.9
+    assert sorted(set(plan.who)) == [0, 1]
+    assert plan.roots.shape == (100, 31, 3)
+    assert not plan.roots[..., 1].any()
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ((0, 1.0, RATE, 0), "count: 0, expected at least 1"),
+        ((5, 0.0, RATE, 0), "seconds: 0, expected a time above 0"),
+        ((5, np.inf, RATE, 0), "seconds: inf, expected"),
+        ((5, 1.0, 0.0, 0), "fps: 0, expected 1 to 1000"),
+        ((5, 1.0, RATE, -1), "seed: -1, expected at least 0"),
+        ((10**6, 10.0, RATE, 0), "count: 1000000 characters of 301 frames, expected 50000000"),
+    ],
+)
+def test_numbers_that_make_no_crowd_are_refused(own, asked, said):
+    with pytest.raises(InvalidField, match=re.escape(said)):
+        company.wandering(own, *asked)

@@ -1,0 +1,101 @@
+"""What a model can walk is asked of the model, and what is wanted of it is done."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import walker
+
+from service.motion.errors import InvalidField
+from service.synthesis import session
+from service.synthesis.walk import gait, region, stride
+
+NOBODY = -1
+
+
+@pytest.fixture(scope="module")
+def opened(walk_path):
+    return session.load(walk_path)
+
+
+@pytest.fixture(scope="module")
+def own(opened):
+    return gait.of(opened)
+
+
+def test_speeds_and_turning_are_those_of_the_clips(own, strides):
+    # The controls say km/h and thousandths of a radian a stride: the model says m/s and rad/s.
+    haste, veer = np.array([example.controls for example in strides]).T
+    durations = np.array([example.clip.duration for example in strides])
+    assert np.abs(own.rates[:, 0] - haste / 3.6).max() < 0.01
+    assert np.abs(own.rates[:, 1] - veer / 1000.0 / durations).max() < 0.01
+
+
+def test_the_model_does_what_was_wanted_whoever_walks(own, opened, rng):
+    speeds = rng.uniform(0.8, 1.4, 300)
+    turning = rng.uniform(-0.4, 0.4, 300)
+    who = rng.integers(-1, 2, 300)
+    labels = stride.labels(opened, who)
+    done = stride.strides(opened, own.controls(speeds, turning, who), labels)
+    assert np.abs(done.speeds - speeds).max() < 2e-3
+    assert np.abs(done.turning - turning).max() < 2e-3
+    # Negative control: the regression alone is not that near.
+    usual = stride.strides(opened, own.typical(speeds, turning, who), labels)
+    assert np.abs(usual.turning - turning).max() > 0.01
+
+
+def test_what_speed_and_turning_leave_open_is_typical(rng):
+    rates = rng.uniform([0.8, -0.3], [1.5, 0.3], (40, 2))
+    line = np.array([[0.5], [0.6], [0.0]])
+    loose = np.column_stack([np.ones(40), rates]) @ line
+    who = np.repeat([0, 1], 20)
+    manners = gait._manners(loose - loose + np.where(who[:, None], 0.1, -0.1), who, 3)
+    # As one clip more at the usual would have it: 20 of 21.
+    assert manners[:, 0] == pytest.approx([-0.1 * 20 / 21, 0.1 * 20 / 21, 0.0, 0.0])
+
+
+def test_a_cycle_of_all_that_was_sampled_is_within_and_twice_that_is_not(own):
+    assert own.region.holds(*own.rates.T).all()
+    assert own.region.holds(np.array([0.71, 1.1, 1.49]), np.zeros(3)).all()
+    assert not own.region.holds(own.rates[:, 0], 2.0 * own.rates[:, 1])[[0, 3, 16, 19]].any()
+    low, high = own.region.turning(np.array([1.0, 1.4]))
+    assert own.region.holds(np.array([1.0, 1.4]), high).all()
+    assert not own.region.holds(np.array([1.0, 1.4]), low - 0.01).any()
+
+
+def test_the_hull_of_a_square_is_the_square(rng):
+    corners = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
+    inner = rng.uniform([1.0, -1.0], [2.0, 1.0], (50, 2))
+    found = region.hull(np.vstack([inner, corners]))
+    assert len(found.limits) == 4
+    assert found.speeds == (1.0, 2.0)
+    low, high = found.turning(np.array([1.0, 1.3, 2.0]))
+    assert low == pytest.approx(-1.0)
+    assert high == pytest.approx(1.0)
+
+
+def test_a_model_that_is_no_cycle_does_not_walk(model_path):
+    with pytest.raises(InvalidField, match="model: reaching is no cycle"):
+        gait.of(session.load(model_path))
+
+
+def test_a_model_that_stays_in_place_does_not_walk(opened):
+    still = replace(opened, card=replace(opened.card, root="in_place"))
+    with pytest.raises(InvalidField, match="model: stroll stays in place"):
+        gait.of(still)
+
+
+def test_a_model_of_one_speed_does_not_walk(opened):
+    once = replace(opened.card, examples=opened.card.examples[:2], moved_by=(0, 0))
+    with pytest.raises(InvalidField, match=r"model: stroll goes 0\.\d+ to 0\.\d+ m/s, expected"):
+        gait.of(replace(opened, card=once))
+
+
+def test_nobody_in_particular_walks_too(opened):
+    assert stride.labels(opened, np.array([0, 1, NOBODY])).tolist() == [[1, 0], [0, 1], [0, 0]]
+    assert opened.card.performers == ("ann", "ben")
+    assert [opened.card.skeleton.names[joint] for joint in opened.card.feet] == [
+        "LeftFoot",
+        "RightFoot",
+    ]
+    assert walker.SKELETON.same_tree(opened.card.skeleton)

@@ -1,0 +1,180 @@
+"""Walkers over time: what the model makes of controls, without a jump, on their ways."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.motion import ground, skeleton
+from service.motion.errors import InvalidField
+from service.synthesis import session
+from service.synthesis.walk import company, gait, given, march, plane, skating, stride, wander
+from service.synthesis.walk.given import Route
+
+# float32 of places some metres away, and of phases after some strides.
+SINGLE = 2e-5
+RATE = 30.0
+ANN = np.zeros(1, dtype=np.int64)
+
+
+@pytest.fixture(scope="module")
+def own(walk_path):
+    return gait.of(session.load(walk_path))
+
+
+def held(own, veer, frames, rate, phase=0.0):
+    """Plan of Ann who walks at one speed and turns evenly, from the origin."""
+    controls = np.tile([4.0, veer], (1, frames, 1))
+    origin = np.zeros(1, dtype=np.complex128), np.zeros(1)
+    return march.roam(own, controls, ANN, np.array([phase]), origin, rate)
+
+
+def joints(own, plan):
+    """Places of all joints (N, F, J, 3), m."""
+    made = company.motions(own.session, plan, np.arange(len(plan.who)))
+    local = skeleton.translations(
+        made.bone_offsets.astype(np.float64), made.root_position.astype(np.float64)
+    )
+    parents = own.session.card.skeleton.parents
+    return skeleton.forward(parents, made.rotations.astype(np.float64), local)[0]
+
+
+def clip_joints(own, veer, phases):
+    """The same (F, J, 3) of the model's own clip, its root's first place on the origin."""
+    controls, labels = np.array([[4.0, veer]]), stride.labels(own.session, ANN)
+    duration = stride.strides(own.session, controls, labels).durations[0]
+    asked = ("rotations", "root_position", "bone_offsets")
+    times = np.array([[0.0, *(phases * duration)]])
+    rotations, roots, bones = own.session.run(controls, times, *asked, labels=labels)
+    roots = roots[0] - roots[0, :1] * [1.0, 0.0, 1.0]
+    local = skeleton.translations(bones[0].astype(float), roots[1:])
+    parents = own.session.card.skeleton.parents
+    return skeleton.forward(parents, rotations[0, 1:].astype(float), local)[0]
+
+
+def rate_of(own, veer, frames):
+    """The rate, 1/s, at which a cycle has so many frames."""
+    labels = stride.labels(own.session, ANN)
+    return frames / stride.strides(own.session, np.array([[4.0, veer]]), labels).durations[0]
+
+
+@pytest.mark.parametrize("veer", [0.0, 450.0])
+def test_held_controls_are_the_models_own_clip_again_and_again(own, veer):
+    rate = rate_of(own, veer, 40)
+    plan = held(own, veer, 121, rate)
+    made = joints(own, plan)[0]
+    clip = clip_joints(own, veer, np.arange(41) / 40)
+    assert np.abs(made[:40] - clip[:40]).max() < SINGLE
+    # A cycle ends where the next begins, in the same pose.
+    assert np.abs(made[40] - clip[40]).max() < SINGLE
+    first = plane.facing(plan.headings[0, 80]) * plane.of(clip[:40]) + plan.places[0, 80]
+    assert np.abs(plane.of(made[80:120]) - first).max() < SINGLE
+    # Negative control: another phase is another clip.
+    other = joints(own, held(own, veer, 41, rate, phase=0.3))[0]
+    assert np.abs(other[:40] - clip[:40]).max() > 0.1
+
+
+def test_an_even_turn_comes_back_to_where_it_began(own):
+    labels = stride.labels(own.session, ANN)
+    found = stride.strides(own.session, np.array([[4.0, 450.0]]), labels)
+    cycles = 2.0 * np.pi / found.turns[0]
+    frames = 600
+    plan = held(own, 450.0, frames + 1, frames / (cycles * found.durations[0]))
+    radius = np.abs(found.ways[0]) / found.turns[0]
+    assert abs(plan.places[0, -1] - plan.places[0, 0]) < 1e-9
+    across = np.abs(plan.places[0][: frames // 2] - plan.places[0][frames // 2 : -1])
+    assert across == pytest.approx(2.0 * radius, rel=1e-9)
+    # Negative control: a twentieth less of a turn is no circle.
+    short = held(own, 450.0, frames + 1, frames / (0.95 * cycles * found.durations[0]))
+    assert abs(short.places[0, -1]) > 0.2 * radius
+
+
+def swaying(own, frames):
+    """Plan of Ann whose speed and turning change from end to end of what was sampled."""
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, 4 * np.pi, frames))
+    controls = np.stack([3.0 + 2.0 * share, -400.0 + 800.0 * share], axis=-1)[None]
+    origin = np.zeros(1, dtype=np.complex128), np.zeros(1)
+    return march.roam(own, controls, ANN, np.zeros(1), origin, RATE)
+
+
+def leap(own, plan):
+    """The farthest that a joint goes between two frames, m."""
+    return float(np.linalg.norm(np.diff(joints(own, plan), axis=1), axis=-1).max())
+
+
+def test_nothing_leaps_while_controls_change(own):
+    plan = swaying(own, 300)
+    fastest = march.roam(
+        own,
+        np.tile([5.0, 400.0], (1, 300, 1)),
+        ANN,
+        np.zeros(1),
+        (np.zeros(1, dtype=np.complex128), np.zeros(1)),
+        RATE,
+    )
+    assert leap(own, plan) < 1.1 * leap(own, fastest)
+    # Negative control: a phase that begins again with every change of controls pops.
+    again = np.concatenate([plan.phases[:, :150], plan.phases[:, :150]], axis=1)
+    assert leap(own, replace(plan, phases=again)) > 1.5 * leap(own, fastest)
+
+
+def wandering(own, count, seconds=6.0, seed=3):
+    return company.wandering(own, count, seconds, RATE, seed)
+
+
+def test_who_walks_keeps_to_the_way(own):
+    characters = wander.cast(own, 20, 3)
+    ways = wander.paths(own, characters, 6.0)
+    frames = 181
+    plan = march.follow(own, ways, characters.who, characters.phases, frames, RATE)
+    starts = plan.places[:, 0], plan.headings[:, 0]
+    free = march.roam(own, plan.controls, plan.who, plan.phases[:, 0], starts, RATE)
+    # Left to itself the model goes the same way: median 2 cm away after six seconds, 11 at most.
+    assert np.median(np.abs(free.places - plan.places)[:, -1]) < 0.03
+    assert np.abs(free.places - plan.places).max() < 0.15
+    assert np.abs(free.headings - plan.headings).max() < 0.05
+    straight = plan.places[:, :1] + plane.facing(plan.headings[:, :1]) * np.linspace(0, 6, frames)
+    assert np.abs(plan.places - straight).max() > 0.5
+
+
+def test_feet_slide_no_more_than_in_the_models_own_strides(own):
+    plan = wandering(own, 60)
+    made = company.motions(own.session, plan, np.arange(60))
+    found = skating.of(own.session.card, made, RATE).mean()
+    strides = skating.usual(own, RATE)
+    each = skating.of_strides(own, RATE)[:, 0]
+    who = np.array(own.session.card.moved_by)
+    assert strides == pytest.approx(0.5 * (each[who == 0].mean() + each[who == 1].mean()))
+    assert 0.0 < found < 1.2 * strides < 0.05
+    # Negative control: a root that goes on a tenth too fast.
+    fast = replace(plan, places=plan.places + 0.1 * (plan.places - plan.places[:, :1]))
+    slid = company.motions(own.session, fast, np.arange(60))
+    assert skating.of(own.session.card, slid, RATE).mean() > 2.0 * strides
+
+
+def test_the_measure_is_that_of_the_evaluation(own, strides):
+    plan = held(own, 200.0, 34, RATE)
+    made = company.motions(own.session, plan, np.arange(1))
+    feet = joints(own, plan)[0][:, list(own.session.card.feet)]
+    length = round(float(np.mean(own.session.card.durations)) * RATE) + 1
+    assert skating.of(own.session.card, made, RATE)[0, 0] == pytest.approx(
+        float(ground.skate(feet[:length], RATE))
+    )
+    clips = [ground.skate(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides]
+    assert np.max(clips) < 1e-5
+
+
+def test_a_straight_route_is_walked_at_its_speed(own):
+    route = Route(np.array([[2.0, 1.0], [2.0, 9.0]]), 1.2)
+    ways = given.through(own, [route])
+    plan = march.follow(own, ways, ANN, np.zeros(1), 121, RATE)
+    gone = plan.places[0, -1] - plan.places[0, 0]
+    assert gone.real == pytest.approx(1.2 * 4.0, rel=2e-3)
+    assert abs(gone.imag) < 1e-9
+    assert plan.places[0, 0] == 1.0 + 2.0j
+
+
+def test_a_way_that_ends_too_soon_is_refused(own):
+    ways = given.through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
+    with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
+        march.follow(own, ways, ANN, np.zeros(1), 121, RATE)

@@ -1,0 +1,87 @@
+"""`posefield crowd`: what it writes and says, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from service import cli, crowds
+from service.motion.errors import FileError, InvalidField, MotionError
+
+
+def run(*words):
+    return CliRunner().invoke(cli.app, ["crowd", *map(str, words)])
+
+
+def test_a_crowd_is_written_and_its_feet_are_told_of(walk_path, tmp_path):
+    path = tmp_path / "crowd.npz"
+    done = run(walk_path, "--count", 7, "--seconds", 2, "--seed", 1, "-o", path)
+    assert done.exit_code == 0, done.output
+    assert "7 characters, 61 frames at 30 a second, seed 1" in done.stdout
+    assert "feet on the ground slide at" in done.stdout
+    with np.load(path) as crowd:
+        assert crowd["rotations"].shape == (7, 61, 7, 4)
+        assert crowd["root_position"].shape == (7, 61, 3)
+        assert crowd["bone_offsets"].shape == (7, 7, 3)
+        assert crowd["rate"] == 30.0
+        assert crowd["joints"][0] == "Hips"
+        # In the world: nobody stands in another's place, and everybody gets on.
+        floor = crowd["root_position"][..., [0, 2]]
+        assert np.linalg.norm(floor[:, -1] - floor[:, 0], axis=-1).min() > 1.0
+        apart = np.linalg.norm(floor[:, None, 0] - floor[:, 0], axis=-1) + 9.0 * np.eye(7)
+        assert apart.min() > 0.8
+
+
+def test_the_same_seed_writes_the_same_bytes(walk_path, tmp_path):
+    paths = [tmp_path / name for name in ("a.npz", "b.npz", "c.npz")]
+    for path, seed in zip(paths, (1, 1, 2), strict=True):
+        run(walk_path, "--count", 3, "--seconds", 1, "--seed", seed, "-o", path)
+    first, again, other = (path.read_bytes() for path in paths)
+    assert first == again != other
+
+
+def test_routes_are_followed(walk_path, tmp_path):
+    routes = tmp_path / "routes.json"
+    plain = [
+        {"waypoints": [[0, 0], [0, 4]], "speed": 1.0},
+        {"waypoints": [[3, 4], [3, 0]], "speed": 1.2},
+    ]
+    routes.write_text(json.dumps(plain))
+    path = tmp_path / "crowd.npz"
+    done = run(walk_path, "--paths", routes, "--seconds", 2, "-o", path, "--json")
+    facts = json.loads(done.stdout)
+    assert (facts["characters"], facts["frames"]) == (2, 61)
+    assert 0.0 < facts["skate_cm_per_s"] < 1.3 * facts["skate_strides_cm_per_s"]
+    with np.load(path) as crowd:
+        gone = crowd["root_position"][:, -1] - crowd["root_position"][:, 0]
+    assert gone[:, 2] == pytest.approx([2.0, -2.4], abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "said"),
+    [
+        (("-o", "crowd.usd"), InvalidField, "output: 'crowd.usd', expected a name that ends in"),
+        (("-o", "c.npz", "--count", 0), InvalidField, "count: 0, expected"),
+        (("-o", "c.npz", "--paths", "none.json"), FileError, "none.json: cannot be read"),
+        (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(walk_path, words, kind, said):
+    done = run(walk_path, *words)
+    assert isinstance(done.exception, kind)
+    assert said in str(done.exception)
+
+
+def test_a_file_that_is_no_json_is_named(walk_path, tmp_path):
+    path = tmp_path / "routes.json"
+    path.write_text("[")
+    order = crowds.Order(None, path, 1.0, 30.0, 0)
+    with pytest.raises(MotionError, match=r"routes\.json: not JSON"):
+        crowds.write(walk_path, order, tmp_path / "c.npz")
+
+
+def test_a_model_that_does_not_walk_is_refused(model_path, tmp_path):
+    done = run(model_path, "-o", tmp_path / "c.npz")
+    assert isinstance(done.exception, InvalidField)
+    assert not (tmp_path / "c.npz").exists()
