@@ -10,7 +10,7 @@ import onnxruntime
 
 from service.motion import card as cards
 from service.motion.card import ModelCard
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles
 from service.motion.errors import ModelError
 from service.synthesis import freeze
 
@@ -39,10 +39,10 @@ class Session:
 
     def run(
         self,
-        controls: Floats,
-        time: Floats,
+        controls: Floats | Singles,
+        time: Floats | Singles,
         *outputs: str,
-        labels: Floats | None = None,
+        labels: Floats | Singles | None = None,
         level: int = 0,
     ) -> list[Any]:
         """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for.
@@ -51,11 +51,11 @@ class Session:
         level: of the card's levels of detail.
         """
         feed = {
-            "controls": controls.astype(np.float32),
-            "time": time.astype(np.float32),
+            "controls": controls.astype(np.float32, copy=False),
+            "time": time.astype(np.float32, copy=False),
         }
         if labels is not None and self.card.performers:
-            feed[PERFORMER] = labels.astype(np.float32)
+            feed[PERFORMER] = labels.astype(np.float32, copy=False)
         answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
         return answers
 

@@ -3,16 +3,20 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
+from service.motion import skeleton
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
 from service.motion.card import Control
 from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
+from service.synthesis import pace
 from service.synthesis.session import Session
+from service.synthesis.view import Ladder
 
 Policy = Literal["warn", "refuse"]
 """What to do with controls outside what was sampled."""
@@ -48,6 +52,29 @@ class Synthesizer:
     def identity(self) -> str:
         """name@contenthash: what an answer under this name will always be."""
         return f"{self.name}@{self.session.digest}"
+
+    @cached_property
+    def ladder(self) -> Ladder:
+        """What each level of detail errs and costs, for a view to choose by.
+
+        An error is the one that a joint in a hundred exceeds; costs are measured when first asked.
+        """
+        errors = np.array([level.p99 for level in self.session.card.levels])
+        return Ladder(errors, np.array(pace.seconds_per_pose(self.session)))
+
+    @property
+    def middle(self) -> Floats:
+        """Where the root is at rest (3,), m."""
+        return self.session.card.skeleton.offsets[0]
+
+    @property
+    def radius(self) -> float:
+        """Of a sphere about the root that holds the body at rest, m."""
+        joints = self.session.card.skeleton
+        from_root = np.concatenate([np.zeros((1, 3)), joints.offsets[1:]])
+        still = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(joints), 4))
+        positions, _ = skeleton.forward(joints.parents, still, from_root)
+        return float(np.linalg.norm(positions, axis=-1).max())
 
     def pose(
         self,

@@ -1,0 +1,211 @@
+"""One pose of each of many characters, in a few large calls of the graph for each level of detail.
+
+Nothing here goes from character to character: what is wrong with one of them is found in whole
+columns, and named by its index.
+"""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion.card import Control, ModelCard
+from service.motion.conventions import Floats, Indices, Singles
+from service.motion.crowd import CrowdPoses, Placement
+from service.motion.errors import InvalidField, OutsideSamples
+from service.synthesis import crowd_question, view
+from service.synthesis.crowd_question import CrowdQuestion, Truths
+from service.synthesis.synthesizer import FARTHEST, Synthesizer
+from service.synthesis.view import View
+
+# Poses of a call: more would not stay in a core's cache between one operator and the next.
+BATCH = 512
+# Of a clip's duration: what float32 makes of a time that was read from an answer.
+SLACK = 1e-5
+
+# onnxruntime and NumPy let go of the interpreter while they work.
+_WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
+
+
+@dataclass(frozen=True)
+class _Block:
+    """What the graph answers for N characters, in their own frames, row by row."""
+
+    rotations: Singles
+    root_position: Singles
+    bone_offsets: Singles
+    duration: Singles
+    sigma: Singles
+    travel: Singles
+
+
+def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
+    """Poses of a crowd where its characters stand.
+
+    With a view, distances are those to where the characters were placed. Raises InvalidField and
+    OutsideSamples, with the index of the first character at fault, as `Synthesizer.pose` does for
+    one.
+    """
+    card = model.session.card
+    controls, said = _controls(card, question)
+    labels = crowd_question.labels(question, card.performers)
+    crowd_question.check_levels(question, len(card.levels))
+    early = question.times < 0.0
+    _refuse("time", question.times, early, "s, expected 0 s or later")
+    levels, error_px, sentences = _levels(model, question)
+    block = _answers(model, question, controls.astype(np.float32), labels, levels)
+    _check_durations(card, block.duration)
+    late = question.times > block.duration * (1.0 + SLACK)
+    _refuse("time", question.times, late, "s, later than the end of the clip")
+    if question.root == "in_place":
+        _stay(block)
+    _place(block, question.placement)
+    return CrowdPoses(
+        model.identity,
+        card.skeleton,
+        block.rotations,
+        block.root_position,
+        block.bone_offsets,
+        levels,
+        error_px,
+        block.duration,
+        block.sigma,
+        (*said, *sentences),
+    )
+
+
+def _controls(card: ModelCard, question: CrowdQuestion) -> tuple[Floats, tuple[str, ...]]:
+    """Controls (N, d) in the card's order, and a sentence for each that some go beyond."""
+    for name in question.controls:
+        if card.control(name) is None:
+            known = ", ".join(c.name for c in card.controls)
+            raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+    columns = [_column(control, question) for control in card.controls]
+    pairs = zip(card.controls, columns, strict=True)
+    said = tuple(filter(None, (_outside(control, column) for control, column in pairs)))
+    if said and question.extrapolate == "refuse":
+        raise OutsideSamples("controls", "; ".join(said))
+    return np.stack(columns, axis=1), said
+
+
+def _column(control: Control, question: CrowdQuestion) -> Floats:
+    field = f"controls/{control.name}"
+    low, high = control.minimum, control.maximum
+    if control.name not in question.controls:
+        raise InvalidField(
+            field,
+            f"missing; give numbers in {control.unit}, sampled from {low:g} to {high:g}",
+        )
+    values = question.controls[control.name]
+    # Where float32 would overflow there is no answer to give.
+    reach = 100.0 * (high - low)
+    far = (values < low - reach) | (values > high + reach)
+    expected = f"{control.unit}, expected {low - reach:g} to {high + reach:g} {control.unit}"
+    _refuse(field, values, far, expected)
+    return values
+
+
+def _outside(control: Control, values: Floats) -> str | None:
+    slack = 1e-6 * (control.maximum - control.minimum)
+    beyond = (values < control.minimum - slack) | (values > control.maximum + slack)
+    if not beyond.any():
+        return None
+    first = int(np.argmax(beyond))
+    return (
+        f"{control.name} of {np.count_nonzero(beyond)} characters lies outside what was sampled, "
+        f"{control.minimum:g} to {control.maximum:g} {control.unit}; "
+        f"the first is character {first}, {values[first]:g} {control.unit}"
+    )
+
+
+def _refuse(field: str, values: Floats, bad: Truths, expected: str) -> None:
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise InvalidField(field, f"{values[first]:g} {expected}", first)
+
+
+def _check_durations(card: ModelCard, durations: Singles) -> None:
+    """Refuse controls so far outside that extrapolation has lost all sense."""
+    low, high = card.durations
+    senseless = ~((durations >= low / FARTHEST) & (durations <= high * FARTHEST))
+    if senseless.any():
+        first = int(np.argmax(senseless))
+        raise OutsideSamples(
+            "controls",
+            f"so far outside what was sampled that the clip would last {durations[first]:.3g} s; "
+            f"captured clips last {low:.3g} to {high:.3g} s",
+            first,
+        )
+
+
+def _levels(
+    model: Synthesizer, question: CrowdQuestion
+) -> tuple[Indices, Singles | None, tuple[str, ...]]:
+    """Levels (N,), the pixels (N,) that their errors cover, and what is to be said of them."""
+    if not isinstance(question.detail, View):
+        return question.detail, None, ()
+    ladder, asked = model.ladder, question.detail
+    middle = question.placement.positions + model.middle
+    scale = view.pixels_per_metre(asked.camera, middle, model.radius)
+    choice = view.see(ladder, scale, asked)
+    shown = view.error_pixels(ladder.errors, scale, choice.levels)
+    return choice.levels, shown, view.warnings(choice, ladder, asked)
+
+
+def _answers(
+    model: Synthesizer, question: CrowdQuestion, controls: Singles, labels: Singles, levels: Indices
+) -> _Block:
+    count, joints = len(question), len(model.session.card.skeleton)
+    shapes = ((joints, 4), (3,), (joints, 3), (), (), (3,))
+    block = _Block(*(np.empty((count, *shape), np.float32) for shape in shapes))
+    times = question.times.astype(np.float32)[:, None]
+
+    def fill(part: tuple[int, Indices | slice]) -> None:
+        level, rows = part
+        asked = controls[rows], times[rows]
+        answers = model.session.run(*asked, *vars(block), labels=labels[rows], level=level)
+        for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
+            whole[rows] = answer[:, 0] if name in _TIMED else answer
+
+    # Taking the results lets errors out.
+    list(_WORKERS.map(fill, _parts(levels)))
+    return block
+
+
+_TIMED = ("rotations", "root_position", "travel")
+
+
+def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
+    """A level and rows of it, for every call: rows that follow one another as a slice."""
+    for level in np.unique(levels).tolist():
+        rows = np.flatnonzero(levels == level)
+        for first in range(0, len(rows), BATCH):
+            part = rows[first : first + BATCH]
+            together = part[-1] - part[0] + 1 == len(part)
+            yield level, slice(part[0], part[-1] + 1) if together else part
+
+
+def _stay(block: _Block) -> None:
+    """Take out of the poses, in place, how far each cycle has got."""
+    block.root_position[:, [0, 2]] -= block.travel[:, :2]
+    _turn(block, -block.travel[:, 2])
+
+
+def _place(block: _Block, placement: Placement) -> None:
+    """Put the poses, in place, where the characters stand."""
+    _turn(block, placement.headings.astype(np.float32))
+    np.add(block.root_position, placement.positions, out=block.root_position, casting="same_kind")
+
+
+def _turn(block: _Block, angles: Singles) -> None:
+    """Turn roots and their paths, in place, about the vertical through each origin."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    x, z = block.root_position[:, 0].copy(), block.root_position[:, 2].copy()
+    block.root_position[:, 0], block.root_position[:, 2] = cos * x + sin * z, cos * z - sin * x
+    cos, sin = np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None]
+    root = block.rotations[:, 0]
+    # The product of (cos, 0, sin, 0) with w x y z.
+    across = np.stack([-root[:, 2], root[:, 3], root[:, 0], -root[:, 1]], axis=1)
+    block.rotations[:, 0] = cos * root + sin * across
