@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from pxr import Gf, Vt
 
-from service.encode import body, names, specs
+from service.encode import body, bounds, names, specs
 from service.encode.body import Body, Bones
 from service.encode.specs import Type
 from service.motion.conventions import Floats
@@ -25,6 +26,12 @@ class Rig:
     bones: Bones
     body: Body
 
+    @property
+    def box(self) -> Floats:
+        """Lowest and highest corner (2, 3) of joints and body at rest, m."""
+        places = np.concatenate([self.rest, self.body.points])
+        return bounds.outwards(places.min(axis=0), places.max(axis=0), bounds.SLACK)
+
 
 def rig(skeleton: Skeleton, offsets: Floats) -> Rig:
     """Rig of a skeleton whose joints rest at offsets (J, 3) from their parents, m."""
@@ -40,21 +47,28 @@ def rig(skeleton: Skeleton, offsets: Floats) -> Rig:
     )
 
 
-def root(parent: Any, name: str, rig: Rig, extent: Any) -> tuple[Any, Any]:
-    """New SkelRoot with a skeleton and a body that are bound to each other; root and skeleton.
+def root(parent: Any, name: str, rig: Rig, box: Floats) -> Any:
+    """New SkelRoot with a skeleton and a body that are bound to each other.
 
-    extent: float3[] of the lowest and highest corner of all that the body does.
+    box: lowest and highest corner (2, 3) of all that the body does, m.
     """
+    extent = specs.vectors(box)
     made = specs.prim(parent, name, "SkelRoot", BINDING)
     made.kind = "component"
     specs.attribute(made, "extent", Type.Float3Array, extent)
     skeleton = specs.prim(made, "Skel", "Skeleton", BINDING)
     mesh = specs.prim(made, "Body", "Mesh", BINDING)
     for bound in (made, mesh):
-        specs.relation(bound, "skel:skeleton", skeleton)
+        specs.relation(bound, "skel:skeleton", skeleton.path)
     _skeleton(skeleton, rig)
     _mesh(mesh, rig.body, extent)
-    return made, skeleton
+    return made
+
+
+def bind(root: Any, animation: Any) -> None:
+    """Let the skeleton of a SkelRoot move as a SkelAnimation does."""
+    skeleton = root.layer.GetPrimAtPath(root.path.AppendChild("Skel"))
+    specs.relation(skeleton, "skel:animationSource", animation.path)
 
 
 def animation(parent: Any, name: str, paths: tuple[str, ...]) -> Any:

@@ -41,9 +41,9 @@ def per_point(owner: Any, name: str, kind: Any, value: Any) -> Any:
 
 
 def relation(owner: Any, name: str, target: Any) -> None:
-    """New relationship to one prim."""
+    """New relationship to the prim at a path."""
     spec = Sdf.RelationshipSpec(owner, name, custom=False)
-    spec.targetPathList.explicitItems = [target.path]
+    spec.targetPathList.explicitItems = [target]
 
 
 def vectors(values: Floats) -> Any:

@@ -50,10 +50,9 @@ def _facts(trust: Trust) -> dict[str, Any]:
 
 
 def _character(made: Any, clip: Clip, rig: Rig) -> None:
-    extent = specs.vectors(bounds.over(clip, rig.bones, rig.rest))
-    root, skeleton = character.root(made, "Character", rig, extent)
+    root = character.root(made, "Character", rig, bounds.over(clip, rig.bones, rig.rest))
     animation = character.animation(root, "Anim", rig.paths)
-    specs.relation(skeleton, "skel:animationSource", animation)
+    character.bind(root, animation)
     # Readers that interpolate quaternions by component need neighbours of the same sign.
     moves = specs.vector_frames(clip.translations)
     specs.samples(made, animation.path.AppendProperty("translations"), moves)

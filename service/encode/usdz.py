@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.encode import usd
+from service.motion import files
 from service.motion.answer import ClipAnswer
 
 NAME = "clip.usdc"
@@ -24,7 +25,6 @@ TIME, DATE = 0, 0x21
 LOCAL = struct.Struct("<4s5H3L2H")
 CENTRAL = struct.Struct("<4s6H3L5H2L")
 END = struct.Struct("<4s4H2LH")
-CHUNK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,9 @@ def whole(name: str, data: bytes) -> Member:
 def lying(name: str, path: Path) -> Member:
     """Member that lies in a file; it is read twice, and never held whole."""
     crc = 0
-    for chunk in pieces(path):
+    for chunk in files.pieces(path):
         crc = zlib.crc32(chunk, crc)
-    return Member(name, path.stat().st_size, crc, pieces(path))
-
-
-def pieces(path: Path) -> Iterator[bytes]:
-    """A file's bytes, a megabyte at a time."""
-    with path.open("rb") as file:
-        while chunk := file.read(CHUNK):
-            yield chunk
+    return Member(name, path.stat().st_size, crc, files.pieces(path))
 
 
 def archive(members: Iterable[Member]) -> Iterator[bytes]:

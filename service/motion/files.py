@@ -7,6 +7,15 @@ from pathlib import Path
 
 from service.motion.errors import FileError
 
+CHUNK = 1 << 20
+
+
+def pieces(path: Path) -> Iterator[bytes]:
+    """A file's bytes, a megabyte at a time."""
+    with path.open("rb") as file:
+        while chunk := file.read(CHUNK):
+            yield chunk
+
 
 def write(content: bytes, path: Path) -> None:
     """Put a whole file in place, or none: it is written beside its place and renamed.
