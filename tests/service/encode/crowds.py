@@ -15,7 +15,7 @@ FACTS = {
 
 
 def motions(person, count, frames, seed=5):
-    """Smooth turns of every joint by up to a radian along curved paths, of people unlike in size."""
+    """Smooth turns of every joint by up to a radian along lines, of people unlike in size."""
     rng = np.random.default_rng(seed)
     t = np.arange(frames) / 30
     phases = rng.uniform(0, 2 * np.pi, (count, 1, len(person), 3))
@@ -32,9 +32,7 @@ def cut(made, size):
     """The same motions in batches of a size."""
     for start in range(0, len(made), size):
         part = slice(start, start + size)
-        yield Motions(
-            made.rotations[part], made.root_position[part], made.bone_offsets[part], made.levels[part]
-        )
+        yield Motions(*(value[part] for value in vars(made).values()))
 
 
 def placement(count, seed=6):
