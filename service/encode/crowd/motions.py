@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import chain
 from typing import Any
 
@@ -49,8 +49,8 @@ def each(crowd: CrowdClip, rig: Rig) -> Iterator[Motion]:
     Raises ValueError where there are more or fewer than the characters play, or other frames.
     """
     made, hull = 0, reach.hull(crowd.skeleton.parents, rig)
-    # A loop of its own over the batches would hold on to one until it has the next.
-    for motion in chain.from_iterable(_of(crowd, hull, batch) for batch in crowd.batches):
+    # A loop over the batches would hold on to each until it has the next.
+    for motion in chain.from_iterable(map(partial(_of, crowd, hull), crowd.batches)):
         made += 1
         yield motion
     if made != count(crowd):

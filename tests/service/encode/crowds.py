@@ -40,7 +40,7 @@ def placement(count, seed=6):
     positions = rng.uniform(-20, 20, (count, 3)) * (1, 0.05, 1)
     headings = rng.uniform(-np.pi, np.pi, count)
     # Readers have special ways to store these.
-    positions[:2], headings[0] = [(0, 0, 0), (1, 2, 3)], 0.0
+    positions[:2], headings[0] = [(0, 0, 0), (1, 2, 3)][:count], 0.0
     return Placement(positions, headings)
 
 
