@@ -31,11 +31,10 @@ def write(crowd: CrowdClip, path: Path, instancing: str = "references") -> None:
     .usda and .usdc: one layer. .usd: an entry with a folder `<stem>_clips` beside it, which has a
     layer for each motion. .usdz: the same in one archive. What is flattened is always one layer.
     The batches are gone through once. Raises InvalidField where ending or instancing are unknown
-    and FileError where the file cannot be written.
+    or a usdz would not hold the crowd, and FileError where the file cannot be written.
     """
     ending = path.suffix.removeprefix(".")
-    _known("format", ending, FILES)
-    _known("instancing", instancing, INSTANCING)
+    _door(crowd, ending, FILES, instancing)
     if ending == "usdz":
         files.stream(_usdz(crowd, instancing), path)
     elif ending == "usd" and instancing != "flatten":
@@ -49,12 +48,17 @@ def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Ite
     """The bytes of a crowd as usda, usdc or usdz, piece by piece.
 
     A usdz is sent while its motions are made; a single layer is first exported to a file on disk,
-    which goes when the stream is closed. Raises InvalidField at once where ending or instancing
-    are unknown.
+    which goes when the stream is closed. Raises InvalidField at once, as `write` does.
     """
-    _known("format", ending, STREAMS)
-    _known("instancing", instancing, INSTANCING)
+    _door(crowd, ending, STREAMS, instancing)
     return _usdz(crowd, instancing) if ending == "usdz" else _single(crowd, ending, instancing)
+
+
+def _door(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancing: str) -> None:
+    _known("format", ending, endings)
+    _known("instancing", instancing, INSTANCING)
+    if ending == "usdz":
+        package.fits(crowd)
 
 
 def _known(field: str, found: str, expected: tuple[str, ...]) -> None:

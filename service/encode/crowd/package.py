@@ -13,8 +13,28 @@ from service.encode import character, layers, specs, usdz
 from service.encode.crowd import motions, scene, summary
 from service.encode.usdz import Member
 from service.motion.crowd import CrowdClip
+from service.motion.errors import InvalidField
 
 FOLDER, CHARACTER, SUMMARY = "crowd_clips", "character.usdc", "summary.usdc"
+
+# Bytes that layers take at most: two arrays of samples a joint and frame; their heads, time codes
+# and level; what a motion's layer has besides; what a character takes; and entry and body.
+SAMPLE, FRAME, LAYER, EACH, REST = 4 * (3 + 4), 40, 8_000, 2_000, 100_000
+
+
+def size(crowd: CrowdClip) -> int:
+    """Bytes that all layers take together at most."""
+    layer = LAYER + crowd.frames * (FRAME + SAMPLE * len(crowd.skeleton))
+    return REST + motions.count(crowd) * layer + len(crowd.motion) * EACH
+
+
+def fits(crowd: CrowdClip) -> None:
+    """Raise InvalidField where an archive of the crowd could become larger than any may be."""
+    taken, members = size(crowd), motions.count(crowd) + 3
+    if taken > usdz.BYTES or members > usdz.MEMBERS:
+        found = f"{taken / 1e9:.1f} GB in {members} layers"
+        expected = f"{usdz.BYTES / 1e9:.1f} GB in {usdz.MEMBERS}"
+        raise InvalidField("format", f"{found}, expected at most {expected} in a usdz; take usd")
 
 
 def entry(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:

@@ -17,7 +17,7 @@ import pytest
 from pxr import Sdf, Usd, UsdUtils
 
 from service.encode import crate, crowd
-from service.encode.crowd import motions
+from service.encode.crowd import motions, package
 from service.motion.errors import FileError, InvalidField
 from service.motion.skeleton import Skeleton
 
@@ -289,6 +289,29 @@ def test_what_cannot_be_written_is_refused_before_any_motion_is_made(clip, tmp_p
     with pytest.raises(InvalidField, match="'usd', expected one of usda, usdc, usdz"):
         crowd.stream(clip, "usd")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("many", "said"),
+    [({"frames": 2_000_000}, "6.0 GB in 8"), ({"motion": np.arange(70_000)}, "70003")],
+)
+def test_a_crowd_that_no_archive_can_hold_is_refused_at_once(many, said, clip, tmp_path):
+    given = replace(breaking(clip, after=0), **many)
+    for ask in (
+        lambda: crowd.write(given, tmp_path / "crowd.usdz"),
+        lambda: crowd.stream(given, "usdz"),
+    ):
+        with pytest.raises(InvalidField, match=said):
+            ask()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_size_of_an_archive_is_not_guessed_too_small():
+    person = conftest.person()
+    for frames, spare in ((1, 10), (500, 1.2)):
+        given = crowds.crowd(person, crowds.motions(person, 5, frames), MOTION)
+        size = sum(map(len, crowd.stream(given, "usdz")))
+        assert size < package.size(given) < spare * size
 
 
 def test_a_place_that_cannot_be_taken_is_named(clip, tmp_path):
