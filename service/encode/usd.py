@@ -6,12 +6,12 @@ The names of prims never vary, because USD keeps every name that it has ever see
 
 from typing import Any
 
-from pxr import Sdf, Vt
+from pxr import Sdf
 
-from service.encode import bounds, character, layers, specs
+from service.encode import bounds, character, facts, layers, specs
 from service.encode.character import Rig
 from service.motion import quat
-from service.motion.answer import ClipAnswer, Trust
+from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 
 
@@ -32,7 +32,7 @@ def layer(answer: ClipAnswer) -> Any:
     clip = answer.clip
     with Sdf.ChangeBlock():
         layers.head(made, "Character", len(clip), clip.rate)
-        made.customLayerData = {"posefield": _facts(answer.trust)}
+        made.customLayerData = {"posefield": facts.dictionary(answer.trust.facts())}
         _character(made, clip, _rig(clip))
     return made
 
@@ -41,12 +41,6 @@ def _rig(clip: Clip) -> Rig:
     offsets = clip.translations[0].copy()
     offsets[0] = clip.skeleton.offsets[0]
     return character.rig(clip.skeleton, offsets)
-
-
-def _facts(trust: Trust) -> dict[str, Any]:
-    facts = trust.facts() | {"warnings": Vt.StringArray(list(trust.warnings))}
-    # USD has no value that stands for none.
-    return {name: fact for name, fact in facts.items() if fact is not None}
 
 
 def _character(made: Any, clip: Clip, rig: Rig) -> None:

@@ -10,13 +10,13 @@
 USD never forgets a name, so they are few and always the same.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from pxr import Sdf, Vt
 
-from service.encode import layers, specs
+from service.encode import facts, layers, specs
 from service.encode.specs import Type
 from service.motion import quat
 from service.motion.crowd import CrowdClip, Placement
@@ -42,7 +42,7 @@ def new(crowd: CrowdClip) -> Any:
     """Layer that states what the crowd is, with no character yet; the caller must keep it."""
     made = Sdf.Layer.CreateAnonymous("crowd.usda")
     layers.head(made, ROOT.name, crowd.frames, crowd.rate)
-    made.customLayerData = {"posefield": _plain(crowd.facts)}
+    made.customLayerData = {"posefield": facts.dictionary(crowd.facts)}
     specs.prim(made, ROOT.name, "Xform", MODEL).kind = "assembly"
     return made
 
@@ -92,18 +92,3 @@ def _matrices(placement: Placement) -> Any:
     matrices[:, :3, :3] = quat.rotate(placement.turns[:, None], np.eye(3))
     matrices[:, 3, :3] = placement.positions
     return Vt.Matrix4dArray.FromNumpy(matrices)
-
-
-def _plain(facts: Mapping[str, Any]) -> dict[str, Any]:
-    # USD has no value that stands for none.
-    return {name: _value(fact) for name, fact in facts.items() if fact is not None}
-
-
-def _value(fact: Any) -> Any:
-    if isinstance(fact, Mapping):
-        return _plain(fact)
-    if isinstance(fact, str) or not isinstance(fact, Sequence | np.ndarray):
-        return fact
-    if all(isinstance(entry, str) for entry in fact):
-        return Vt.StringArray(list(fact))
-    return Vt.DoubleArray.FromNumpy(np.asarray(fact, float))
