@@ -30,7 +30,10 @@ def rows() -> list[Row]:
     """Seconds to disk of unique and of shared motion, and the ratios to the schema API's."""
     person = _person()
     unique, shared = _motions(person, CHARACTERS), _motions(person, SHARED)
-    with TemporaryDirectory() as name:
+    build = Path(__file__).parents[1] / "build"
+    build.mkdir(exist_ok=True)
+    # Not in /tmp, where a file may take ten times as long to make where many come and go.
+    with TemporaryDirectory(dir=build) as name:
         folder = Path(name)
         runs = {
             **{e: _ours(person, unique, folder / f"unique.{e}") for e in ("usd", "usdz", "usdc")},

@@ -67,7 +67,7 @@ def author(prim: Any, samples: Samples) -> None:
 
 @lru_cache(maxsize=16)
 def writer(paths: tuple[str, ...], frames: int, rate: float) -> Write:
-    """What writes binary layers of one motion each; each kind of them takes 10 ms once."""
+    """What writes binary layers of one motion each; kept, for it takes milliseconds to make."""
     joints = len(paths)
     shapes = {"translations": (frames, joints, 3), "rotations": (frames, joints, 4)}
     return crate.writer(lambda samples: layers.crate(_layer(paths, rate, samples)), shapes)
