@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from service.encode import usdz
+from service.encode import layers, usdz
 from service.encode.crowd import folder, package, single
 from service.motion import files
 from service.motion.crowd import CrowdClip
@@ -41,7 +41,7 @@ def write(crowd: CrowdClip, path: Path, instancing: str = "references") -> None:
         folder.write(crowd, path, instancing == "scenegraph")
     else:
         with files.replacing(path) as made:
-            single.export(_layer(crowd, instancing), made)
+            layers.export(_layer(crowd, instancing), made)
 
 
 def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Iterator[bytes]:
@@ -75,7 +75,7 @@ def _layer(crowd: CrowdClip, instancing: str) -> Any:
 def _single(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, f"crowd.{ending}")
-        single.export(_layer(crowd, instancing), path)
+        layers.export(_layer(crowd, instancing), path)
         yield from files.pieces(path)
 
 
@@ -88,5 +88,5 @@ def _usdz(crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
 def _flat_usdz(crowd: CrowdClip) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, "crowd.usdc")
-        single.export(single.flat(crowd), path)
+        layers.export(single.flat(crowd), path)
         yield from usdz.archive([usdz.lying(path.name, path)])

@@ -65,7 +65,7 @@ def author(prim: Any, samples: Samples) -> None:
     specs.samples(prim.layer, prim.path.AppendProperty("rotations"), turns)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=8)
 def writer(paths: tuple[str, ...], frames: int, rate: float) -> Write:
     """What writes binary layers of one motion each; kept, for it takes milliseconds to make."""
     joints = len(paths)

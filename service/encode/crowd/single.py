@@ -3,7 +3,6 @@
 usd-core holds a layer's samples until it has been exported: the crowd is in memory once.
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,6 @@ from service.encode.character import Rig
 from service.encode.crowd import motions, scene, summary
 from service.encode.crowd.motions import Motion
 from service.motion.crowd import CrowdClip
-
-
-def export(made: Any, path: Path) -> None:
-    """Write a layer as text where the path ends in .usda, and in binary form else."""
-    made.Export(str(path), args={"format": "usda" if path.suffix == ".usda" else "usdc"})
 
 
 def referring(crowd: CrowdClip, instanced: bool) -> Any:

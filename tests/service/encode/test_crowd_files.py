@@ -1,6 +1,7 @@
 """How crowds get to a disk or a client: whole, lazily, the same bytes, and nothing left behind."""
 
 import hashlib
+import resource
 import subprocess
 import sys
 import tempfile
@@ -318,6 +319,38 @@ def test_a_place_that_cannot_be_taken_is_named(clip, tmp_path):
     (tmp_path / "crowd.usdc" / "inside").mkdir(parents=True)
     with pytest.raises(FileError, match=r"crowd\.usdc: cannot be written: Is a directory"):
         crowd.write(clip, tmp_path / "crowd.usdc")
+
+
+ON_A_FULL_DISK = """
+import resource, sys
+sys.path.insert(0, sys.argv[1])
+import test_crowd_files
+test_crowd_files.write_and_say(*sys.argv[2:])
+"""
+
+
+def write_and_say(path, instancing):
+    person = conftest.person()
+    given = crowds.crowd(person, crowds.motions(person, 5, 30), MOTION)
+    # The disk takes 5 kB of a file and no more.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
+    try:
+        crowd.write(given, Path(path), instancing)
+    except FileError as fault:
+        print(fault)  # noqa: T201
+
+
+@pytest.mark.parametrize(
+    ("ending", "instancing"), [*((e, "references") for e in crowd.FILES), ("usdz", "flatten")]
+)
+def test_a_disk_that_fills_up_is_named_and_keeps_what_was_there(ending, instancing, tmp_path):
+    path = tmp_path / f"crowd.{ending}"
+    path.write_bytes(b"old")
+    command = [sys.executable, "-c", ON_A_FULL_DISK, str(FOLDER), str(path), instancing]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert said.startswith(f"{path}: cannot be written: ")
+    assert said.endswith("File too large\n")
+    assert contents(tmp_path) == {path.name: b"old"}
 
 
 def test_motions_that_do_not_fit_the_crowd_are_an_error(clip, made, tmp_path):
