@@ -1,6 +1,6 @@
 """Short forms for writing prims, attributes and relationships straight into a layer."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,9 +41,9 @@ def per_point(owner: Any, name: str, kind: Any, value: Any) -> Any:
 
 
 def relation(owner: Any, name: str, target: Any) -> None:
-    """New relationship to one prim."""
+    """New relationship to the prim at a path."""
     spec = Sdf.RelationshipSpec(owner, name, custom=False)
-    spec.targetPathList.explicitItems = [target.path]
+    spec.targetPathList.explicitItems = [target]
 
 
 def vectors(values: Floats) -> Any:
@@ -67,3 +67,9 @@ def translations(values: Floats) -> Any:
     # The nearest float32 as a short decimal: a reader computes in float32 anyway.
     matrices[:, 3, :3] = np.round(values, 7)
     return Vt.Matrix4dArray.FromNumpy(matrices)
+
+
+def samples(layer: Any, path: Any, values: Iterable[Any]) -> None:
+    """Values of an attribute at the time codes 0, 1, 2 and so on."""
+    for frame, value in enumerate(values):
+        layer.SetTimeSample(path, frame, value)

@@ -68,8 +68,8 @@ def slerp(a: Floats, b: Floats, t: Floats) -> Floats:
 
 def unroll(q: Floats) -> Floats:
     """The same rotations (frames, ..., 4) with signs chosen so that neighbours lie close."""
-    dots = np.sum(q[1:] * q[:-1], axis=-1)
-    signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
+    dots = np.einsum("...k,...k->...", q[1:], q[:-1])
+    signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0, dtype=q.dtype)
     return np.concatenate([q[:1], q[1:] * signs[..., None]])
 
 

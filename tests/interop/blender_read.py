@@ -1,7 +1,7 @@
 """Reads USD files in Blender with its default options: blender_read.py FOLDER RESULT.npz.
 
-For each file the result holds NAME/joints, and NAME/matrices (F, J, 4, 4): the joints in the world,
-column vectors, Y up, metres. A file without an animation has no frames.
+For each character of a file the result holds FILE/NAME/joints, and FILE/NAME/matrices (F, J, 4, 4):
+the joints in the world, column vectors, Y up, metres. Without an animation it has no frames.
 """
 
 import sys
@@ -18,9 +18,14 @@ def read(path):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.usd_import(filepath=str(path))
     armatures = [found for found in bpy.data.objects if found.type == "ARMATURE"]
-    if not armatures:
-        return [], np.empty((0, 0, 4, 4))
-    armature = armatures[0]
+    return {character(found): motion(found) for found in armatures}
+
+
+def character(armature):
+    return armature.parent.name if armature.parent else ""
+
+
+def motion(armature):
     joints = [bone.name for bone in armature.pose.bones]
     matrices = [pose(armature, joints, frame) for frame in frames(armature)]
     return joints, np.array(matrices).reshape(-1, len(joints), 4, 4)
@@ -41,9 +46,10 @@ def pose(armature, joints, frame):
 
 def main(folder, result):
     found = {}
-    for path in sorted(Path(folder).glob("*.usd?")):
-        joints, matrices = read(path)
-        found |= {f"{path.name}/joints": np.array(joints, str), f"{path.name}/matrices": matrices}
+    for path in sorted(Path(folder).glob("*.usd*")):
+        for name, (joints, matrices) in read(path).items():
+            found[f"{path.name}/{name}/joints"] = np.array(joints, str)
+            found[f"{path.name}/{name}/matrices"] = matrices
     np.savez(result, **found)
 
 

@@ -16,6 +16,9 @@ FORMATS = ("usda", "usdc", "usdz")
 CONTROL = "control"
 """Name of the clip whose quaternions are written in the wrong order."""
 
+WHO = "Character"
+"""Name of a clip's only character."""
+
 # Names that readers stumble over; some are alike once what is illegal is replaced.
 JOINTS = [
     ("mixamorig:Hips", -1, (0.02, 0.95, 0.01)),
@@ -52,8 +55,9 @@ def answers() -> list[tuple[str, ClipAnswer]]:
     ]
 
 
-def write(folder: Path) -> dict[str, Path]:
-    """Every clip and the control in every USD format, and by file name what to expect of it."""
+def write(folder: Path) -> dict[str, dict[str, Path]]:
+    """Every clip and the control in every USD format, and by file name and character what to
+    expect of it."""
     given = answers()
     control = given[0][1]
     expected = {}
@@ -62,15 +66,22 @@ def write(folder: Path) -> dict[str, Path]:
         (CONTROL, _swapped(control), control),
     ):
         expectation = folder / f"{name}.npz"
-        np.savez(expectation, **_expected(meant.clip))
+        np.savez(expectation, **matrices_of(meant.clip))
         for extension in FORMATS:
             path = folder / f"{name}.{extension}"
             path.write_bytes(ENCODERS[extension].encode(written))
-            expected[path.name] = expectation
+            expected[path.name] = {WHO: expectation}
     return expected
 
 
-def _expected(clip: Clip) -> dict[str, np.ndarray]:
+def person() -> Skeleton:
+    """A person whose joints have those names."""
+    leaves, parents, offsets = zip(*JOINTS, strict=True)
+    joints, arms = zip(*TIPS, strict=True)
+    return Skeleton(leaves, parents, np.array(offsets, float), joints, np.array(arms, float))
+
+
+def matrices_of(clip: Clip) -> dict[str, np.ndarray]:
     """Joint names in the file and matrices (F, J, 4, 4) in the world, for column vectors, m."""
     parents = clip.skeleton.parents
     positions, turns = skeleton.forward(parents, clip.rotations, clip.translations)
@@ -82,14 +93,12 @@ def _expected(clip: Clip) -> dict[str, np.ndarray]:
 
 def _answer(frames: int, rate: float) -> ClipAnswer:
     rng = np.random.default_rng(7)
-    leaves, parents, offsets = zip(*JOINTS, strict=True)
-    joints, arms = zip(*TIPS, strict=True)
-    person = Skeleton(leaves, parents, np.array(offsets, float), joints, np.array(arms, float))
+    somebody = person()
     t = np.arange(frames) / rate
-    phases = rng.uniform(0, 2 * np.pi, (len(person), 3))
+    phases = rng.uniform(0, 2 * np.pi, (len(somebody), 3))
     turns = quat.exp(0.6 * np.sin(2 * np.pi * t[:, None, None] + phases))
     path = np.stack([0.3 * np.sin(t), 0.9 + 0.05 * np.cos(5 * t), 1.2 * t], axis=-1)
-    made = clips.assemble(person, turns, path, 1.07 * person.offsets, rate)
+    made = clips.assemble(somebody, turns, path, 1.07 * somebody.offsets, rate)
     return ClipAnswer(made, Trust("hand@0", {"speed": 1.0}, made.duration, 0.01, ()))
 
 

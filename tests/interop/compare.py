@@ -11,6 +11,10 @@ FURTHEST = 1e-4
 TURNED = 1e-3
 """How far an entry of a joint's rotation matrix may be from what was meant."""
 
+Motion = tuple[list[str], np.ndarray]
+Characters = dict[str, Motion]
+NOBODY: Motion = ([], np.empty((0, 0, 4, 4)))
+
 
 @dataclass(frozen=True)
 class Row:
@@ -28,8 +32,21 @@ class Row:
         return not self.fault and self.metres <= FURTHEST and self.turn <= TURNED
 
 
-def compare(file: str, reader: str, joints: list[str], matrices: np.ndarray, npz: Path) -> Row:
-    """A reader's joints and matrices (F, J, 4, 4) against those that were meant."""
+def compare(file: str, reader: str, found: Characters, meant: dict[str, Path]) -> Row:
+    """What a reader made of a file's characters, of whom each is as good as the worst."""
+    rows = [_character(file, reader, found.get(who, NOBODY), meant[who]) for who in meant]
+    return Row(
+        file,
+        reader,
+        max((row.metres for row in rows if not row.fault), default=np.nan),
+        max((row.turn for row in rows if not row.fault), default=np.nan),
+        "; ".join(sorted({row.fault for row in rows if row.fault})),
+    )
+
+
+def _character(file: str, reader: str, found: Motion, npz: Path) -> Row:
+    """Joints and matrices (F, J, 4, 4) of one character against those that were meant."""
+    joints, matrices = found
     with np.load(npz) as meant:
         expected, order = meant["matrices"], meant["joints"].tolist()
     fault = _fault(joints, len(matrices), order, len(expected))

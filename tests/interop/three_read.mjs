@@ -1,7 +1,8 @@
 // Reads USD files with three.js: three_read.mjs MODULES FOLDER RESULT.json
 //
-// For each file the result holds its joints and, for each key of its animation, their matrices in
-// the world: 16 numbers by column, Y up, metres. A file without an animation has no frames.
+// For each character of each file the result holds its joints and, for each key of its animation,
+// their matrices in the world: 16 numbers by column, Y up, metres. Without an animation it has no
+// frames. A file that cannot be read has no characters.
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
@@ -16,29 +17,45 @@ function contents(path) {
   return data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength);
 }
 
+function parsed(path) {
+  try {
+    return new USDLoader().parse(contents(path));
+  } catch (fault) {
+    return { animations: [], traverse() {} };
+  }
+}
+
 function read(path) {
-  const group = new USDLoader().parse(contents(path));
+  const group = parsed(path);
+  const roots = [];
+  group.traverse((node) => node.userData.isSkelRoot && roots.push(node));
+  return Object.fromEntries(roots.map((root) => [root.name, motion(root, group.animations)]));
+}
+
+// All characters of a crowd have joints of the same names: an animation is told whose it is by its
+// own name, and looks for joints below that character alone.
+function motion(root, animations) {
   const bones = [];
-  group.traverse((node) => node.isBone && bones.push(node));
-  const [clip] = group.animations;
+  root.traverse((node) => node.isBone && bones.push(node));
+  const clip = animations.length > 1 ? animations.find(({ name }) => name === root.name) : animations[0];
   if (!clip) return { joints: bones.map((bone) => bone.name), matrices: [] };
   // An action repeats: without a longer clip its last key would be its first again.
   clip.duration += 1;
-  const mixer = new AnimationMixer(group);
+  const mixer = new AnimationMixer(root);
   mixer.clipAction(clip).play();
   const times = [...new Set(clip.tracks.flatMap((track) => [...track.times]))].sort((a, b) => a - b);
   return {
     joints: bones.map((bone) => bone.name),
-    matrices: times.map((time) => pose(group, mixer, bones, time)),
+    matrices: times.map((time) => pose(root, mixer, bones, time)),
   };
 }
 
-function pose(group, mixer, bones, time) {
+function pose(root, mixer, bones, time) {
   mixer.setTime(time);
-  group.updateMatrixWorld(true);
+  root.updateWorldMatrix(true, true);
   return bones.map((bone) => bone.matrixWorld.toArray());
 }
 
-const files = readdirSync(folder).filter((name) => /\.usd.$/.test(name)).sort();
+const files = readdirSync(folder).filter((name) => /\.usd.?$/.test(name)).sort();
 const found = Object.fromEntries(files.map((name) => [name, read(join(folder, name))]));
 writeFileSync(result, JSON.stringify(found));

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
-from service.encode import names, usd
+from service.encode import layers, names, usd
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 
@@ -213,12 +213,12 @@ def test_other_processes_write_the_same_bytes():
 
 
 def test_no_temporary_file_is_left(walk, tmp_path, monkeypatch):
-    monkeypatch.setattr(usd, "MEMORY", tmp_path)
+    monkeypatch.setattr(layers, "MEMORY", tmp_path)
     assert usd.usdc(walk).startswith(b"PXR-USDC")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_machine_without_a_folder_in_memory_will_do(walk, tmp_path, monkeypatch):
     expected = usd.usdc(walk)
-    monkeypatch.setattr(usd, "MEMORY", tmp_path / "none")
+    monkeypatch.setattr(layers, "MEMORY", tmp_path / "none")
     assert usd.usdc(walk) == expected

@@ -1,4 +1,5 @@
 import io
+import struct
 import zipfile
 
 import pytest
@@ -38,3 +39,23 @@ def test_pxr_opens_it(archive, tmp_path):
     stage = Usd.Stage.Open(str(path))
     assert stage.GetDefaultPrim().IsA(UsdSkel.Root)
     assert len(stage.GetAttributeAtPath("/Character/Anim.rotations").GetTimeSamples()) == 45
+
+
+def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):
+    contents = {"root.usdc": b"r" * 1000, "folder/a.usdc": b"", "folder/long name.usdc": b"z" * 65}
+    lying = tmp_path / "lying"
+    lying.write_bytes(b"on disk" * 300_000)
+    members = [usdz.whole(name, data) for name, data in contents.items()]
+    data = b"".join(usdz.archive([*members, usdz.lying("last.usdc", lying)]))
+    with zipfile.ZipFile(io.BytesIO(data)) as found:
+        assert found.testzip() is None
+        assert found.namelist() == [*contents, "last.usdc"]
+        assert [found.read(name) for name in contents] == list(contents.values())
+        assert found.read("last.usdc") == lying.read_bytes()
+        assert {starts(data, entry) % 64 for entry in found.infolist()} == {0}
+
+
+def starts(data, entry):
+    """Where a member's data start: its header's last two fields are the lengths in between."""
+    name, extra = struct.unpack_from("<2H", data, entry.header_offset + 26)
+    return entry.header_offset + 30 + name + extra

@@ -101,3 +101,48 @@ def test_reader_never_sees_a_part(tmp_path):
         seen.add(target.read_bytes())
     writer.join()
     assert seen <= set(contents)
+
+
+def test_pieces_that_break_off_leave_the_old_file(tmp_path):
+    target = tmp_path / "crowd.usdz"
+    target.write_bytes(b"old")
+
+    def pieces():
+        yield b"new"
+        raise RuntimeError("no more")
+
+    with pytest.raises(RuntimeError, match="no more"):
+        files.stream(pieces(), target)
+    assert target.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def fill(path, folder, word):
+    with files.replacing_pair(path, folder) as (file, inside):
+        file.write_text(word)
+        (inside / word).write_text(word)
+
+
+def seen(folder):
+    found = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_text() for path in found}
+
+
+def test_a_file_and_its_folder_are_replaced_together(tmp_path):
+    for word in ("first", "second"):
+        fill(tmp_path / "crowd.usd", tmp_path / "crowd_clips", word)
+        assert seen(tmp_path) == {"crowd.usd": word, f"crowd_clips/{word}": word}
+
+
+def test_a_file_and_its_folder_stay_where_one_cannot_be_replaced(tmp_path):
+    taken, folder = tmp_path / "crowd.usd", tmp_path / "crowd_clips"
+    (taken / "inside").mkdir(parents=True)
+    with pytest.raises(FileError, match="Is a directory"):
+        fill(taken, folder, "new")
+    assert not folder.exists()
+    folder.mkdir()
+    (folder / "old").write_text("old")
+    with pytest.raises(FileError, match="Is a directory"):
+        fill(taken, folder, "new")
+    assert seen(tmp_path) == {"crowd_clips/old": "old"}
+    assert sorted(tmp_path.iterdir()) == [taken, folder]

@@ -1,0 +1,69 @@
+"""What is known of a crowd once all its motions have been made: its boxes and levels of detail.
+
+Written as opinions, so that they may stand in a layer of their own.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pxr import Sdf
+
+from service.encode import specs
+from service.encode.crowd import reach, scene
+from service.encode.crowd.motions import Note
+from service.encode.specs import Type
+from service.motion.conventions import Floats
+from service.motion.crowd import CrowdClip
+
+LEVEL = "posefield:level"
+"""Level of detail of a motion's frames, with a time sample where it changes."""
+
+
+def referring(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
+    """Boxes of a crowd of references to one prototype, and levels of the motions."""
+    _boxes(made, crowd, notes)
+    every = _round([note.box for note in notes])
+    for path in (scene.PROTOTYPE, scene.PROTOTYPE.AppendChild("Body")):
+        _extent(made, path, every)
+    for index, note in enumerate(notes):
+        _levels(made, scene.MOTIONS.AppendChild(scene.motion(index)), note)
+
+
+def flat(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
+    """Boxes of a crowd of which each character has its own body and motion, and their levels."""
+    _boxes(made, crowd, notes)
+    for index, played in enumerate(crowd.motion):
+        path = scene.CHARACTERS.AppendChild(scene.character(index))
+        _extent(made, path.AppendChild("Body"), notes[played].box)
+        _levels(made, path.AppendChild(scene.character(index)), notes[played])
+
+
+def _boxes(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
+    own = np.array([notes[played].box for played in crowd.motion])
+    for index, box in enumerate(own):
+        _extent(made, scene.CHARACTERS.AppendChild(scene.character(index)), box)
+    whole = specs.vectors(reach.placed(crowd.placement, own))
+    for path in (scene.ROOT, scene.CHARACTERS):
+        _attribute(made, path.AppendProperty("extentsHint"), Type.Float3Array).default = whole
+
+
+def _round(boxes: Sequence[Floats]) -> Floats:
+    corners = np.array(boxes)
+    return np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+
+
+def _extent(made: Any, prim: Any, box: Floats) -> None:
+    _attribute(made, prim.AppendProperty("extent"), Type.Float3Array).default = specs.vectors(box)
+
+
+def _levels(made: Any, prim: Any, note: Note) -> None:
+    path = prim.AppendProperty(LEVEL)
+    _attribute(made, path, Type.Int).custom = True
+    for frame, level in note.levels.items():
+        made.SetTimeSample(path, frame, level)
+
+
+def _attribute(made: Any, path: Any, kind: Any) -> Any:
+    found = made.GetAttributeAtPath(path)
+    return found or Sdf.CreatePrimAttributeInLayer(made, path, kind)

@@ -1,0 +1,40 @@
+"""The head of a layer, and its bytes."""
+
+import errno
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from pxr import Tf
+
+MEMORY = Path("/dev/shm")
+
+
+def head(made: Any, default: str, frames: int, rate: float) -> None:
+    """State default prim, units, axes and times: frames at the time codes 0 to frames - 1."""
+    made.defaultPrim = default
+    made.startTimeCode, made.endTimeCode = 0.0, float(frames - 1)
+    # Readers differ in which of the two they believe.
+    made.timeCodesPerSecond = made.framesPerSecond = float(rate)
+    made.pseudoRoot.SetInfo("metersPerUnit", 1.0)
+    made.pseudoRoot.SetInfo("upAxis", "Y")
+
+
+def crate(made: Any) -> bytes:
+    """The layer in its binary form, which pxr can only write to a file."""
+    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
+        path = Path(folder, "layer.usdc")
+        export(made, path)
+        return path.read_bytes()
+
+
+def export(made: Any, path: Path) -> None:
+    """Write a layer as text where the path ends in .usda, and in binary form else.
+
+    Raises OSError where it cannot be, like all that writes.
+    """
+    form = "usda" if path.suffix == ".usda" else "usdc"
+    try:
+        made.Export(str(path), args={"format": form})
+    except Tf.ErrorException as fault:
+        raise OSError(errno.EIO, str(fault.args[0].commentary)) from fault

@@ -1,0 +1,282 @@
+"""What USD's own composition and skinning make of a crowd, against our own kinematics."""
+
+import conftest
+import crowds
+import numpy as np
+import pytest
+from pxr import Kind, Usd, UsdGeom, UsdSkel
+
+from service.check import check
+from service.encode import crowd, names
+
+MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
+FRAMES = 12
+LOOKED_AT = (0, 4, 11)
+# float32 keeps 2e-6 of the 20 m that characters stand apart, and errors add up along the joints.
+NEAR = 3e-5
+
+
+@pytest.fixture(scope="module")
+def made():
+    return crowds.motions(conftest.person(), 5, FRAMES)
+
+
+@pytest.fixture(scope="module")
+def clip(made):
+    """The crowd, but for its motions."""
+    return crowds.crowd(conftest.person(), made, MOTION)
+
+
+@pytest.fixture(scope="module", params=crowd.INSTANCING)
+def instancing(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=crowd.FILES)
+def path(request, made, instancing, tmp_path_factory):
+    found = tmp_path_factory.mktemp(instancing) / f"crowd.{request.param}"
+    crowd.write(crowds.crowd(conftest.person(), made, MOTION), found, instancing)
+    return found
+
+
+@pytest.fixture(scope="module")
+def stage(path):
+    return Usd.Stage.Open(str(path))
+
+
+def characters(stage, root="/Crowd"):
+    return stage.GetPrimAtPath(f"{root}/Characters").GetChildren()
+
+
+def below(prim, name):
+    return prim.GetStage().GetPrimAtPath(prim.GetPath().AppendChild(name))
+
+
+def queries(prim):
+    """USD's own reading of one character; the cache must be kept."""
+    cache, root = UsdSkel.Cache(), UsdSkel.Root(prim)
+    assert cache.Populate(root, Usd.TraverseInstanceProxies())
+    return cache, root, cache.GetSkelQuery(UsdSkel.Skeleton(below(prim, "Skel")))
+
+
+def placed(prim, frame):
+    """World positions (J, 3) of a character's joints at a frame, m."""
+    _, _, skeleton = queries(prim)
+    # The query's own world is the prototype's where characters are instances of one.
+    return stands(prim, np.array(skeleton.ComputeJointSkelTransforms(frame))[:, 3, :3])
+
+
+def error(stage, expected):
+    """Largest distance of any character's joint at some frames from where it should be, m."""
+    found = np.array([[placed(prim, frame) for frame in LOOKED_AT] for prim in characters(stage)])
+    return np.max(np.linalg.norm(found - expected[:, list(LOOKED_AT)], axis=-1))
+
+
+def test_every_joint_of_every_character_is_where_our_kinematics_put_it(stage, clip, made):
+    assert error(stage, crowds.positions(clip, made)) < NEAR
+
+
+def test_every_character_moves(stage):
+    for prim in characters(stage):
+        moved = np.linalg.norm(placed(prim, 11) - placed(prim, 0), axis=-1)
+        assert moved.max() > 0.2
+
+
+def test_the_crowd_comes_along_where_its_default_prim_is_referenced(path, clip, made):
+    other = Usd.Stage.CreateInMemory()
+    other.SetTimeCodesPerSecond(clip.rate)
+    other.DefinePrim("/Set/People").GetReferences().AddReference(str(path))
+    expected = crowds.positions(clip, made)
+    found = [placed(prim, 11) for prim in characters(other, "/Set/People")]
+    assert np.max(np.linalg.norm(found - expected[:, 11], axis=-1)) < NEAR
+
+
+def test_extents_hold_all_that_is_drawn(stage):
+    world = box(stage, "/Crowd", "extentsHint")
+    np.testing.assert_array_equal(world, box(stage, "/Crowd/Characters", "extentsHint"))
+    for prim in characters(stage):
+        own = box(stage, prim.GetPath(), "extent")
+        body = box(stage, below(prim, "Body").GetPath(), "extent")
+        for frame in range(FRAMES):
+            points = skinned(prim, frame)
+            assert inside(points, own) and inside(points, body)
+            assert inside(stands(prim, points), world)
+
+
+def test_extents_are_not_much_too_large(stage):
+    everything = []
+    for prim in characters(stage):
+        points = np.concatenate([skinned(prim, frame) for frame in range(FRAMES)])
+        everything.append(stands(prim, points))
+        spare = np.abs(box(stage, prim.GetPath(), "extent") - reach(points))
+        assert np.all(spare < 0.25)
+    # A box that is turned needs more room than what is in it.
+    spare = np.abs(box(stage, "/Crowd", "extentsHint") - reach(np.concatenate(everything)))
+    assert np.all(spare < 1.0)
+
+
+def test_the_extent_at_rest_would_be_too_small(stage):
+    # The negative control of the two above.
+    prim = characters(stage)[0]
+    points = np.concatenate([skinned(prim, frame) for frame in range(FRAMES)])
+    at_rest = np.array(below(prim, "Body").GetAttribute("points").Get())
+    assert not inside(points, reach(at_rest))
+
+
+def box(stage, path, name):
+    attribute = stage.GetPrimAtPath(path).GetAttribute(name)
+    assert attribute.GetNumTimeSamples() == 0
+    return np.array(attribute.Get())
+
+
+def reach(points):
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def inside(points, corners):
+    return np.all(points >= corners[0]) and np.all(points <= corners[1])
+
+
+def skinned(prim, frame):
+    """Points of a character's body in its own frame, as USD's own skinning places them."""
+    cache, root, skeleton = queries(prim)
+    (binding,) = cache.ComputeSkelBindings(root, Usd.TraverseInstanceProxies())
+    (target,) = binding.GetSkinningTargets()
+    points = UsdGeom.Mesh(target.GetPrim()).GetPointsAttr().Get()
+    assert target.ComputeSkinnedPoints(skeleton.ComputeSkinningTransforms(frame), points, frame)
+    return np.array(points)
+
+
+def stands(prim, points):
+    matrix = np.array(UsdGeom.XformCache(0).GetLocalToWorldTransform(prim))
+    return points @ matrix[:3, :3] + matrix[3, :3]
+
+
+def test_the_model_hierarchy_is_assembly_group_components(stage):
+    models = {str(prim.GetPath()): Usd.ModelAPI(prim).GetKind() for prim in stage.Traverse()}
+    found = {path: kind for path, kind in models.items() if kind}
+    assert found == {
+        "/Crowd": Kind.Tokens.assembly,
+        "/Crowd/Characters": Kind.Tokens.group,
+        **{f"/Crowd/Characters/c{i:05}": Kind.Tokens.component for i in range(len(MOTION))},
+    }
+    assert all(stage.GetPrimAtPath(path).IsModel() for path in found)
+    assert stage.GetDefaultPrim().GetPath() == "/Crowd"
+
+
+def test_instances_share_one_prototype_and_others_none(stage, instancing):
+    expected = 1 if instancing == "scenegraph" else 0
+    assert len(stage.GetPrototypes()) == expected
+    assert {prim.IsInstance() for prim in characters(stage)} == {bool(expected)}
+
+
+def test_what_plays_one_motion_shares_its_animation_unless_flattened(stage, instancing):
+    played = [animation(prim) for prim in characters(stage)]
+    if instancing == "flatten":
+        assert len(set(played)) == len(MOTION)
+        # three.js names an animation by its own name alone.
+        assert [path.name for path in played] == [prim.GetName() for prim in characters(stage)]
+    else:
+        assert [path.pathString for path in played] == [f"/Crowd/Motions/m{m:05}" for m in MOTION]
+
+
+def animation(prim):
+    skeleton = UsdSkel.BindingAPI(below(prim, "Skel"))
+    return skeleton.GetInheritedAnimationSource().GetPath()
+
+
+def test_the_prototype_plays_nothing_of_its_own(stage, instancing):
+    prototype = stage.GetPrimAtPath("/Crowd/Prototype")
+    assert bool(prototype) == (instancing != "flatten")
+    if prototype:
+        assert prototype.IsAbstract()
+        own = below(prototype, "Skel").GetRelationship("skel:animationSource")
+        assert not own.HasAuthoredTargets()
+
+
+def test_characters_are_placed_by_a_matrix_alone(stage, clip):
+    for prim, position in zip(characters(stage), clip.placement.positions, strict=True):
+        (only,) = UsdGeom.Xformable(prim).GetOrderedXformOps()
+        assert only.GetOpType() == UsdGeom.XformOp.TypeTransform
+        np.testing.assert_allclose(np.array(only.Get())[3, :3], position)
+
+
+def test_levels_have_a_sample_where_they_change(stage, made):
+    for prim, motion in zip(characters(stage), MOTION, strict=True):
+        level = stage.GetPrimAtPath(animation(prim)).GetAttribute("posefield:level")
+        assert level.IsCustom()
+        assert [level.Get(frame) for frame in range(FRAMES)] == made.levels[motion].tolist()
+        changes = 1 + np.count_nonzero(np.diff(made.levels[motion]))
+        assert len(level.GetTimeSamples()) == changes
+
+
+def test_animations_are_baked_named_and_of_one_sign(stage, clip, made):
+    paths = names.paths(names.legal(clip.skeleton.names), clip.skeleton.parents)
+    for prim in characters(stage):
+        played = stage.GetPrimAtPath(animation(prim))
+        assert tuple(played.GetAttribute("joints").Get()) == paths
+        assert np.all(np.array(played.GetAttribute("scales").Get()) == 1)
+        turns = played.GetAttribute("rotations")
+        assert turns.GetTimeSamples() == list(range(FRAMES))
+        values = np.array([turns.Get(frame) for frame in range(FRAMES)])
+        assert np.all(np.sum(values[1:] * values[:-1], axis=-1) > 0)
+    given = made.rotations
+    assert np.any(np.sum(given[:, 1:] * given[:, :-1], axis=-1) < 0)
+
+
+def test_the_stage_states_units_times_and_facts(stage):
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, FRAMES - 1)
+    assert stage.GetTimeCodesPerSecond() == stage.GetFramesPerSecond() == 30
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    facts = stage.GetRootLayer().customLayerData["posefield"]
+    assert (facts["model"], facts["seed"]) == ("walk@0123abcd", 7)
+    assert facts["controls"]["speed"] == 1.25
+    assert list(facts["controls"]["from"]) == [0.5, 1.5]
+    assert list(facts["warnings"]) == ["speed is beyond 1.2"]
+    assert "performer" not in facts
+
+
+def test_our_own_check_and_the_official_ones_find_nothing(path):
+    assert [finding for finding in check(path) if finding.severity == "error"] == []
+
+
+@pytest.mark.parametrize("ending", ["usd", "usdz"])
+def test_a_crowd_that_is_not_loaded_still_says_how_large_it_is(ending, made, clip, tmp_path):
+    path = tmp_path / f"crowd.{ending}"
+    crowd.write(crowds.crowd(conftest.person(), made, MOTION), path)
+    stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+    unloaded = stage.GetPrimAtPath("/Crowd/Characters").GetAllChildren()
+    assert len(unloaded) == len(MOTION)
+    assert not any(prim.IsLoaded() for prim in unloaded)
+    assert all(prim.GetAttribute("extent").Get() for prim in unloaded)
+    stage.Load()
+    assert (
+        error(stage, crowds.positions(crowds.crowd(conftest.person(), made, MOTION), made)) < NEAR
+    )
+
+
+class TestNegativeControls:
+    """Crowds that are wrong in one way must be seen to be."""
+
+    @pytest.fixture
+    def expected(self, clip, made):
+        return crowds.positions(clip, made)
+
+    def test_headings_that_are_left_out(self, expected, made, clip, tmp_path, instancing):
+        standing = type(clip.placement)(clip.placement.positions, 0 * clip.placement.headings)
+        assert self.error(made, clip, expected, tmp_path, instancing, placement=standing) > 0.1
+
+    def test_headings_the_other_way_round(self, expected, made, clip, tmp_path, instancing):
+        turned = type(clip.placement)(clip.placement.positions, -clip.placement.headings)
+        assert self.error(made, clip, expected, tmp_path, instancing, placement=turned) > 0.1
+
+    def test_somebody_elses_motion(self, expected, made, clip, tmp_path, instancing):
+        others = np.roll(clip.motion, 1)
+        assert self.error(made, clip, expected, tmp_path, instancing, motion=others) > 0.1
+
+    def error(self, made, clip, expected, folder, instancing, **wrong):
+        path = folder / "wrong.usdc"
+        given = vars(clip) | {"batches": crowds.cut(made, 2)} | wrong
+        crowd.write(type(clip)(**given), path, instancing)
+        return error(Usd.Stage.Open(str(path)), expected)

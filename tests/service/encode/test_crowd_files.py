@@ -1,0 +1,364 @@
+"""How crowds get to a disk or a client: whole, lazily, the same bytes, and nothing left behind."""
+
+import hashlib
+import resource
+import subprocess
+import sys
+import tempfile
+import tracemalloc
+import weakref
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import conftest
+import crowds
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdUtils
+
+from service.encode import crate, crowd
+from service.encode.crowd import motions, package
+from service.motion.errors import FileError, InvalidField
+from service.motion.skeleton import Skeleton
+
+FOLDER = Path(__file__).parent
+MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
+LAYOUTS = [(e, i) for e in crowd.FILES for i in crowd.INSTANCING]
+
+
+@pytest.fixture(scope="module")
+def made():
+    return crowds.motions(conftest.person(), 5, 12)
+
+
+@pytest.fixture
+def clip(made):
+    return crowds.crowd(conftest.person(), made, MOTION)
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Folder in which all temporary files are made."""
+    found = tmp_path / "temporary"
+    found.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(found))
+    return found
+
+
+def contents(folder):
+    found = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found}
+
+
+def breaking(clip, after):
+    """The same crowd, whose motions break off."""
+
+    def batches():
+        for index, batch in enumerate(clip.batches):
+            if index == after:
+                raise RuntimeError("the model has gone")
+            yield batch
+
+    return replace(clip, batches=batches())
+
+
+def test_a_folder_has_a_layer_for_each_motion_and_two_more(clip, tmp_path):
+    crowd.write(clip, tmp_path / "many.usd")
+    parts = ["character", *(f"m{i:05}" for i in range(5)), "summary"]
+    assert list(contents(tmp_path)) == ["many.usd", *(f"many_clips/{p}.usdc" for p in parts)]
+    assert all(data.startswith(b"PXR-USDC") for data in contents(tmp_path).values())
+
+
+@pytest.mark.parametrize(("ending", "instancing"), [("usdc", "references"), ("usd", "flatten")])
+def test_a_single_layer_needs_no_other(ending, instancing, clip, tmp_path):
+    crowd.write(clip, tmp_path / f"one.{ending}", instancing)
+    assert list(contents(tmp_path)) == [f"one.{ending}"]
+    layers, assets, missing = UsdUtils.ComputeAllDependencies(str(tmp_path / f"one.{ending}"))
+    assert (len(layers), assets, missing) == (1, [], [])
+
+
+def test_everything_that_an_entry_names_is_there(clip, tmp_path):
+    crowd.write(clip, tmp_path / "many.usd")
+    layers, assets, missing = UsdUtils.ComputeAllDependencies(str(tmp_path / "many.usd"))
+    assert (len(layers), assets, missing) == (1 + 5 + 2, [], [])
+
+
+@pytest.mark.parametrize("instancing", crowd.INSTANCING)
+def test_an_archive_is_stored_aligned_and_begins_with_what_is_opened(instancing, clip, tmp_path):
+    path = tmp_path / "crowd.usdz"
+    crowd.write(clip, path, instancing)
+    data = path.read_bytes()
+    with zipfile.ZipFile(path) as found:
+        assert found.testzip() is None
+        entries = found.infolist()
+    assert entries[0].filename == "crowd.usdc"
+    assert len(entries) == (1 if instancing == "flatten" else 1 + 5 + 2)
+    package = Sdf.ZipFile.Open(str(path))
+    for entry in entries:
+        info = package.GetFileInfo(entry.filename)
+        assert info.dataOffset % 64 == 0
+        assert data[info.dataOffset :].startswith(b"PXR-USDC")
+        assert (info.compressionMethod, info.encrypted) == (0, False)
+
+
+@pytest.mark.parametrize("ending", crowd.STREAMS)
+@pytest.mark.parametrize("instancing", crowd.INSTANCING)
+def test_a_stream_has_the_bytes_of_the_file(ending, instancing, clip, made, tmp_path, temporary):
+    path = tmp_path / f"crowd.{ending}"
+    crowd.write(clip, path, instancing)
+    again = crowds.crowd(conftest.person(), made, MOTION, size=2)
+    assert b"".join(crowd.stream(again, ending, instancing)) == path.read_bytes()
+    assert contents(temporary) == {}
+
+
+@pytest.mark.parametrize(("ending", "instancing"), LAYOUTS)
+def test_what_breaks_off_leaves_what_was_there(ending, instancing, made, clip, tmp_path):
+    path = tmp_path / f"crowd.{ending}"
+    crowd.write(replace(clip, batches=crowds.cut(made, 2), facts={}), path, instancing)
+    before = contents(tmp_path)
+    with pytest.raises(RuntimeError, match="the model has gone"):
+        crowd.write(breaking(clip, after=1), path, instancing)
+    assert contents(tmp_path) == before
+    assert not [found for found in tmp_path.rglob("*") if ".writing" in found.name]
+
+
+@pytest.mark.parametrize(("ending", "instancing"), LAYOUTS)
+def test_what_breaks_off_leaves_nothing_where_nothing_was(ending, instancing, clip, tmp_path):
+    with pytest.raises(RuntimeError, match="the model has gone"):
+        crowd.write(breaking(clip, after=1), tmp_path / f"crowd.{ending}", instancing)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_smaller_crowd_leaves_no_motion_of_a_larger_one(clip, made, tmp_path):
+    crowd.write(clip, tmp_path / "crowd.usd")
+    crowd.write(crowds.crowd(conftest.person(), first(made, 2), [0, 1]), tmp_path / "crowd.usd")
+    assert "crowd_clips/m00001.usdc" in contents(tmp_path)
+    assert "crowd_clips/m00002.usdc" not in contents(tmp_path)
+
+
+def first(made, count):
+    return next(crowds.cut(made, count))
+
+
+@pytest.mark.parametrize("name", ["crowd_clips/notes.txt", "crowd_clips/mine/m00000.usdc"])
+def test_a_folder_with_something_else_in_it_is_left_alone(name, clip, tmp_path):
+    (tmp_path / name).parent.mkdir(parents=True)
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(FileError, match="in the way; expected nothing here but an earlier crowd"):
+        crowd.write(clip, tmp_path / "crowd.usd")
+    assert contents(tmp_path) == {name: b"mine"}
+
+
+@pytest.mark.parametrize(("ending", "instancing"), LAYOUTS)
+def test_a_batch_is_garbage_before_the_next_is_made(ending, instancing, made, clip, tmp_path):
+    alive = []
+    given = replace(clip, batches=watched(made, alive))
+    crowd.write(given, tmp_path / f"crowd.{ending}", instancing)
+    assert alive == [0] * 5
+
+
+def test_batches_that_are_kept_would_be_counted(made):
+    alive = []
+    assert len(list(watched(made, alive))) == 5
+    assert alive == [0, 4, 8, 12, 16]
+
+
+def watched(made, alive):
+    """Batches of one motion each; before one is made, says how many earlier arrays are alive."""
+    earlier = []
+    for batch in crowds.cut(made, 1):
+        alive.append(sum(array() is not None for array in earlier))
+        yield watch(batch, earlier)
+
+
+def watch(batch, earlier):
+    copy = type(batch)(*(value.copy() for value in vars(batch).values()))
+    earlier.extend(weakref.ref(value) for value in vars(copy).values())
+    return copy
+
+
+def test_a_longer_archive_takes_no_more_memory():
+    peak(8)
+    (few, _), (many, sent) = peak(8), peak(40)
+    # Prims and zip entries of each character are some hundred bytes of its 60 kB.
+    assert many < 1.15 * few
+    assert many < sent / 4
+
+
+def peak(count):
+    """Bytes that NumPy and Python hold at most while an archive of so many motions is sent; and
+    how many bytes are sent."""
+    person = conftest.person()
+    batches = (crowds.motions(person, 1, 100, seed) for seed in range(count))
+    given = replace(
+        crowds.crowd(person, crowds.motions(person, 1, 100), range(count)), batches=batches
+    )
+    tracemalloc.start()
+    sent = sum(map(len, crowd.stream(given, "usdz")))
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return held, sent
+
+
+def test_an_archive_is_sent_while_it_is_made(clip, made):
+    asked = []
+
+    def batches():
+        for index, batch in enumerate(crowds.cut(made, 1)):
+            asked.append(index)
+            yield batch
+
+    sent = 0
+    for piece in crowd.stream(replace(clip, batches=batches()), "usdz"):
+        sent += piece.startswith(b"PXR-USDC")
+        # The entry and the character go first.
+        assert len(asked) == max(0, min(sent - 2, 5)) or not piece.startswith(b"PXR-USDC")
+    assert (sent, asked) == (8, list(range(5)))
+
+
+@pytest.mark.parametrize(("ending", "instancing"), [("usdc", "references"), ("usdz", "flatten")])
+def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, temporary):
+    sent = crowd.stream(clip, ending, instancing)
+    next(sent)
+    assert contents(temporary) != {}
+    sent.close()
+    assert list(temporary.iterdir()) == []
+
+
+def test_without_templates_the_same_is_written(clip, made, tmp_path, monkeypatch):
+    crowd.write(clip, tmp_path / "crowd.usd")
+    before = contents(tmp_path)
+    motions.writer.cache_clear()
+    monkeypatch.setattr(crate, "template", lambda write, shapes: None)
+    crowd.write(replace(clip, batches=crowds.cut(made, 3)), tmp_path / "crowd.usd")
+    motions.writer.cache_clear()
+    assert contents(tmp_path) == before
+
+
+def test_motions_are_written_by_template(clip):
+    joints = len(clip.skeleton)
+    write = motions.writer(tuple(f"j{i}" for i in range(joints)), 12, 30.0)
+    assert isinstance(getattr(write, "__self__", None), crate.Template)
+
+
+PRINT_DIGESTS = """
+import hashlib, sys
+sys.path.insert(0, sys.argv[1])
+import test_crowd_files
+test_crowd_files.print_digests()
+"""
+
+
+def print_digests():
+    person = conftest.person()
+    made = crowds.motions(person, 5, 12)
+    for ending in crowd.STREAMS:
+        for instancing in crowd.INSTANCING:
+            sent = b"".join(crowd.stream(crowds.crowd(person, made, MOTION), ending, instancing))
+            print(ending, instancing, hashlib.sha256(sent).hexdigest())  # noqa: T201
+
+
+def test_other_processes_write_the_same_bytes():
+    command = [sys.executable, "-c", PRINT_DIGESTS, str(FOLDER)]
+    runs = {
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)
+    }
+    assert len(runs) == 1
+    assert len(runs.pop().splitlines()) == 9
+
+
+@pytest.mark.parametrize("instancing", crowd.INSTANCING)
+def test_one_joint_in_one_frame_by_one_character_will_do(instancing, tmp_path):
+    dot = Skeleton(("Root",), (-1,), np.zeros((1, 3)), (), np.zeros((0, 3)))
+    made = crowds.motions(dot, 1, 1)
+    for ending in crowd.FILES:
+        path = tmp_path / f"dot.{ending}"
+        crowd.write(crowds.crowd(dot, made, [0]), path, instancing)
+        stage = Usd.Stage.Open(str(path))
+        assert len(stage.GetPrimAtPath("/Crowd/Characters").GetChildren()) == 1
+
+
+def test_what_cannot_be_written_is_refused_before_any_motion_is_made(clip, tmp_path):
+    for ending, instancing, said in (
+        ("usdx", "references", "format: 'usdx', expected one of usd, usda, usdc, usdz"),
+        ("usdc", "copies", "instancing: 'copies', expected one of references, scenegraph, flatten"),
+    ):
+        with pytest.raises(InvalidField) as refusal:
+            crowd.write(breaking(clip, after=0), tmp_path / f"crowd.{ending}", instancing)
+        assert str(refusal.value) == said
+    with pytest.raises(InvalidField, match="'usd', expected one of usda, usdc, usdz"):
+        crowd.stream(clip, "usd")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("many", "said"),
+    [({"frames": 2_000_000}, "6.0 GB in 8"), ({"motion": np.arange(70_000)}, "70003")],
+)
+def test_a_crowd_that_no_archive_can_hold_is_refused_at_once(many, said, clip, tmp_path):
+    given = replace(breaking(clip, after=0), **many)
+    for ask in (
+        lambda: crowd.write(given, tmp_path / "crowd.usdz"),
+        lambda: crowd.stream(given, "usdz"),
+    ):
+        with pytest.raises(InvalidField, match=said):
+            ask()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_size_of_an_archive_is_not_guessed_too_small():
+    person = conftest.person()
+    for frames, spare in ((1, 10), (500, 1.2)):
+        given = crowds.crowd(person, crowds.motions(person, 5, frames), MOTION)
+        size = sum(map(len, crowd.stream(given, "usdz")))
+        assert size < package.size(given) < spare * size
+
+
+def test_a_place_that_cannot_be_taken_is_named(clip, tmp_path):
+    (tmp_path / "crowd.usdc" / "inside").mkdir(parents=True)
+    with pytest.raises(FileError, match=r"crowd\.usdc: cannot be written: Is a directory"):
+        crowd.write(clip, tmp_path / "crowd.usdc")
+
+
+ON_A_FULL_DISK = """
+import resource, sys
+sys.path.insert(0, sys.argv[1])
+import test_crowd_files
+test_crowd_files.write_and_say(*sys.argv[2:])
+"""
+
+
+def write_and_say(path, instancing):
+    person = conftest.person()
+    given = crowds.crowd(person, crowds.motions(person, 5, 30), MOTION)
+    # The disk takes 5 kB of a file and no more.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
+    try:
+        crowd.write(given, Path(path), instancing)
+    except FileError as fault:
+        print(fault)  # noqa: T201
+
+
+@pytest.mark.parametrize(
+    ("ending", "instancing"), [*((e, "references") for e in crowd.FILES), ("usdz", "flatten")]
+)
+def test_a_disk_that_fills_up_is_named_and_keeps_what_was_there(ending, instancing, tmp_path):
+    path = tmp_path / f"crowd.{ending}"
+    path.write_bytes(b"old")
+    command = [sys.executable, "-c", ON_A_FULL_DISK, str(FOLDER), str(path), instancing]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert said.startswith(f"{path}: cannot be written: ")
+    assert said.endswith("File too large\n")
+    assert contents(tmp_path) == {path.name: b"old"}
+
+
+def test_motions_that_do_not_fit_the_crowd_are_an_error(clip, made, tmp_path):
+    for batches, said in (
+        (crowds.cut(first(made, 4), 2), "4 motions, expected 5"),
+        ([made, made], "10 motions, expected 5"),
+        ([crowds.motions(conftest.person(), 5, 9)], r"\(9, 20, 4\), expected \(12, 20, 4\)"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            crowd.write(replace(clip, batches=batches), tmp_path / "crowd.usdc")
+    assert list(tmp_path.iterdir()) == []
