@@ -169,8 +169,8 @@ def _answers(
         for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
             whole[rows] = answer[:, 0] if name in _TIMED else answer
 
-    # Taking the results lets errors out.
-    list(_WORKERS.map(fill, _parts(levels)))
+    # A list first, so that making the parts does not hold workers up; taking results lets errors out.
+    list(_WORKERS.map(fill, list(_parts(levels))))
     return block
 
 

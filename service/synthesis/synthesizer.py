@@ -67,7 +67,7 @@ class Synthesizer:
         """Where the root is at rest (3,), m."""
         return self.session.card.skeleton.offsets[0]
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """Of a sphere about the root that holds the body at rest, m."""
         joints = self.session.card.skeleton
