@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import blend
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats, Indices, Singles
 from service.motion.crowd import CrowdPoses, Placement
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import crowd_question, view
-from service.synthesis.crowd_question import CrowdQuestion, Truths
+from service.synthesis.crowd_question import Blending, CrowdQuestion, Truths
 from service.synthesis.synthesizer import FARTHEST, Synthesizer
 from service.synthesis.view import View
 
@@ -27,6 +28,22 @@ SLACK = 1e-5
 
 # onnxruntime and NumPy let go of the interpreter while they work.
 _WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Rows for the graph: controls (N, d), times (N, 1), labels (N, p)."""
+
+    controls: Singles
+    times: Singles
+    labels: Singles
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def rows(self, which: Indices) -> "_Asked":
+        """Some of them."""
+        return _Asked(*(column[which] for column in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -55,7 +72,10 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     early = question.times < 0.0
     _refuse("time", question.times, early, "s, expected 0 s or later")
     levels, error_px, sentences = _levels(model, question)
-    block = _answers(model, question, controls.astype(np.float32), labels, levels)
+    asked = _Asked(controls.astype(np.float32), question.times.astype(np.float32)[:, None], labels)
+    block = _answers(model, asked, levels)
+    if question.blending is not None:
+        _blend(model, asked, block, levels, question.blending)
     _check_durations(card, block.duration)
     late = question.times > block.duration * (1.0 + SLACK)
     _refuse("time", question.times, late, "s, later than the end of the clip")
@@ -150,28 +170,42 @@ def _levels(
     middle = question.placement.positions + model.middle
     scale = view.pixels_per_metre(asked.camera, middle, model.radius)
     choice = view.see(ladder, scale, asked)
-    shown = view.error_pixels(ladder.errors, scale, choice.levels)
-    return choice.levels, shown, view.warnings(choice, ladder, asked)
+    levels = choice.levels
+    if question.blending is not None and asked.previous is not None:
+        # Who is still on the way from one level to another goes to no third.
+        levels = np.where(question.blending.shares < 1.0, asked.previous, levels)
+    shown = view.error_pixels(ladder.errors, scale, levels)
+    return levels, shown, view.warnings(choice, ladder, asked)
 
 
-def _answers(
-    model: Synthesizer, question: CrowdQuestion, controls: Singles, labels: Singles, levels: Indices
-) -> _Block:
-    count, joints = len(question), len(model.session.card.skeleton)
+def _answers(model: Synthesizer, asked: _Asked, levels: Indices) -> _Block:
+    joints = len(model.session.card.skeleton)
     shapes = ((joints, 4), (3,), (joints, 3), (), (), (3,))
-    block = _Block(*(np.empty((count, *shape), np.float32) for shape in shapes))
-    times = question.times.astype(np.float32)[:, None]
+    block = _Block(*(np.empty((len(asked), *shape), np.float32) for shape in shapes))
 
     def fill(part: tuple[int, Indices | slice]) -> None:
         level, rows = part
-        asked = controls[rows], times[rows]
-        answers = model.session.run(*asked, *vars(block), labels=labels[rows], level=level)
+        given, labels = (asked.controls[rows], asked.times[rows]), asked.labels[rows]
+        answers = model.session.run(*given, *vars(block), labels=labels, level=level)
         for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
             whole[rows] = answer[:, 0] if name in _TIMED else answer
 
-    # A list first, so that making the parts does not hold workers up; taking results lets errors out.
+    # A list first: making parts must not hold workers up. Taking results lets their errors out.
     list(_WORKERS.map(fill, list(_parts(levels))))
     return block
+
+
+def _blend(
+    model: Synthesizer, asked: _Asked, block: _Block, levels: Indices, blending: Blending
+) -> None:
+    """Mix into the poses, in place, those of the levels that characters are on their way from."""
+    rows = np.flatnonzero((blending.shares < 1.0) & (blending.levels != levels))
+    if len(rows):
+        before = _answers(model, asked.rows(rows), blending.levels[rows])
+        shares = blending.shares[rows].astype(np.float32)
+        for name, whole in vars(block).items():
+            mixing = blend.rotations if name == "rotations" else blend.straight
+            whole[rows] = mixing(getattr(before, name), whole[rows], shares)
 
 
 _TIMED = ("rotations", "root_position", "travel")

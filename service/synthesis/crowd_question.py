@@ -18,13 +18,22 @@ Root = Literal["travelling", "in_place"]
 
 
 @dataclass(frozen=True)
+class Blending:
+    """Levels (N,) that characters are on their way from, and how much of it (N,) is behind them."""
+
+    levels: Indices
+    shares: Floats
+
+
+@dataclass(frozen=True)
 class CrowdQuestion:
     """One pose of each of N characters.
 
     controls: (N,) by name, in their units. times (N,): s from the start of each character's clip.
     performers: who is asked for, each once, None for somebody who was never seen; performer (N,):
     which of them each character is. detail: levels of detail (N,), or the view to choose them by.
-    extrapolate: what to do with controls outside what was sampled.
+    extrapolate: what to do with controls outside what was sampled. blending: of levels that
+    characters are on their way from, where they are.
 
     Raises InvalidField, with the index of the first character at fault, for rows that are missing
     or too many, numbers that are not finite, and places farther than float32 can tell.
@@ -38,6 +47,7 @@ class CrowdQuestion:
     detail: Indices | View
     root: Root
     extrapolate: Literal["warn", "refuse"]
+    blending: "Blending | None" = None
 
     def __post_init__(self) -> None:
         for field, column in self._columns().items():
@@ -46,6 +56,9 @@ class CrowdQuestion:
             _check(field, column, np.isfinite(column), "a finite number")
         near = np.abs(self.placement.positions) <= FARTHEST
         _check("position", self.placement.positions, near, f"at most {FARTHEST:g} m")
+        if self.blending is not None:
+            shares = self.blending.shares
+            _check("blend", shares, (shares >= 0.0) & (shares <= 1.0), "0 to 1")
 
     def __len__(self) -> int:
         return len(self.times)
@@ -53,6 +66,7 @@ class CrowdQuestion:
     def _columns(self) -> dict[str, Floats | Indices]:
         seen = isinstance(self.detail, View)
         levels = self.detail.previous if isinstance(self.detail, View) else self.detail
+        own = self.blending
         return {
             **{f"controls/{name}": values for name, values in self.controls.items()},
             "time": self.times,
@@ -60,6 +74,7 @@ class CrowdQuestion:
             "heading": self.placement.headings,
             "performer": self.performer,
             **({} if levels is None else {"previous_level" if seen else "level": levels}),
+            **({} if own is None else {"from_level": own.levels, "blend": own.shares}),
         }
 
 
@@ -69,8 +84,12 @@ def check_levels(question: CrowdQuestion, count: int) -> None:
         field, levels = "previous_level", question.detail.previous
     else:
         field, levels = "level", question.detail
-    if levels is not None:
-        _check(field, levels, (levels >= 0) & (levels < count), f"0 to {count - 1}")
+    columns = {field: levels}
+    if question.blending is not None:
+        columns["from_level"] = question.blending.levels
+    for name, column in columns.items():
+        if column is not None:
+            _check(name, column, (column >= 0) & (column < count), f"0 to {count - 1}")
 
 
 def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:

@@ -33,6 +33,12 @@ def card(model: Synthesizer) -> dict[str, Any]:
     return {"identity": model.identity, **cards.plain_values(model.session.card)}
 
 
+def attachment(content: bytes, media_type: str, name: str) -> Response:
+    """A file to save."""
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(content, headers=headers, media_type=media_type)
+
+
 def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
     """A clip as a file to save; what its format cannot carry travels in headers."""
     name = trust.model.partition("@")[0]

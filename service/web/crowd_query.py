@@ -4,6 +4,7 @@ All lists have one length, the number of characters; what is no list holds for e
 nothing is a list there is one character.
 """
 
+from collections.abc import Sequence
 from itertools import chain
 from typing import Annotated, Literal
 
@@ -13,14 +14,16 @@ import numpy as np
 from service.motion.conventions import Floats, Indices
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
-from service.synthesis.crowd_question import CrowdQuestion, Root
+from service.synthesis.crowd_question import Blending, CrowdQuestion, Root
 from service.synthesis.synthesizer import Policy
 from service.synthesis.view import Camera, View
 from service.web import decoding
 from service.web.problems import pointer
 
 PIXELS = 1.0
-Level = Annotated[int, msgspec.Meta(ge=0, le=127)]
+# JSON has one kind of number: 1.0 is a whole one.
+Level = Annotated[float, msgspec.Meta(ge=0, le=127)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Numbers = float | list[float]
 
 
@@ -42,6 +45,8 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     performer: str | list[str | None] | None = None
     level: Level | list[Level] | Literal["auto"] = 0
     previous_level: list[Level] | None = None
+    from_level: list[Level] | None = None
+    blend: Share | list[Share] | None = None
     camera: CameraBody | None = None
     pixels: Annotated[float, msgspec.Meta(ge=0)] | None = None
     budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
@@ -71,6 +76,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
         _detail(body, count),
         body.root,
         body.extrapolate,
+        _blending(body, count),
     )
 
 
@@ -86,8 +92,7 @@ def _control(name: str, raw: msgspec.Raw) -> Numbers:
 def _count(controls: dict[str, Numbers], body: CrowdBody, most: float) -> int:
     """How many characters all lists are for."""
     fields = {f"controls/{name}": values for name, values in controls.items()} | {
-        name: getattr(body, name)
-        for name in ("time", "position", "heading", "performer", "level", "previous_level")
+        name: getattr(body, name) for name in CrowdBody.__struct_fields__ if name != "controls"
     }
     sizes = {name: len(values) for name, values in fields.items() if isinstance(values, list)}
     first, count = next(iter(sizes.items()), ("", 1))
@@ -126,8 +131,27 @@ def _detail(body: CrowdBody, count: int) -> Indices | View:
     for name in ("previous_level", "camera", "pixels", "budget_ms"):
         if getattr(body, name) is not None:
             raise InvalidField(name, 'given without level "auto", expected only with it')
-    given = body.level
-    return np.array(given) if isinstance(given, list) else np.full(count, given)
+    given = [body.level] * count if isinstance(body.level, float) else body.level
+    return _levels("level", given)
+
+
+def _levels(name: str, given: Sequence[float]) -> Indices:
+    values = np.array(given)
+    parts = np.flatnonzero(values % 1.0)
+    if len(parts):
+        place, found = str(parts[0]), values[parts[0]]
+        raise decoding.bad_body(f"{found:g}, expected a whole number", pointer(name, place))
+    return values.astype(np.int64)
+
+
+def _blending(body: CrowdBody, count: int) -> Blending | None:
+    if body.from_level is None and body.blend is None:
+        return None
+    if body.from_level is None or body.blend is None:
+        raise InvalidField("blend", "expected from_level and blend, or neither")
+    if body.level == "auto" and body.previous_level is None:
+        raise InvalidField("previous_level", 'missing; level "auto" with blend holds it')
+    return Blending(_levels("from_level", body.from_level), _column(body.blend, count))
 
 
 def _view(body: CrowdBody) -> View:
@@ -139,5 +163,5 @@ def _view(body: CrowdBody) -> View:
         Camera(np.array(lens.position), lens.fov, lens.height),
         PIXELS if body.pixels is None else body.pixels,
         None if body.budget_ms is None else body.budget_ms / 1000.0,
-        None if previous is None else np.array(previous),
+        None if previous is None else _levels("previous_level", previous),
     )

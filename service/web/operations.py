@@ -9,11 +9,12 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.encode import ENCODERS, Encoder, poses
+from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
 from service.motion.answer import ClipAnswer, PoseAnswer
+from service.synthesis import crowd
 from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
-from service.web import answers, body, contract, query
+from service.web import answers, body, contract, crowd_query, query
 from service.web.query import ClipQuestion, PoseQuestion
 from service.web.settings import Settings
 
@@ -73,6 +74,19 @@ async def query_clip(encoder: Encoder, service: Service, request: Request) -> Re
     return await _clip(model, query.clip_of_body(content), encoder)
 
 
+async def query_crowd(encoder: CrowdEncoder, service: Service, request: Request) -> Response:
+    """Poses of a crowd in the encoder's format, asked for by a body."""
+    model, settings = _model(service, request), service.settings
+    content = await body.read(request, settings.crowd_body_limit)
+    most = min(settings.crowd_limit, encoder.most)
+    made = await run_in_threadpool(_crowd, model, encoder, content, most)
+    return answers.attachment(made, encoder.media_type, f"{model.name}.{encoder.extension}")
+
+
+def _crowd(model: Synthesizer, encoder: CrowdEncoder, content: bytes, most: float) -> bytes:
+    return encoder.encode(crowd.poses(model, crowd_query.of_body(content, most)))
+
+
 async def live(service: Service, request: Request) -> Response:
     """That the process answers."""
     return answers.document({"status": "live"})
@@ -96,6 +110,7 @@ OPERATIONS: dict[str, Handler] = {
     "queryPose": query_pose,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
+    **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,

@@ -58,7 +58,7 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     times: list[float]
     extrapolate: Policy = POLICY
     performer: str | None = None
-    level: int = 0
+    level: float = 0.0
 
 
 class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,7 +70,7 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     end: float | None = None
     extrapolate: Policy = POLICY
     performer: str | None = None
-    level: int = 0
+    level: float = 0.0
 
 
 _POSE = msgspec.json.Decoder(PoseBody)
@@ -112,7 +112,8 @@ def pose_of_body(content: bytes) -> PoseQuestion:
     """Question of a JSON body."""
     body = decoding.decoded(_POSE, content)
     controls = _controls(body.controls)
-    return PoseQuestion(controls, body.times, body.extrapolate, body.performer, body.level)
+    level = _level(body.level)
+    return PoseQuestion(controls, body.times, body.extrapolate, body.performer, level)
 
 
 def clip_of_body(content: bytes) -> ClipQuestion:
@@ -125,7 +126,7 @@ def clip_of_body(content: bytes) -> ClipQuestion:
         body.end,
         body.extrapolate,
         body.performer,
-        body.level,
+        _level(body.level),
     )
 
 
@@ -153,6 +154,13 @@ def _number(name: str, text: str) -> float:
     if not math.isfinite(value):
         raise _bad_parameter(name, f"{text!r}, expected a finite number")
     return value
+
+
+def _level(given: float) -> int:
+    # JSON has one kind of number: 1.0 is a whole one.
+    if not given.is_integer():
+        raise decoding.bad_body(f"{given:g}, expected a whole number", "/level")
+    return int(given)
 
 
 def _whole(name: str, text: str) -> int:
