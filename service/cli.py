@@ -11,10 +11,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import orjson
 import typer
 
-from service import __version__, crowds
+from service import __version__
 from service.encode import ENCODERS, poses
 from service.motion import card as cards
 from service.motion import files
@@ -29,6 +30,7 @@ from service.motion.errors import (
 )
 from service.synthesis import library, session
 from service.synthesis.synthesizer import Policy, Synthesizer
+from service.synthesis.view import Camera
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -133,9 +135,14 @@ def clip(
 @app.command()
 def crowd(
     model: ModelPath,
-    output: Annotated[Path, typer.Option("--output", "-o", help="the .npz file to write")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="usd, usda, usdc, usdz or npz, by its ending")
+    ],
     count: Annotated[
         int | None, typer.Option(help="characters, each on a way of its own; 500 if not said")
+    ] = None,
+    motions: Annotated[
+        int | None, typer.Option(help="different motions they share; each its own if not said")
     ] = None,
     paths: Annotated[
         Path | None,
@@ -146,11 +153,49 @@ def crowd(
     seconds: Annotated[float, typer.Option(help="how long they walk")] = 10.0,
     fps: Annotated[float, typer.Option(help="frames a second")] = 30.0,
     seed: Annotated[int, typer.Option(help="of all that is random")] = 0,
+    level: LevelOfDetail = 0,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="instead of a level: where one looks from, m; levels are chosen by what shows",
+            metavar="X,Y,Z",
+        ),
+    ] = None,
+    fov: Annotated[float, typer.Option(help="vertical field of view, rad")] = 1.0472,
+    height: Annotated[float, typer.Option(help="of the image, pixels")] = 1080.0,
+    pixels: Annotated[float, typer.Option(help="that a level's error may cover")] = 1.0,
+    instancing: Annotated[
+        str, typer.Option(help="references, scenegraph or flatten: what characters share in USD")
+    ] = "references",
     json: Json = False,
 ) -> None:
     """Write a crowd that walks, each character on its own way at its own changing speed."""
-    facts = crowds.write(model, crowds.Order(count, paths, seconds, fps, seed), output)
+    from service import crowds
+    from service.synthesis.walk import order
+
+    if paths and count is not None:
+        raise InvalidField("count", f"{count}, expected none: every path has one character")
+    asked = order.Order(
+        count=order.COUNT if count is None else count,
+        routes=crowds.routes(paths) if paths else (),
+        motions=motions,
+        seconds=seconds,
+        fps=fps,
+        seed=seed,
+        level=level,
+        camera=None if camera is None else lens(camera, fov, height),
+        pixels=pixels,
+    )
+    facts = crowds.write(open_model(model), asked, instancing, output)
     typer.echo(as_json(facts) if json else crowds.said(facts))
+
+
+def lens(position: str, fov: float, height: float) -> Camera:
+    """Camera at a position in words; InvalidField for one that is none."""
+    try:
+        return Camera(np.array([float(word) for word in position.split(",")]), fov, height)
+    except ValueError as fault:
+        raise InvalidField("camera", f"{position!r}, expected X,Y,Z in metres") from fault
 
 
 @app.command()

@@ -1,7 +1,7 @@
 """The `crowd` command: from a model file to a file of characters who walk, and what to tell."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,62 +10,52 @@ import numpy as np
 import orjson
 import typer
 
-from service.encode import crowd_arrays
+from service.encode import crowd, crowd_arrays
 from service.motion.conventions import Floats
 from service.motion.crowd import CrowdClip, Motions
 from service.motion.errors import FileError, InvalidField
-from service.synthesis import session
-from service.synthesis.walk import company, gait, given, skating
+from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.walk import gait, given, order, skating
 from service.synthesis.walk.gait import Gait
-from service.synthesis.walk.march import Plan
+from service.synthesis.walk.given import Route
+from service.synthesis.walk.order import Order
 
-COUNT = 500
-
-
-@dataclass(frozen=True)
-class Order:
-    """What was asked for: `count` characters that wander, or as many as the file of `paths` has."""
-
-    count: int | None
-    paths: Path | None
-    seconds: float
-    fps: float
-    seed: int
+ENDINGS = (*crowd.FILES, "npz")
 
 
-def write(model: Path, order: Order, output: Path) -> dict[str, Any]:
+def write(model: Synthesizer, asked: Order, instancing: str, output: Path) -> dict[str, Any]:
     """Write a crowd and tell what it is, as plain values.
 
     Raises InvalidField and FileError.
     """
-    if output.suffix != ".npz":
-        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .npz")
-    opened = gait.of(session.load(model))
-    plan = _plan(opened, order)
-    crowd = company.crowd(opened.session, plan)
-    feet = _Feet(opened, order.fps)
-    crowd_arrays.write(_watched(crowd, feet), output)
-    characters = len(plan.who)
+    ending = output.suffix.removeprefix(".")
+    if ending not in ENDINGS:
+        raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(ENDINGS)}")
+    opened = gait.of(model.session)
+    made = order.crowd(model, opened, asked)
+    feet = _Feet(opened, asked.fps)
+    watched = _watched(made, asked.motions or len(made.motion), feet)
+    if ending == "npz":
+        crowd_arrays.write(watched, output)
+    else:
+        crowd.write(watched, output, instancing)
     return {
         "file": str(output),
-        "model": crowd.facts["model"],
-        "characters": characters,
-        "frames": crowd.frames,
-        "rate": crowd.rate,
-        "seed": order.seed,
-        "outside_share": crowd.facts["outside_share"],
+        "model": made.facts["model"],
+        "characters": len(made.motion),
+        "motions": asked.motions or len(made.motion),
+        "frames": made.frames,
+        "rate": made.rate,
+        "seed": asked.seed,
+        "level_shares": made.facts["level_shares"],
+        "outside_share": made.facts["outside_share"],
         **feet.facts(),
     }
 
 
-def _plan(opened: Gait, order: Order) -> Plan:
-    if order.paths is None:
-        count = COUNT if order.count is None else order.count
-        return company.wandering(opened, count, order.seconds, order.fps, order.seed)
-    if order.count is not None:
-        raise InvalidField("count", f"{order.count}, expected none: every path has one character")
-    routes = given.parse(_json(order.paths))
-    return company.following(opened, routes, order.seconds, order.fps, order.seed)
+def routes(path: Path) -> Sequence[Route]:
+    """Routes of a JSON file; FileError and InvalidField where it holds none."""
+    return given.parse(_json(path))
 
 
 def _json(path: Path) -> Any:
@@ -99,24 +89,26 @@ class _Feet:
         }
 
 
-def _watched(crowd: CrowdClip, feet: _Feet) -> CrowdClip:
+def _watched(made: CrowdClip, motions: int, feet: _Feet) -> CrowdClip:
     """The crowd, with a bar on standard error that grows as its motions are made."""
 
     def batches() -> Iterator[Motions]:
-        with typer.progressbar(length=len(crowd.motion), label="walking", file=sys.stderr) as bar:
-            for motions in crowd.batches:
-                feet.look(motions)
-                yield motions
-                bar.update(len(motions))
+        with typer.progressbar(length=motions, label="walking", file=sys.stderr) as bar:
+            for batch in made.batches:
+                feet.look(batch)
+                yield batch
+                bar.update(len(batch))
 
-    return replace(crowd, batches=batches())
+    return replace(made, batches=batches())
 
 
 def said(facts: dict[str, Any]) -> str:
     """What to tell of a crowd on a few lines."""
+    shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
     lines = [
         f"{facts['file']}: {facts['characters']} characters, {facts['frames']} frames at "
-        f"{facts['rate']:g} a second, seed {facts['seed']}"
+        f"{facts['rate']:g} a second, seed {facts['seed']}",
+        f"poses at each level of detail, the finest first: {', '.join(shares)}",
     ]
     if "skate_cm_per_s" in facts:
         lines.append(

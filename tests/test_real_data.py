@@ -10,7 +10,7 @@ from service.motion import ground, quat
 from service.motion.conventions import UP
 from service.synthesis import session
 from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.walk import company, gait, march, skating
+from service.synthesis.walk import company, detail, gait, march, skating
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
 CLIPS = {"hdm05_grab_high": 29, "hdm05_deposit_floor": 32, "cmu_walk": 78}
@@ -147,6 +147,12 @@ def test_a_walk_closes_its_loop(made, model):
     assert away[50] > 0.3
 
 
+def finest(opened, plan):
+    """Motions of all characters of a plan, at the finest level."""
+    shown = detail.constant(0, plan.phases.shape)
+    return company.motions(opened, plan, np.arange(len(plan.who)), shown)
+
+
 def source_skate(clips, feet, rate):
     """Sliding speeds of captured clips' feet, m/s, at a rate."""
     speeds = []
@@ -169,7 +175,11 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
     card, rate = exported.card, 30.0
     walk = gait.of(model.session)
     plan = company.wandering(walk, 150, 10.0, rate, 0)
-    feet = skating.of(card, company.motions(walk.session, plan, np.arange(150)), rate)
+    feet = skating.of(
+        card,
+        finest(walk.session, plan),
+        rate,
+    )
     count = len(card.performers)
     crowd = mean_walker(feet.mean(axis=1), plan.who, count)
     moved_by = np.array(card.moved_by)
@@ -181,5 +191,9 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
     starts = plan.places[:, 0], plan.headings[:, 0]
     free = march.roam(walk, plan.controls, plan.who, plan.phases[:, 0], starts, rate)
     assert np.abs(free.places - plan.places).max() < 0.3
-    left = skating.of(card, company.motions(walk.session, free, np.arange(150)), rate)
+    left = skating.of(
+        card,
+        finest(walk.session, free),
+        rate,
+    )
     assert left.mean() == pytest.approx(feet.mean(), rel=0.01)

@@ -2,19 +2,23 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from service.motion import blend
 from service.motion.card import ModelCard
 from service.motion.conventions import Indices
 from service.motion.crowd import CrowdClip, Motions, Placement
 from service.motion.errors import InvalidField
 from service.synthesis.session import Session
 from service.synthesis.walk import given, march, plane, stride, wander
+from service.synthesis.walk.detail import Detail
 from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.given import Route
 from service.synthesis.walk.march import Plan
+from service.synthesis.walk.stride import Poses
 
 # Motions that are made at a time: a few megabytes of poses for ten seconds.
 TOGETHER = 50
@@ -22,6 +26,8 @@ TOGETHER = 50
 
 # Poses that one plan may be of: its own numbers take some hundred bytes each.
 MOST_POSES = 50_000_000
+Pairs = tuple[Indices, Indices]
+"""Characters (K,) and frames (K,)."""
 RATES = (1.0, 1000.0)
 
 
@@ -65,7 +71,7 @@ def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
     return frames
 
 
-def crowd(session: Session, plan: Plan) -> CrowdClip:
+def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:
     """Crowd of a plan, each character with a motion of its own, in the frame that it begins in."""
     characters, frames = plan.phases.shape
     return CrowdClip(
@@ -74,9 +80,16 @@ def crowd(session: Session, plan: Plan) -> CrowdClip:
         frames,
         Placement(plan.roots[:, 0], plan.headings[:, 0]),
         np.arange(characters),
-        _batches(session, plan.at_home()),
-        _facts(session, plan),
+        _batches(session, plan.at_home(), shown),
+        {**_facts(session, plan), "level_shares": _shares(session, shown)},
     )
+
+
+def sharing(session: Session, plan: Plan, shown: Detail, stands: Placement) -> CrowdClip:
+    """Crowd of more characters than a plan has, who stand at places of their own and take turns
+    with its motions."""
+    one_each = crowd(session, plan, shown)
+    return replace(one_each, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
 
 
 def _facts(session: Session, plan: Plan) -> dict[str, Any]:
@@ -88,22 +101,29 @@ def _facts(session: Session, plan: Plan) -> dict[str, Any]:
     }
 
 
+def _shares(session: Session, shown: Detail) -> list[float]:
+    """Share of the poses that is shown at each level."""
+    counts = np.bincount(shown.levels.ravel(), minlength=len(session.card.levels))
+    return [float(f"{share:.4g}") for share in counts / shown.levels.size]
+
+
 def _outside(card: ModelCard, plan: Plan) -> float:
     """Share of the poses with some control outside its sampled range."""
     low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
     return float(np.mean(np.any((plan.controls < low) | (plan.controls > high), axis=-1)))
 
 
-def _batches(session: Session, plan: Plan) -> Iterator[Motions]:
+def _batches(session: Session, plan: Plan, shown: Detail) -> Iterator[Motions]:
     for first in range(0, len(plan.who), TOGETHER):
-        yield motions(session, plan, np.arange(first, min(first + TOGETHER, len(plan.who))))
+        who = np.arange(first, min(first + TOGETHER, len(plan.who)))
+        yield motions(session, plan, who, shown.of(who))
 
 
-def motions(session: Session, plan: Plan, who: Indices) -> Motions:
-    """Motions of some characters (M,) at the finest level, where the plan has them."""
+def motions(session: Session, plan: Plan, who: Indices, shown: Detail) -> Motions:
+    """Motions of some characters (M,), where the plan has them, at the levels of their own."""
     shape = (len(who), plan.phases.shape[1])
-    everyone, frames = (pairs.ravel() for pairs in np.meshgrid(who, range(shape[1]), indexing="ij"))
-    posed = march.pose(session, plan, everyone, frames)
+    pairs = np.meshgrid(who, range(shape[1]), indexing="ij")
+    posed = _posed(session, plan, (pairs[0].ravel(), pairs[1].ravel()), shown)
     roots = plane.at_height(posed.places, posed.heights).astype(np.float32)
     # A character's bones do not grow as it speeds up: they are those of its mean controls.
     usual = plan.controls[who].mean(axis=1)
@@ -112,5 +132,29 @@ def motions(session: Session, plan: Plan, who: Indices) -> Motions:
         posed.rotations.astype(np.float32).reshape(*shape, *posed.rotations.shape[1:]),
         roots.reshape(*shape, 3),
         bones,
-        np.zeros(shape, dtype=np.int64),
+        shown.levels,
     )
+
+
+def _posed(session: Session, plan: Plan, pairs: Pairs, shown: Detail) -> Poses:
+    """Poses of pairs of characters and frames, mixed where they are between two levels."""
+    after, shares = _at_levels(session, plan, pairs, shown.levels.ravel()), shown.shares.ravel()
+    between = np.flatnonzero(shares < 1.0)
+    if len(between):
+        some = pairs[0][between], pairs[1][between]
+        before = _at_levels(session, plan, some, shown.before.ravel()[between])
+        for name, whole in vars(after).items():
+            mix = blend.rotations if name == "rotations" else blend.straight
+            whole[between] = mix(getattr(before, name), whole[between], shares[between])
+    return after
+
+
+def _at_levels(session: Session, plan: Plan, pairs: Pairs, levels: Indices) -> Poses:
+    joints, count = len(session.card.skeleton), len(levels)
+    poses = Poses(np.empty((count, joints, 4)), np.empty(count), np.empty(count, dtype=complex))
+    for level in np.unique(levels).tolist():
+        rows = np.flatnonzero(levels == level)
+        own = march.pose(session, plan, pairs[0][rows], pairs[1][rows], level)
+        for name, whole in vars(poses).items():
+            whole[rows] = getattr(own, name)
+    return poses

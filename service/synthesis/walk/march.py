@@ -92,11 +92,11 @@ def follow(
     return Plan(controls, who, _phases(own, phases, rate), places, tangents - own.drifts, rate)
 
 
-def pose(session: Session, plan: Plan, who: Indices, frames: Indices) -> Poses:
+def pose(session: Session, plan: Plan, who: Indices, frames: Indices, level: int = 0) -> Poses:
     """Poses of K pairs of a character (K,) and a frame (K,), where the plan has them."""
     performers = stride.labels(session, plan.who[who])
     pair = who, frames
-    own = stride.poses(session, plan.controls[pair], performers, plan.phases[pair])
+    own = stride.poses(session, plan.controls[pair], performers, plan.phases[pair], level)
     headings = plan.headings[pair]
     places = plan.places[pair] + own.places * plane.facing(headings)
     return Poses(plane.turned(own.rotations, headings), own.heights, places)

@@ -6,7 +6,7 @@ from service.motion import ground, skeleton
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.crowd import Motions
-from service.synthesis.walk import company, march, plane
+from service.synthesis.walk import company, detail, march, plane
 from service.synthesis.walk.gait import Gait
 
 
@@ -39,7 +39,8 @@ def of_strides(gait: Gait, rate: float) -> Floats:
     origin = plane.of(np.zeros((len(controls), 3)))
     held = np.repeat(controls[:, None], length, axis=1)
     plan = march.roam(gait, held, who, nowhere, (origin, nowhere), rate)
-    return of(card, company.motions(gait.session, plan, np.arange(len(controls))), rate)
+    finest = detail.constant(0, plan.phases.shape)
+    return of(card, company.motions(gait.session, plan, np.arange(len(controls)), finest), rate)
 
 
 def usual(gait: Gait, rate: float) -> float:

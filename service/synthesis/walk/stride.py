@@ -61,20 +61,25 @@ class Poses:
     places: Plane
 
 
-def strides(session: Session, controls: Floats, labels: Floats) -> Strides:
-    """Cycles of controls (B, d) as performers of labels (B, p) walk them."""
-    ends = np.tile([0.0, AFTER], (len(controls), 1))
+def strides(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
+    """Cycles of controls (B, d) as performers of labels (B, p) walk them at a level of detail."""
+    ends = np.full((len(controls), 1), AFTER)
     asked = ("duration", "travel", "root_position")
-    durations, travel, roots = _ask(session, controls, ends, labels, *asked)
-    gap, turns = travel[:, 1, 1] + 1j * travel[:, 1, 0], travel[:, 1, 2]
-    return Strides(durations, plane.straightened(gap, turns), turns, plane.of(roots[:, 0]))
+    durations, travel, roots = _ask(session, controls, ends, labels, level, *asked)
+    gap, turns = travel[:, 0, 1] + 1j * travel[:, 0, 0], travel[:, 0, 2]
+    # Without its travel a cycle ends where it began.
+    starts = plane.of(roots[:, 0]) - gap
+    return Strides(durations, plane.straightened(gap, turns), turns, starts)
 
 
-def poses(session: Session, controls: Floats, labels: Floats, phases: Floats) -> Poses:
+def poses(
+    session: Session, controls: Floats, labels: Floats, phases: Floats, level: int = 0
+) -> Poses:
     """Poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, from 0 to 1."""
-    own = strides(session, controls, labels)
+    own = strides(session, controls, labels, level)
     times = (phases * own.durations)[:, None]
-    rotations, roots = _ask(session, controls, times, labels, "rotations", "root_position")
+    asked = ("rotations", "root_position")
+    rotations, roots = _ask(session, controls, times, labels, level, *asked)
     turned = phases * own.turns
     gone = plane.of(roots[:, 0]) - own.starts - plane.arc(phases * own.ways, turned)
     return Poses(
@@ -85,7 +90,7 @@ def poses(session: Session, controls: Floats, labels: Floats, phases: Floats) ->
 def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
     """Bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
     begin = np.zeros((len(controls), 1))
-    return _ask(session, controls, begin, labels, "bone_offsets")[0].astype(np.float32)
+    return _ask(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
 
 
 def labels(session: Session, who: Indices) -> Floats:
@@ -95,11 +100,11 @@ def labels(session: Session, who: Indices) -> Floats:
 
 
 def _ask(
-    session: Session, controls: Floats, times: Floats, labels: Floats, *outputs: str
+    session: Session, controls: Floats, times: Floats, labels: Floats, level: int, *outputs: str
 ) -> list[Floats]:
     """Outputs for any number of rows, a batch at a time."""
     answers = [
-        session.run(controls[rows], times[rows], *outputs, labels=labels[rows])
+        session.run(controls[rows], times[rows], *outputs, labels=labels[rows], level=level)
         for rows in _batches(len(controls))
     ]
     return [np.concatenate(parts).astype(np.float64) for parts in zip(*answers, strict=True)]

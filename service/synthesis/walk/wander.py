@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.motion.conventions import Floats, Indices
+from service.motion.crowd import Placement
+from service.synthesis.walk import plane
 from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.paths import STEP, Paths
 from service.synthesis.walk.plane import Plane
@@ -38,16 +40,21 @@ class Cast:
 
 def cast(gait: Gait, count: int, seed: int) -> Cast:
     """Characters of a seed."""
-    rng = np.random.Generator(np.random.PCG64(seed))
-    table = rng.random((count, 6 + 2 * len(WAVES)))
+    table = _table(count, seed)
     performers = len(gait.session.card.performers)
     who = (table[:, 0] * performers).astype(np.int64) if performers else np.full(count, -1)
     return Cast(who, table[:, 1], table[:, 2:])
 
 
+def stands(count: int, seed: int) -> Placement:
+    """Where so many characters stand at first, and where to they face: as their own ways begin."""
+    drawn = _table(count, seed)[:, 2:]
+    return Placement(plane.at_height(_starts(drawn[:, :2]), np.zeros(count)), _facing(drawn))
+
+
 def paths(gait: Gait, characters: Cast, seconds: float) -> Paths:
     """Ways on which characters wander for a time, long enough for the fastest."""
-    spot, (heading, pace) = characters.drawn[:, :2], characters.drawn[:, 2:4].T
+    spot, pace = characters.drawn[:, :2], characters.drawn[:, 3]
     waves = 2.0 * np.pi * characters.drawn[:, 4:].reshape(len(spot), 2, len(WAVES))
     places = int(np.ceil(gait.region.speeds[1] * seconds / STEP)) + 3
     along = np.linspace(0.0, (places - 1) * STEP, places)
@@ -56,8 +63,16 @@ def paths(gait: Gait, characters: Cast, seconds: float) -> Paths:
     bends = _bends(gait, speeds, _wave(along, waves[:, 1]))
     # The trapezoidal rule: the bend of a step is the mean of those at its ends.
     turns = np.cumsum(0.5 * STEP * (bends[:, 1:] + bends[:, :-1]), axis=1)
-    headings = 2.0 * np.pi * heading[:, None] + np.pad(turns, ((0, 0), (1, 0)))
+    headings = _facing(characters.drawn)[:, None] + np.pad(turns, ((0, 0), (1, 0)))
     return Paths(_starts(spot), headings, speeds, np.full(len(spot), along[-1]))
+
+
+def _table(count: int, seed: int) -> Floats:
+    return np.random.Generator(np.random.PCG64(seed)).random((count, 6 + 2 * len(WAVES)))
+
+
+def _facing(drawn: Floats) -> Floats:
+    return 2.0 * np.pi * drawn[:, 2]
 
 
 def _starts(spot: Floats) -> Plane:

@@ -8,7 +8,7 @@ import pytest
 from service.motion import quat
 from service.motion.errors import InvalidField
 from service.synthesis import session
-from service.synthesis.walk import company, gait, march, plane
+from service.synthesis.walk import company, detail, gait, march, plane
 
 RATE = 30.0
 
@@ -20,7 +20,8 @@ def own(walk_path):
 
 def made(own, count, seed=3, seconds=1.0):
     """A crowd that wanders, and its motions."""
-    crowd = company.crowd(own.session, company.wandering(own, count, seconds, RATE, seed))
+    plan = company.wandering(own, count, seconds, RATE, seed)
+    crowd = company.crowd(own.session, plan, detail.constant(0, plan.phases.shape))
     return crowd, list(crowd.batches)
 
 
@@ -50,7 +51,7 @@ def test_fewer_characters_are_the_first_of_more(own):
 
 def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
     plan = company.wandering(own, 4, 2.0, RATE, 0)
-    crowd = company.crowd(own.session, plan)
+    crowd = company.crowd(own.session, plan, detail.constant(0, plan.phases.shape))
     motions = next(iter(crowd.batches))
     at_home = motions.root_position[:, 0] * [1.0, 0.0, 1.0]
     # A pelvis sways about the way, no farther.

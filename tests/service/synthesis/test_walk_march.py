@@ -8,13 +8,29 @@ import pytest
 from service.motion import ground, skeleton
 from service.motion.errors import InvalidField
 from service.synthesis import session
-from service.synthesis.walk import company, gait, given, march, plane, skating, stride, wander
+from service.synthesis.walk import (
+    company,
+    detail,
+    gait,
+    given,
+    march,
+    plane,
+    skating,
+    stride,
+    wander,
+)
 from service.synthesis.walk.given import Route
 
 # float32 of places some metres away, and of phases after some strides.
 SINGLE = 2e-5
 RATE = 30.0
 ANN = np.zeros(1, dtype=np.int64)
+
+
+def finest(opened, plan):
+    """Motions of all characters of a plan, at the finest level."""
+    shown = detail.constant(0, plan.phases.shape)
+    return company.motions(opened, plan, np.arange(len(plan.who)), shown)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +47,9 @@ def held(own, veer, frames, rate, phase=0.0):
 
 def joints(own, plan):
     """Places of all joints (N, F, J, 3), m."""
-    made = company.motions(own.session, plan, np.arange(len(plan.who)))
+    made = company.motions(
+        own.session, plan, np.arange(len(plan.who)), detail.constant(0, plan.phases.shape)
+    )
     local = skeleton.translations(
         made.bone_offsets.astype(np.float64), made.root_position.astype(np.float64)
     )
@@ -139,7 +157,7 @@ def test_who_walks_keeps_to_the_way(own):
 
 def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     plan = wandering(own, 60)
-    made = company.motions(own.session, plan, np.arange(60))
+    made = finest(own.session, plan)
     found = skating.of(own.session.card, made, RATE).mean()
     strides = skating.usual(own, RATE)
     each = skating.of_strides(own, RATE)[:, 0]
@@ -148,13 +166,13 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     assert 0.0 < found < 1.2 * strides < 0.05
     # Negative control: a root that goes on a tenth too fast.
     fast = replace(plan, places=plan.places + 0.1 * (plan.places - plan.places[:, :1]))
-    slid = company.motions(own.session, fast, np.arange(60))
+    slid = finest(own.session, fast)
     assert skating.of(own.session.card, slid, RATE).mean() > 2.0 * strides
 
 
 def test_the_measure_is_that_of_the_evaluation(own, strides):
     plan = held(own, 200.0, 34, RATE)
-    made = company.motions(own.session, plan, np.arange(1))
+    made = finest(own.session, plan)
     feet = joints(own, plan)[0][:, list(own.session.card.feet)]
     length = round(float(np.mean(own.session.card.durations)) * RATE) + 1
     assert skating.of(own.session.card, made, RATE)[0, 0] == pytest.approx(
