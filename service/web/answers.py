@@ -1,10 +1,11 @@
 """Answers as they travel: JSON documents, and the headers that say how far a clip is trusted."""
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
 import orjson
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from service.encode import Encoder
 from service.motion import card as cards
@@ -37,6 +38,15 @@ def attachment(content: bytes, media_type: str, name: str) -> Response:
     """A file to save."""
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(content, headers=headers, media_type=media_type)
+
+
+def streamed(pieces: Iterator[bytes], media_type: str, name: str, model: str) -> Response:
+    """A file to save, sent while it is made."""
+    headers = {
+        "Content-Disposition": f'attachment; filename="{name}"',
+        "Posefield-Model": model,
+    }
+    return StreamingResponse(pieces, headers=headers, media_type=media_type)
 
 
 def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:

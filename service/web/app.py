@@ -14,7 +14,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.encode import ENCODERS
+from service.encode import CROWD_ENCODERS, ENCODERS, crowd
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.web import contract, problems
@@ -26,7 +26,8 @@ from service.web.settings import Settings
 log = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-CLIP_PATH = re.compile(r"/v1/models/[^/]+/clip\.([^/]+)")
+FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(clip|crowd)\.([^/]+)")
+FORMATS = {"clip": ENCODERS.keys(), "crowd": [*CROWD_ENCODERS, *crowd.STREAMS]}
 
 
 def create_app(library: Library, settings: Settings) -> Starlette:
@@ -96,8 +97,8 @@ async def _of_routing(request: Request, fault: Exception) -> Response:
         detail = f"{request.method}, expected one of {allow}"
         refusal = RequestFault(problems.METHOD_NOT_ALLOWED, detail, headers={"Allow": allow})
         return await problems.of_fault(request, refusal)
-    if clip := CLIP_PATH.fullmatch(path):
-        message = f"no format {clip[1]!r}; there are {', '.join(ENCODERS)}"
+    if asked := FORMAT_PATH.fullmatch(path):
+        message = f"no format {asked[2]!r}; there are {', '.join(FORMATS[asked[1]])}"
         return await problems.of_query_error(request, UnknownFormat("format", message))
     refusal = RequestFault(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")
     return await problems.of_fault(request, refusal)

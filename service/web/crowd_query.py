@@ -43,7 +43,7 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     position: list[tuple[float, float, float]] | None = None
     heading: Numbers = 0.0
     performer: str | list[str | None] | None = None
-    level: Level | list[Level] | Literal["auto"] = 0
+    level: Level | list[Level] | Literal["auto"] = 0.0
     previous_level: list[Level] | None = None
     from_level: list[Level] | None = None
     blend: Share | list[Share] | None = None
@@ -131,8 +131,7 @@ def _detail(body: CrowdBody, count: int) -> Indices | View:
     for name in ("previous_level", "camera", "pixels", "budget_ms"):
         if getattr(body, name) is not None:
             raise InvalidField(name, 'given without level "auto", expected only with it')
-    given = [body.level] * count if isinstance(body.level, float) else body.level
-    return _levels("level", given)
+    return _levels("level", body.level if isinstance(body.level, list) else [body.level] * count)
 
 
 def _levels(name: str, given: Sequence[float]) -> Indices:

@@ -1,6 +1,6 @@
 """What each operation of the contract does: decode, ask, encode."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import ParamSpec, TypeVar
@@ -10,13 +10,16 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
+from service.encode import crowd as crowd_usd
 from service.motion.answer import ClipAnswer, PoseAnswer
 from service.synthesis import crowd
 from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
-from service.web import answers, body, contract, crowd_query, query
+from service.synthesis.walk import gait, order
+from service.web import answers, body, contract, crowd_query, query, walk_query
 from service.web.query import ClipQuestion, PoseQuestion
 from service.web.settings import Settings
+from service.web.walk_query import WalkQuestion
 
 # 200 poses of 33 joints take 1 ms as JSON and 12 ms as USD text; more would hold up other requests.
 INLINE_POSES = 200
@@ -87,6 +90,20 @@ def _crowd(model: Synthesizer, encoder: CrowdEncoder, content: bytes, most: floa
     return encoder.encode(crowd.poses(model, crowd_query.of_body(content, most)))
 
 
+async def get_crowd(ending: str, service: Service, request: Request) -> Response:
+    """A crowd that walks, as USD that is sent while it is made."""
+    model, pairs = _model(service, request), request.query_params.multi_items()
+    question = walk_query.of_pairs(pairs, service.settings)
+    pieces = await run_in_threadpool(_walking, model, question, ending)
+    name, media_type = f"{model.name}.{ending}", ENCODERS[ending].media_type
+    return answers.streamed(pieces, media_type, name, model.identity)
+
+
+def _walking(model: Synthesizer, question: WalkQuestion, ending: str) -> Iterator[bytes]:
+    made = order.crowd(model, gait.of(model.session), question.order)
+    return crowd_usd.stream(made, ending, question.instancing)
+
+
 async def live(service: Service, request: Request) -> Response:
     """That the process answers."""
     return answers.document({"status": "live"})
@@ -111,6 +128,7 @@ OPERATIONS: dict[str, Handler] = {
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
+    **{f"getCrowd{n.capitalize()}": partial(get_crowd, n) for n in crowd_usd.STREAMS},
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,

@@ -81,21 +81,21 @@ _FLOAT = msgspec.json.Decoder(float)
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
     """Question of query parameters: `time` once or more, extrapolate, performer, level, and one
     per control."""
-    times = [_number(name, text) for name, text in pairs if name == "time"]
+    times = [number(name, text) for name, text in pairs if name == "time"]
     if not times:
-        raise _bad_parameter("time", "missing; give seconds from the start of the clip")
-    single = _unique([pair for pair in pairs if pair[0] != "time"])
+        raise bad_parameter("time", "missing; give seconds from the start of the clip")
+    single = unique([pair for pair in pairs if pair[0] != "time"])
     policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
-    level = _whole("level", single.pop("level", "0"))
+    level = whole("level", single.pop("level", "0"))
     return PoseQuestion(_numbers(single), times, policy, performer, level)
 
 
 def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
     """Question of query parameters: fps, start, end, extrapolate, performer, level, and one per
     control."""
-    single = _unique(pairs)
+    single = unique(pairs)
     policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
-    level = _whole("level", single.pop("level", "0"))
+    level = whole("level", single.pop("level", "0"))
     numbers = _numbers(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -130,29 +130,31 @@ def clip_of_body(content: bytes) -> ClipQuestion:
     )
 
 
-def _unique(pairs: Pairs) -> dict[str, str]:
+def unique(pairs: Pairs) -> dict[str, str]:
+    """Texts by name; RequestFault for a name that is given twice."""
     single: dict[str, str] = {}
     for name, text in pairs:
         if name in single:
-            raise _bad_parameter(name, "given twice, expected once")
+            raise bad_parameter(name, "given twice, expected once")
         single[name] = text
     return single
 
 
 def _policy(text: str) -> Policy:
     if text not in get_args(Policy):
-        raise _bad_parameter("extrapolate", f"{text!r}, expected one of {get_args(Policy)}")
+        raise bad_parameter("extrapolate", f"{text!r}, expected one of {get_args(Policy)}")
     return cast(Policy, text)
 
 
 def _numbers(texts: dict[str, str]) -> dict[str, float]:
-    return {name: _number(name, text) for name, text in texts.items()}
+    return {name: number(name, text) for name, text in texts.items()}
 
 
-def _number(name: str, text: str) -> float:
+def number(name: str, text: str) -> float:
+    """Finite number of a text; RequestFault where it is none."""
     value = float(text) if NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
-        raise _bad_parameter(name, f"{text!r}, expected a finite number")
+        raise bad_parameter(name, f"{text!r}, expected a finite number")
     return value
 
 
@@ -163,14 +165,16 @@ def _level(given: float) -> int:
     return int(given)
 
 
-def _whole(name: str, text: str) -> int:
+def whole(name: str, text: str) -> int:
+    """Whole number of a text; RequestFault where it is none."""
     # No level has ten digits; int would read as many as there are.
     if not re.fullmatch("[0-9]{1,9}", text, re.ASCII):
-        raise _bad_parameter(name, f"{text!r}, expected a whole number")
+        raise bad_parameter(name, f"{text!r}, expected a whole number")
     return int(text)
 
 
-def _bad_parameter(name: str, detail: str) -> RequestFault:
+def bad_parameter(name: str, detail: str) -> RequestFault:
+    """Refusal of a query parameter."""
     return RequestFault(BAD_PARAMETER, f"{name}: {detail}", {"parameter": name})
 
 

@@ -14,8 +14,9 @@ class Settings:
     """Settings of the service; each is read from POSEFIELD_ and its name in capitals.
 
     host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
-    crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd. grace:
-    seconds that open requests get to finish after SIGTERM.
+    crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
+    crowd_poses: poses of all motions of one that walks. grace: seconds that open requests get to
+    finish after SIGTERM.
     """
 
     host: str = "127.0.0.1"
@@ -24,6 +25,8 @@ class Settings:
     # A character with six controls, none rounded, takes 250 bytes.
     crowd_body_limit: int = 32 * 1024 * 1024
     crowd_limit: int = 100_000
+    # USD takes 900 bytes for a pose of 31 joints.
+    crowd_poses: int = 500_000
     grace: int = 10
 
     def __post_init__(self) -> None:
@@ -31,6 +34,7 @@ class Settings:
         _within("body_limit", self.body_limit, 1, 64 * 1024 * 1024)
         _within("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
         _within("crowd_limit", self.crowd_limit, 1, 10_000_000)
+        _within("crowd_poses", self.crowd_poses, 1, 50_000_000)
         _within("grace", self.grace, 0, 600)
 
 

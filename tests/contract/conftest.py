@@ -18,10 +18,12 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
-def models(labelled_path, tmp_path_factory) -> Path:
-    """Folder with the model that knows performers under the name that the examples use."""
+def models(labelled_path, walk_path, tmp_path_factory) -> Path:
+    """Folder with models under the names that the examples use: one that knows performers, and one
+    of a gait."""
     folder = tmp_path_factory.mktemp("models")
     shutil.copy(labelled_path, folder / "reach.onnx")
+    shutil.copy(walk_path, folder / "walk.onnx")
     return folder
 
 

@@ -92,6 +92,16 @@ def narrowed(spec, card):
     times = {"type": "number", "minimum": 0, "maximum": 0.8}
     parts["parameters"]["time"]["schema"]["items"] = times
     parts["schemas"]["PoseQuestion"]["properties"]["times"]["items"] = times
+    # That all lists are equally long cannot be said in a schema, nor that this model does not walk.
+    crowd = parts["schemas"]["CrowdQuestion"]
+    level = {"type": "integer", "minimum": 0, "maximum": len(card.levels) - 1}
+    crowd["properties"] = {"controls": exact, "time": times, "level": level}
+    narrow["paths"] = {
+        path: item
+        for path, item in narrow["paths"].items()
+        if not ("crowd" in path and "get" in item)
+    }
+    parts["parameters"]["level"]["schema"] = parts["schemas"]["LevelNumber"] = level
     performers = list(card.performers)
     parts["parameters"]["performer"]["schema"] = {"enum": performers}
     parts["schemas"]["Performer"] = {"enum": [*performers, None]}
