@@ -224,20 +224,26 @@ def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
 def _stay(block: _Block) -> None:
     """Take out of the poses, in place, how far each cycle has got."""
     block.root_position[:, [0, 2]] -= block.travel[:, :2]
-    _turn(block, -block.travel[:, 2])
+    _turn_roots(block, -block.travel[:, 2])
 
 
 def _place(block: _Block, placement: Placement) -> None:
     """Put the poses, in place, where the characters stand."""
-    _turn(block, placement.headings.astype(np.float32))
+    angles = placement.headings.astype(np.float32)
+    _turn_roots(block, angles)
+    _turn_paths(block, angles)
     np.add(block.root_position, placement.positions, out=block.root_position, casting="same_kind")
 
 
-def _turn(block: _Block, angles: Singles) -> None:
-    """Turn roots and their paths, in place, about the vertical through each origin."""
+def _turn_paths(block: _Block, angles: Singles) -> None:
+    """Turn where the roots are, in place, about the vertical through each origin."""
     cos, sin = np.cos(angles), np.sin(angles)
     x, z = block.root_position[:, 0].copy(), block.root_position[:, 2].copy()
     block.root_position[:, 0], block.root_position[:, 2] = cos * x + sin * z, cos * z - sin * x
+
+
+def _turn_roots(block: _Block, angles: Singles) -> None:
+    """Turn the roots themselves, in place, about the vertical."""
     cos, sin = np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None]
     root = block.rotations[:, 0]
     # The product of (cos, 0, sin, 0) with w x y z.

@@ -1,0 +1,322 @@
+"""Crowds: what each character would be answered alone, where it stands, at its level."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.motion import quat, skeleton
+from service.motion.conventions import UP
+from service.motion.crowd import Placement
+from service.motion.errors import InvalidField, OutsideSamples
+from service.synthesis import crowd, library
+from service.synthesis.crowd_question import Blending, CrowdQuestion
+from service.synthesis.view import Camera, View
+
+COUNT = 60
+# The graph answers in float32, and sums a batch in another order than one row; m.
+FLOAT32 = 3e-5
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return library.load([labelled_path]).models["labelled"]
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path):
+    return next(iter(library.load([walk_path]).models.values()))
+
+
+def asked(model, count=COUNT, **given):
+    """A crowd all over a model, each character somebody at some time somewhere."""
+    rng = np.random.Generator(np.random.PCG64(2))
+    card = model.session.card
+    ends = [(c.minimum, c.maximum) for c in card.controls]
+    question = CrowdQuestion(
+        {
+            c.name: rng.uniform(low, high, count)
+            for c, (low, high) in zip(card.controls, ends, strict=True)
+        },
+        rng.uniform(0.0, 0.5, count),
+        Placement(rng.uniform(-50.0, 50.0, (count, 3)), rng.uniform(-4.0, 4.0, count)),
+        (None, *card.performers),
+        rng.integers(0, 1 + len(card.performers), count),
+        rng.integers(0, len(card.levels), count),
+        "travelling",
+        "warn",
+    )
+    return replace(question, **given)
+
+
+def joints(rotations, root, offsets, parents):
+    local = skeleton.translations(offsets.astype(float), root[:, None].astype(float))
+    return skeleton.forward(parents, rotations[:, None].astype(float), local)[0][:, 0]
+
+
+def of(model, found):
+    parents = model.session.card.skeleton.parents
+    return joints(found.rotations, found.root_position, found.bone_offsets, parents)
+
+
+def alone(model, question, row):
+    """Joints (J, 3) of one character asked for by itself, and what its answer is worth."""
+    controls = {name: float(values[row]) for name, values in question.controls.items()}
+    answer = model.pose(
+        controls,
+        [float(question.times[row])],
+        "warn",
+        question.performers[question.performer[row]],
+        int(question.detail[row]),
+    )
+    parents = model.session.card.skeleton.parents
+    found = joints(answer.rotations, answer.root_position, answer.bone_offsets[None], parents)
+    turn = quat.about(UP, question.placement.headings[row])
+    return quat.rotate(turn, found[0]) + question.placement.positions[row], answer.trust
+
+
+def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
+    question = asked(model)
+    found = crowd.poses(model, question)
+    places = of(model, found)
+    for row in range(COUNT):
+        expected, trust = alone(model, question, row)
+        assert np.abs(places[row] - expected).max() < FLOAT32
+        assert found.duration[row] == pytest.approx(trust.duration, rel=1e-5)
+        assert found.sigma[row] == pytest.approx(trust.sigma, rel=1e-3)
+    assert np.array_equal(found.levels, question.detail)
+    assert found.error_px is None and found.warnings == ()
+    # Negative controls: another heading, and another level.
+    turned = replace(question.placement, headings=question.placement.headings + 0.01)
+    others = crowd.poses(model, replace(question, placement=turned))
+    assert np.abs(of(model, others) - places).max(axis=(1, 2)).min() > 10 * FLOAT32
+    finest = crowd.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
+    changed = np.abs(of(model, finest) - places).max(axis=(1, 2)) > 10 * FLOAT32
+    assert np.array_equal(changed, question.detail > 0)
+
+
+def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
+    question = asked(model, 3 * crowd.BATCH + 7)
+    whole = crowd.poses(model, question)
+    rows = np.array([0, 1, crowd.BATCH, 2 * crowd.BATCH + 5, len(question) - 1])
+    part = crowd.poses(
+        model,
+        replace(
+            question,
+            controls={name: values[rows] for name, values in question.controls.items()},
+            times=question.times[rows],
+            placement=Placement(
+                question.placement.positions[rows], question.placement.headings[rows]
+            ),
+            performer=question.performer[rows],
+            detail=question.detail[rows],
+        ),
+    )
+    gap = np.abs(of(model, whole)[rows] - of(model, part))
+    assert gap.max() < FLOAT32
+    assert np.abs(of(model, whole)[rows[::-1]] - of(model, part)).max() > 1.0
+
+
+def test_the_same_crowd_is_the_same_bytes(model):
+    question = asked(model, 2_000)
+    once, again = crowd.poses(model, question), crowd.poses(model, question)
+    for name in ("rotations", "root_position", "bone_offsets", "sigma"):
+        assert getattr(once, name).tobytes() == getattr(again, name).tobytes()
+
+
+def test_in_place_a_cycle_goes_nowhere(walk):
+    card = walk.session.card
+    count = 20
+    question = asked(walk, count, detail=np.zeros(count, dtype=int), root="in_place")
+    still = replace(
+        question, times=np.zeros(count), placement=Placement(np.zeros((count, 3)), np.zeros(count))
+    )
+    begin = crowd.poses(walk, still)
+    late = replace(still, times=begin.duration.astype(float))
+    end = crowd.poses(walk, late)
+    assert np.abs(of(walk, end) - of(walk, begin)).max() < 1e-4
+    gone = crowd.poses(walk, replace(late, root="travelling"))
+    assert card.cyclic and np.abs(gone.root_position - end.root_position).max(axis=1).min() > 0.3
+
+
+def test_levels_are_those_that_the_camera_asks_for(model):
+    camera = Camera(np.array([0.0, 1.7, 0.0]), math.radians(60.0), 1080.0)
+    far = np.linspace(3.0, 2000.0, COUNT)
+    positions = np.column_stack([far, np.zeros((COUNT, 2))])
+    question = asked(
+        model,
+        placement=Placement(positions, np.zeros(COUNT)),
+        detail=View(camera, 1.0, None, None),
+    )
+    found = crowd.poses(model, question)
+    assert found.levels.tolist() == sorted(found.levels.tolist())
+    assert set(found.levels) == set(range(len(model.session.card.levels)))
+    errors = np.array([level.p99 for level in model.session.card.levels])
+    nearest = np.linalg.norm(positions + model.middle - camera.position, axis=1) - model.radius
+    shown = errors[found.levels] * camera.pixels / nearest
+    assert found.error_px == pytest.approx(shown, rel=1e-5)
+    assert np.all((shown <= 1.0) | (found.levels == 0))
+    # The next level would show; but for the coarsest, after which there is none.
+    coarser = np.minimum(found.levels + 1, len(errors) - 1)
+    would = errors[coarser] * camera.pixels / nearest
+    assert np.all((would > 1.0) | (found.levels == len(errors) - 1))
+
+
+def test_what_the_viewer_sees_of_a_level_is_less_than_the_limit(model):
+    """Joints of the chosen levels against those of the finest: hardly one in a hundred shows."""
+    camera = Camera(np.array([0.0, 1.7, 0.0]), math.radians(60.0), 1080.0)
+    rng = np.random.Generator(np.random.PCG64(4))
+    count = 2_000
+    positions = np.column_stack(
+        [rng.uniform(5.0, 150.0, count), np.zeros(count), rng.uniform(-20.0, 20.0, count)]
+    )
+    placed = Placement(positions, np.zeros(count))
+    question = asked(model, count, placement=placed, detail=View(camera, 1.0, None, None))
+    seen = crowd.poses(model, question)
+    finest = crowd.poses(model, replace(question, detail=np.zeros(count, dtype=int)))
+    gaps = np.linalg.norm(of(model, seen) - of(model, finest), axis=-1)
+    distances = np.linalg.norm(of(model, finest) - camera.position, axis=-1)
+    pixels = gaps / distances * camera.pixels
+    assert np.mean(pixels > 1.0) < 0.02
+    assert np.sqrt(np.mean(np.square(pixels), axis=1)).max() < 1.0
+    coarsest = crowd.poses(model, replace(question, detail=np.full(count, 3)))
+    gaps = np.linalg.norm(of(model, coarsest) - of(model, finest), axis=-1)
+    assert np.mean(gaps / distances * camera.pixels > 1.0) > 0.04
+
+
+def test_a_budget_is_kept_and_said(model):
+    camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
+    view = View(camera, 0.01, None, None)
+    question = asked(model, placement=Placement(np.zeros((COUNT, 3)), np.zeros(COUNT)), detail=view)
+    free = crowd.poses(model, question)
+    assert set(free.levels) == {0}
+    costs = model.ladder.costs
+    if costs[-1] == costs[0]:
+        pytest.skip("this machine takes as long for every level")
+    tight = COUNT * float(costs[-1]) * 1.001
+    bound = crowd.poses(model, replace(question, detail=replace(view, budget=tight)))
+    assert float(np.sum(costs[bound.levels])) <= tight
+    assert len(bound.warnings) == 1 and "budget" in bound.warnings[0]
+
+
+def test_who_is_between_two_levels_is_between_their_poses(model):
+    question = asked(model, detail=np.full(COUNT, 3))
+    before = crowd.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
+    after = crowd.poses(model, question)
+
+    def mixed(share):
+        shares = np.full(COUNT, share)
+        blending = Blending(np.zeros(COUNT, dtype=int), shares)
+        return of(model, crowd.poses(model, replace(question, blending=blending)))
+
+    assert np.abs(mixed(1.0) - of(model, after)).max() < FLOAT32
+    assert np.abs(mixed(0.0) - of(model, before)).max() < FLOAT32
+    half = mixed(0.5)
+    whole = np.linalg.norm(of(model, after) - of(model, before), axis=-1)
+    for end in (before, after):
+        way = np.linalg.norm(half - of(model, end), axis=-1)
+        moved = whole > 0.02
+        assert np.median(way[moved] / whole[moved]) == pytest.approx(0.5, abs=0.02)
+        assert np.all(way[moved] < 0.75 * whole[moved])
+    assert np.linalg.norm(
+        crowd.poses(
+            model,
+            replace(question, blending=Blending(np.zeros(COUNT, dtype=int), np.full(COUNT, 0.3))),
+        ).rotations,
+        axis=-1,
+    ) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_who_is_on_the_way_goes_to_no_third_level(model):
+    camera = Camera(np.array([0.0, 1.7, -3.0]), math.radians(60.0), 1080.0)
+    held = np.full(COUNT, 2)
+    view = View(camera, 1.0, None, held)
+    placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
+    shares = np.where(np.arange(COUNT) % 2, 1.0, 0.4)
+    question = asked(
+        model,
+        placement=placed,
+        detail=view,
+        blending=Blending(np.full(COUNT, 3), shares),
+    )
+    found = crowd.poses(model, question)
+    assert set(found.levels[shares < 1.0]) == {2}
+    assert set(found.levels[shares == 1.0]) == {0}
+
+
+def broken(model, field, row, value):
+    question = asked(model)
+    if field.startswith("controls/"):
+        column = question.controls[field.partition("/")[2]].copy()
+        column[row] = value
+        name = field.partition("/")[2]
+        return replace(question, controls={**question.controls, name: column})
+    if field == "time":
+        times = question.times.copy()
+        times[row] = value
+        return replace(question, times=times)
+    levels = question.detail.copy()
+    levels[row] = value
+    return replace(question, detail=levels)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("time", -0.1, "expected 0 s or later"),
+        ("time", 60.0, "later than the end of the clip"),
+        ("level", 4, "expected 0 to 3"),
+        ("level", -1, "expected 0 to 3"),
+        ("controls/stature", 1e9, "expected -"),
+    ],
+)
+def test_what_is_wrong_with_one_character_names_it(model, field, value, said):
+    with pytest.raises(InvalidField, match=said) as caught:
+        crowd.poses(model, broken(model, field, 17, value))
+    assert (caught.value.field, caught.value.index) == (field, 17)
+
+
+def test_controls_that_make_no_sense_name_the_first_character(model):
+    card = model.session.card
+    turn = card.control("turn")
+    far = turn.maximum + 99.0 * (turn.maximum - turn.minimum)
+    question = broken(model, "controls/turn", 5, far)
+    try:
+        crowd.poses(model, question)
+    except OutsideSamples as refusal:
+        assert refusal.index == 5
+
+
+def test_missing_and_unknown_controls_are_named(model):
+    question = asked(model)
+    fewer = {name: values for name, values in question.controls.items() if name != "turn"}
+    with pytest.raises(InvalidField, match="controls/turn: missing"):
+        crowd.poses(model, replace(question, controls=fewer))
+    more = {**question.controls, "mood": np.zeros(COUNT)}
+    with pytest.raises(InvalidField, match="controls/mood: no such control"):
+        crowd.poses(model, replace(question, controls=more))
+
+
+def test_outside_the_samples_is_said_once_a_control_or_refused(model):
+    high = model.session.card.control("stature").maximum
+    question = broken(model, "controls/stature", 9, high + 0.05)
+    found = crowd.poses(model, question)
+    assert len(found.warnings) == 1
+    assert "stature of 1 characters" in found.warnings[0]
+    assert "the first is character 9" in found.warnings[0]
+    with pytest.raises(OutsideSamples, match="the first is character 9"):
+        crowd.poses(model, replace(question, extrapolate="refuse"))
+
+
+def test_a_camera_in_a_character_names_it(model):
+    inside = Camera(model.middle + np.array([0.0, 0.0, 0.2]), 1.0, 1080.0)
+    positions = np.full((COUNT, 3), 40.0)
+    positions[23] = 0.0
+    question = asked(
+        model,
+        placement=Placement(positions, np.zeros(COUNT)),
+        detail=View(inside, 1.0, None, None),
+    )
+    with pytest.raises(InvalidField, match="inside character 23"):
+        crowd.poses(model, question)

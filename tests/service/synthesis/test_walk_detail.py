@@ -1,0 +1,147 @@
+"""Levels of walkers over time: nobody is coarser than may be seen, flickers or pops."""
+
+import numpy as np
+import pytest
+
+from service.motion import skeleton
+from service.synthesis import library
+from service.synthesis.view import HYSTERESIS, Camera, Ladder
+from service.synthesis.walk import company, detail, gait, order
+from service.synthesis.walk.order import Order
+
+RATE = 30.0
+LADDER = Ladder(np.array([0.01, 0.03, 0.08, 0.2]), np.array([4.0, 3.0, 2.0, 1.0]))
+SWITCH = round(detail.SWITCH * RATE)
+
+
+def passing(count=40, frames=600):
+    """Pixels (N, F) that a metre covers on characters who pass by at 2 m or more."""
+    rng = np.random.Generator(np.random.PCG64(8))
+    nearest = rng.uniform(2.0, 40.0, count)[:, None]
+    when = rng.uniform(0.0, frames / RATE, count)[:, None]
+    speed = rng.uniform(2.0, 30.0, count)[:, None]
+    way = speed * (np.arange(frames) / RATE - when)
+    return 935.0 / np.hypot(nearest, way)
+
+
+def shown_pixels(shown, scale):
+    """Errors (N, F) of what is shown, the coarser level's while two are mixed."""
+    both = np.maximum(LADDER.errors[shown.levels], LADDER.errors[shown.before])
+    coarser = np.where(shown.shares < 1.0, both, LADDER.errors[shown.levels])
+    return coarser * scale
+
+
+def test_nobody_is_shown_coarser_than_the_limit_even_while_switching():
+    scale = passing()
+    shown = detail.seen(LADDER, scale, 1.0, RATE)
+    visible = shown_pixels(shown, scale) > 1.0
+    unavoidable = LADDER.errors[0] * scale > 1.0
+    # On its way to the finest level a character may still be at the next: never beyond its limit.
+    assert not np.any(visible & ~unavoidable & (shown.levels > 0))
+    assert not np.any((shown.levels > 0) & (LADDER.errors[shown.levels] * scale > 1.0))
+    assert set(np.unique(shown.levels)) == {0, 1, 2, 3}
+    # Negative control: the same levels a second later would show.
+    late = np.roll(shown.levels, 30, axis=1)[:, 30:]
+    assert np.any((late > 0) & (LADDER.errors[late] * scale[:, 30:] > 1.0))
+
+
+def test_a_switch_takes_its_time_and_ends_before_the_next():
+    shown = detail.seen(LADDER, passing(), 1.0, RATE)
+    for levels, shares in zip(shown.levels, shown.shares, strict=True):
+        switches = np.flatnonzero(np.diff(levels)) + 1
+        assert np.all(np.diff(switches) >= SWITCH)
+        for at in switches:
+            way = shares[at : at + SWITCH + 1]
+            assert np.all(np.diff(way) > 0.0) and way[0] < 0.1
+            assert len(way) < SWITCH + 1 or way[-1] == 1.0
+    assert np.any(np.diff(shown.levels, axis=1))
+
+
+def test_who_trembles_about_a_threshold_does_not_flicker():
+    frames = np.arange(600)
+    # The limit of level 1, met and missed by a tenth every second.
+    scale = (1.0 / LADDER.errors[1]) * (1.0 + 0.1 * np.sin(frames / 5.0))[None]
+    switches = np.count_nonzero(np.diff(detail.seen(LADDER, scale, 1.0, RATE).levels))
+    assert switches <= 1
+    # Negative control: more than hysteresis allows for.
+    wide = (1.0 / LADDER.errors[1]) * (1.0 + 0.5 * np.sin(frames / 20.0))[None]
+    assert wide.min() < (1.0 - HYSTERESIS) / LADDER.errors[1]
+    assert np.count_nonzero(np.diff(detail.seen(LADDER, wide, 1.0, RATE).levels)) > 4
+
+
+def test_one_level_for_all_is_never_mixed():
+    shown = detail.constant(2, (3, 5))
+    assert np.all(shown.levels == 2) and np.all(shown.shares == 1.0)
+
+
+# --- a real walk ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def model(walk_path):
+    return next(iter(library.load([walk_path]).models.values()))
+
+
+@pytest.fixture(scope="module")
+def own(model):
+    return gait.of(model.session)
+
+
+def joints(own, plan, shown):
+    made = company.motions(own.session, plan, np.arange(len(plan.who)), shown)
+    local = skeleton.translations(made.bone_offsets.astype(float), made.root_position.astype(float))
+    parents = own.session.card.skeleton.parents
+    return skeleton.forward(parents, made.rotations.astype(float), local)[0]
+
+
+def switching(plan, shares):
+    """From the finest level to the coarsest in the middle, by the shares of the way."""
+    shown = detail.constant(0, plan.phases.shape)
+    middle = plan.phases.shape[1] // 2
+    shown.levels[:, middle:] = 3
+    before = np.zeros_like(shown.levels)
+    own_shares = np.ones(plan.phases.shape)
+    own_shares[:, middle : middle + len(shares)] = shares
+    return detail.Detail(shown.levels, before, own_shares)
+
+
+def test_a_switch_does_not_pop(own):
+    """The step that a switch adds to what the joints do anyway."""
+    plan = company.wandering(own, 20, 2.0, RATE, 1)
+    finest = joints(own, plan, detail.constant(0, plan.phases.shape))
+
+    middle = plan.phases.shape[1] // 2
+
+    def pop(shares):
+        away = joints(own, plan, switching(plan, shares)) - finest
+        steps = np.linalg.norm(np.diff(away, axis=1), axis=-1)[:, middle - 1 : middle + SWITCH]
+        return np.sqrt(np.mean(np.square(steps), axis=(0, 2))).max()
+
+    gentle = np.array([detail.blend.eased(s) for s in np.linspace(0.0, 1.0, SWITCH + 2)[1:-1]])
+    sudden, mixed = pop(np.zeros(0)), pop(gentle)
+    assert sudden > 2.5 * mixed
+    steps = np.linalg.norm(np.diff(finest, axis=1), axis=-1)
+    print(sudden, mixed, np.sqrt(np.mean(np.square(steps))))
+    assert mixed < 0.3 * np.sqrt(np.mean(np.square(steps)))
+
+
+def test_a_camera_changes_levels_and_hardly_the_walk(model, own):
+    camera = Camera(np.array([-40.0, 1.7, 0.0]), 1.0472, 1080.0)
+    far = order.crowd(model, own, Order(count=12, seconds=2.0, camera=camera, pixels=2.0))
+    near = order.crowd(model, own, Order(count=12, seconds=2.0))
+    assert far.facts["level_shares"][0] < 1.0 == near.facts["level_shares"][0]
+    gaps = [
+        np.abs(a.root_position - b.root_position).max()
+        for a, b in zip(far.batches, near.batches, strict=True)
+    ]
+    assert 0.0 < max(gaps) < 0.2
+
+
+def test_characters_may_share_motions(model, own):
+    made = order.crowd(model, own, Order(count=25, motions=4, seconds=0.5))
+    assert len(made.placement) == 25 and made.shared
+    assert np.array_equal(made.motion, np.arange(25) % 4)
+    assert sum(len(batch) for batch in made.batches) == 4
+    gaps = made.placement.positions[:, None] - made.placement.positions
+    apart = np.linalg.norm(gaps, axis=-1)[~np.eye(25, dtype=bool)]
+    assert apart.min() > 1.0
