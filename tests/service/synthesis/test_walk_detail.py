@@ -106,7 +106,7 @@ def switching(plan, shares):
 
 
 def test_a_switch_does_not_pop(own):
-    """Mixed, a switch moves joints hardly more than the coarse level does by itself all the time."""
+    """Mixed, a switch moves joints hardly more than the coarse level does by itself."""
     plan = company.wandering(own, 20, 2.0, RATE, 1)
     finest = joints(own, plan, detail.constant(0, plan.phases.shape))
 

@@ -1,0 +1,184 @@
+"""Crowds over HTTP: blocks that clients read whole, walks that open as USD, refusals that tell."""
+
+import io
+import json
+import math
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from asking import asker
+from pxr import Usd, UsdSkel
+
+from service.web.app import create_app
+from service.web.settings import Settings
+
+CROWD = "/v1/models/reach/crowd"
+WALK = "/v1/models/walk/crowd"
+
+
+def question(controls, count=3, **given):
+    return {
+        "controls": {name: [value] * count for name, value in controls.items()},
+        "time": [0.1 * row for row in range(count)],
+        "position": [[3.0 * row, 0.0, 0.0] for row in range(count)],
+        "heading": 0.5,
+        **given,
+    }
+
+
+def test_all_formats_hold_the_same_poses(ask, controls):
+    asked = question(controls, level=[0, 1, 2])
+    answers = {e: ask("POST", f"{CROWD}.{e}", json=asked) for e in ("arrow", "npz", "json")}
+    assert {answer.status_code for answer in answers.values()} == {200}
+    batch = pa.ipc.open_stream(answers["arrow"].content).read_next_batch()
+    archive = np.load(io.BytesIO(answers["npz"].content))
+    plain = answers["json"].json()
+    turns = batch.column("rotations").to_numpy_ndarray()
+    assert turns.shape == (3, 33, 4)
+    assert np.array_equal(turns, archive["rotations"])
+    assert np.abs(turns - np.array(plain["rotations"])).max() < 1e-6
+    assert np.ptp(turns, axis=0).max() > 1e-2
+    assert plain["levels"] == archive["levels"].tolist() == [0, 1, 2]
+    assert plain["model"].startswith("reach@")
+
+
+def test_levels_follow_the_camera(ask, controls):
+    camera = {"position": [0.0, 1.7, -4.0], "fov": 1.0, "height": 1080}
+    far = [[0.0, 0.0, 10.0**power] for power in range(1, 5)]
+    asked = question(controls, 4, position=far, level="auto", camera=camera)
+    found = ask("POST", f"{CROWD}.json", json=asked).json()
+    assert found["levels"] == sorted(found["levels"]) and found["levels"][-1] > 0
+    assert len(found["error_px"]) == 4
+    fine = ask("POST", f"{CROWD}.json", json={**asked, "pixels": 1e-4}).json()
+    assert set(fine["levels"]) == {0}
+
+
+def without(asked, *names):
+    return {name: value for name, value in asked.items() if name not in names}
+
+
+CAMERA = {"position": [0.0, 1.7, -9.0], "fov": 1.0, "height": 1080}
+HALF_TURN = {**CAMERA, "fov": math.pi}
+REFUSED = {
+    "zero characters": ({"time": []}, 422, "/time"),
+    "lengths that differ": ({"heading": [0.0, 1.0]}, 422, "/heading"),
+    "a number that is none": ({"time": [0.0, 1e999, 0.0]}, 400, "/time/1"),
+    "a word for a number": ({"time": [0.0, "x", 0.0]}, 400, "/time/1"),
+    "a time after the clip": ({"time": [0.0, 0.0, 99.0]}, 422, "/time/2"),
+    "an unknown level": ({"level": [0, 0, 9]}, 422, "/level/2"),
+    "a level in parts": ({"level": [0, 0.5, 0]}, 400, "/level/1"),
+    "an unknown performer": ({"performer": ["tall", "tall", "nobody"]}, 422, "/performer/2"),
+    "no field of view": ({"level": "auto", "camera": {**CAMERA, "fov": 0}}, 422, "/camera/fov"),
+    "half a turn of view": ({"level": "auto", "camera": HALF_TURN}, 422, "/camera/fov"),
+    "no camera": ({"level": "auto"}, 422, "/camera"),
+    "a camera for nothing": ({"camera": CAMERA}, 422, "/camera"),
+    "a share beyond the whole": ({"from_level": [0, 0, 0], "blend": [0, 0, 2]}, 400, "/blend/2"),
+    "a share of nothing": ({"blend": 0.5}, 422, "/blend"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_crowd_that_cannot_be_is_refused_where_it_fails(ask, controls, name):
+    given, status, pointer = REFUSED[name]
+    asked = question(controls, **given)
+    # JSON has no infinity, but 1e999 reads as one.
+    body = json.dumps(asked).replace("Infinity", "1e999")
+    headers = {"content-type": "application/json"}
+    answer = ask("POST", f"{CROWD}.arrow", content=body.encode(), headers=headers)
+    assert answer.status_code == status, answer.text
+    problem = answer.json()
+    assert problem["errors"][0]["pointer"] == pointer, problem
+    assert "Traceback" not in answer.text
+
+
+def test_a_camera_in_a_character_names_it(ask, controls):
+    inside = {"position": [3.0, 0.9, 0.0], "fov": 1.0, "height": 1080}
+    answer = ask("POST", f"{CROWD}.npz", json=question(controls, level="auto", camera=inside))
+    assert answer.status_code == 422
+    assert "inside character 1" in answer.json()["detail"]
+
+
+def test_more_characters_than_the_service_takes_are_refused(loaded, controls):
+    small = asker(create_app(loaded, Settings(crowd_limit=2, crowd_poses=100)))
+    answer = small("POST", f"{CROWD}.arrow", json=question(controls))
+    assert answer.status_code == 422 and "expected 1 to 2" in answer.json()["detail"]
+    assert small("GET", f"{WALK}.usdc?count=3").status_code == 422
+    long = small("GET", f"{WALK}.usdc?count=2&seconds=60")
+    assert long.status_code == 422 and "expected at most 100" in long.json()["detail"]
+    assert small("GET", f"{WALK}.usdc?count=2&seconds=1").status_code == 200
+
+
+def skeletons(path):
+    """Animated skeletons of a stage, instances looked into."""
+    stage = Usd.Stage.Open(str(path))
+    inside = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())
+    return stage, [UsdSkel.Skeleton(prim) for prim in inside if prim.IsA(UsdSkel.Skeleton)]
+
+
+@pytest.mark.parametrize("instancing", ["references", "scenegraph", "flatten"])
+@pytest.mark.parametrize("ending", ["usda", "usdc", "usdz"])
+def test_a_walk_opens_and_everybody_moves(ask, tmp_path, ending, instancing):
+    answer = ask("GET", f"{WALK}.{ending}?count=4&seconds=0.5&instancing={instancing}")
+    assert answer.status_code == 200
+    path = tmp_path / f"walk.{ending}"
+    path.write_bytes(answer.content)
+    stage, found = skeletons(path)
+    cache = UsdSkel.Cache()
+    queries = [cache.GetSkelQuery(skeleton) for skeleton in found]
+    moving = [query for query in queries if query.GetAnimQuery()]
+    assert len(moving) == 4 and stage.GetEndTimeCode() == 15
+    for query in moving:
+        first, last = (np.array(query.ComputeJointSkelTransforms(code)) for code in (0, 15))
+        assert np.abs(last[:, 3, 2] - first[:, 3, 2]).max() > 0.2
+
+
+def test_the_same_seed_is_the_same_crowd(ask):
+    once, again, other = (
+        ask("GET", f"{WALK}.usdz?count=3&seconds=0.3&seed={seed}").content for seed in (5, 5, 6)
+    )
+    assert once == again != other
+
+
+def test_shared_motions_are_sent_once(ask):
+    own, shared = (
+        len(ask("GET", f"{WALK}.usdz?count=20&seconds=1{more}").content)
+        for more in ("", "&motions=2")
+    )
+    assert shared < own / 3
+
+
+@pytest.mark.parametrize(
+    ("query", "status", "parameter"),
+    [
+        ("count=0", 422, "count"),
+        ("count=x", 400, "count"),
+        ("count=5&motions=6", 422, "motions"),
+        ("motions=2&camera=30,2,0", 422, "motions"),
+        ("seconds=0", 422, "seconds"),
+        ("fps=0.5", 422, "fps"),
+        ("level=9", 422, "level"),
+        ("camera=1,2", 400, "camera"),
+        ("camera=1,2,x", 400, "camera"),
+        ("camera=90,2,0&fov=0", 422, "fov"),
+        ("camera=90,2,0&pixels=-1", 422, "pixels"),
+        ("pixels=2", 422, "pixels"),
+        ("instancing=clones", 422, "instancing"),
+    ],
+)
+def test_a_walk_that_cannot_be_is_refused_before_it_begins(ask, query, status, parameter):
+    answer = ask("GET", f"{WALK}.usdz?{query}")
+    assert answer.status_code == status, answer.text
+    assert parameter in answer.json()["errors"][0].get("parameter", ""), answer.text
+
+
+def test_a_model_that_does_not_walk_says_so(ask):
+    answer = ask("GET", f"{CROWD}.usdz")
+    assert answer.status_code == 422 and "no cycle" in answer.json()["detail"]
+
+
+def test_an_unknown_format_of_a_crowd_lists_what_there_is(ask):
+    answer = ask("GET", f"{WALK}.fbx")
+    assert answer.status_code == 404
+    for known in ("arrow", "npz", "json", "usdz"):
+        assert known in answer.json()["detail"]
