@@ -1,6 +1,7 @@
 """What a pose of each level of detail costs, measured in the process that asks."""
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from service.synthesis.session import OUTPUTS, Session
 BATCH = 512
 """Characters a call, each at one time, as a crowd asks."""
 ROUNDS = 7
+"""Few enough to be measured whenever a model is opened."""
 
 
 def seconds_per_pose(session: Session) -> tuple[float, ...]:
@@ -18,13 +20,19 @@ def seconds_per_pose(session: Session) -> tuple[float, ...]:
     They never grow from a level to the next: who could have the finer level for less is not asked
     for more.
     """
-    levels = range(len(session.runtimes))
-    question = _question(session)
-    for level in levels:
-        _ask(session, question, level)
-    # All levels in every round: whatever slows the machine down slows all of them.
-    taken = [[_ask(session, question, level) for level in levels] for _ in range(ROUNDS)]
-    return falling(np.median(taken, axis=0) / BATCH)
+    return falling(in_turn([(session, level) for level in range(len(session.runtimes))], ROUNDS))
+
+
+def in_turn(asked: Sequence[tuple[Session, int]], rounds: int) -> Floats:
+    """Seconds (N,) a pose of levels of sessions, as they are found: the median of the rounds.
+
+    All are asked in every round: whatever slows the machine down slows all of them.
+    """
+    calls = [(session, _question(session), level) for session, level in asked]
+    for call in calls:
+        _ask(*call)
+    taken = [[_ask(*call) for call in calls] for _ in range(rounds)]
+    return np.median(taken, axis=0) / BATCH
 
 
 def falling(costs: Floats) -> tuple[float, ...]:

@@ -62,6 +62,12 @@ def test_a_coarser_level_that_is_slower_costs_what_the_finer_one_does(paced):
     assert pace.seconds_per_pose(paced(512, 600, 128)) == pytest.approx([1e-3, 1e-3, 0.25e-3])
 
 
+def test_levels_of_several_files_are_told_as_they_are_found(paced):
+    one, other = paced(512, 600), paced(64)
+    found = pace.in_turn([(one, 1), (other, 0), (one, 0)], 3)
+    assert found == pytest.approx([600 / 512e3, 64 / 512e3, 1e-3])
+
+
 def test_costs_never_grow(rng):
     costs = rng.uniform(1.0, 2.0, 20)
     found = np.array(pace.falling(costs))
