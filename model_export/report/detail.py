@@ -27,7 +27,7 @@ from service.synthesis.view import Camera
 CAMERA = Camera(np.zeros(3), math.radians(60.0), 1080.0)
 
 # Levels may differ by a few per cent, and so does one call from the next.
-ROUNDS = 101
+ROUNDS = 51
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Ladder:
             f"Error against numbers read and time a pose; chosen: {self._said()}.",
             "Orange: the levels of this model. Blue: other levels, each made alone, for 1 to "
             f"{self.times[-1]:g} times the budgets of the model's own size. Where the time falls "
-            "no further it goes to what every level does: the quaternions of all joints.",
+            "no further it goes to what every level answers: rotations and bones of all joints.",
         )
         return Section(
             "levels", "Levels of detail", words, (self._kept(), self._errors()), (drawn,)
@@ -152,6 +152,7 @@ class Ladder:
         _name(right, self.chosen.microseconds, self.chosen.centimetres)
         left.set(xlabel="numbers read", ylabel="error (cm, RMS)", title="size")
         right.set(xlabel="time (µs a pose)", title="time", xlim=(0.0, None))
+        left.margins(y=0.12)
         left.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         left.yaxis.set_major_formatter("{x:g}")
         left.yaxis.set_minor_formatter("")

@@ -62,6 +62,20 @@ def test_a_coarser_level_that_is_slower_costs_what_the_finer_one_does(paced):
     assert pace.seconds_per_pose(paced(512, 600, 128)) == pytest.approx([1e-3, 1e-3, 0.25e-3])
 
 
+def test_a_round_that_something_else_slowed_down_does_not_count(paced):
+    own = paced(512)
+    disturbed = iter([0.0, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5])
+    answer = own.runtimes[0].run
+
+    def run(outputs, feed):
+        own.runtimes[0].clock[0] += next(disturbed)
+        return answer(outputs, feed)
+
+    own.runtimes[0].run = run
+    assert pace.seconds_per_pose(own) == pytest.approx([1e-3])
+    assert next(disturbed, None) is None
+
+
 def test_levels_of_several_files_are_told_as_they_are_found(paced):
     one, other = paced(512, 600), paced(64)
     found = pace.in_turn([(one, 1), (other, 0), (one, 0)], 3)
