@@ -25,9 +25,17 @@ from service.synthesis.view import Camera
 
 # An image as on most screens, seen as most games see: of 1080 lines, 60 degrees high.
 CAMERA = Camera(np.zeros(3), math.radians(60.0), 1080.0)
-
 # Levels may differ by a few per cent, and so does one call from the next.
 ROUNDS = 51
+
+_MEANT = (
+    "Errors are true distances of joints from those of the model that nothing is cut from, over "
+    "random controls, performers and times: truncation and the clips that are not asked. A pixel "
+    f"is one of an image of {CAMERA.height:.0f} lines that spans {math.degrees(CAMERA.fov):.0f} "
+    f"degrees from top to bottom. Times are a pose's in calls of {pace.BATCH}, by the service's "
+    "own session on one thread of the machine that trained: they are not in the model file, and "
+    "never grow from a level to the next."
+)
 
 
 @dataclass(frozen=True)
@@ -82,17 +90,7 @@ class Ladder:
         }
 
     def section(self) -> Section:
-        """What each level keeps and costs, and all that there could have been."""
-        words = (
-            "Errors are true distances of joints from those of the model that nothing is cut from, "
-            "over random controls, performers and times: truncation and the clips that are not "
-            "asked. A pixel is one of an image of "
-            f"{CAMERA.height:.0f} lines that spans {math.degrees(CAMERA.fov):.0f} degrees from top "
-            f"to bottom. Times are a pose's in calls of {pace.BATCH}, by the service's own session "
-            "on one thread of the machine that trained: they are not in the model file, and never "
-            "grow from a level to the next.",
-            *self._uses(),
-        )
+        """What each level keeps, costs and is for, and all that there could have been."""
         drawn = picture.draw(
             "levels",
             3.7,
@@ -102,9 +100,8 @@ class Ladder:
             f"{self.times[-1]:g} times the budgets of the model's own size. Where the time falls "
             "no further it goes to what every level answers: rotations and bones of all joints.",
         )
-        return Section(
-            "levels", "Levels of detail", words, (self._kept(), self._errors()), (drawn,)
-        )
+        tables = self._kept(), self._errors()
+        return Section("levels", "Levels of detail", (_MEANT, *self._uses()), tables, (drawn,))
 
     def _uses(self) -> tuple[str, ...]:
         """A sentence for each level on what it is for."""
