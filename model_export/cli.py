@@ -18,6 +18,7 @@ from service.motion.errors import InvalidField
 
 if TYPE_CHECKING:
     from model_export.export import Exported
+    from model_export.recipe import Recipe
     from model_export.train import Trained
 
 
@@ -84,8 +85,7 @@ def train_command(
     exported = export.export(own, trained, notes)
     files.write(exported.content, output)
     if report:
-        progress("drawing the report")
-        _write_report(trained, exported, progress, report)
+        _write_report(own, trained, exported, progress, report)
     progress("done")
     typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
 
@@ -199,14 +199,17 @@ class _Progress:
 
 
 def _write_report(
-    trained: "Trained", exported: "Exported", progress: _Progress, path: Path
+    recipe: "Recipe", trained: "Trained", exported: "Exported", progress: _Progress, path: Path
 ) -> None:
     # Nobody who wants no pictures waits for matplotlib, or needs it.
-    from model_export.report import render
+    from model_export.report import detail, render
     from model_export.report.about import Step
 
+    progress("measuring levels of detail")
+    ladder = detail.of(recipe, trained, exported)
+    progress("drawing the report")
     steps = [Step(name, seconds) for name, seconds in progress.finished]
-    rendered = render.render(trained, exported, steps)
+    rendered = render.render(trained, exported, ladder, steps)
     files.write(rendered.html, path)
     files.write(rendered.json, path.with_suffix(".json"))
 

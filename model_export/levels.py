@@ -15,6 +15,7 @@ from model_export.fidelity import Judge
 from model_export.model import Model
 from model_export.ranks import Triple
 from model_export.recipe import Detail, Recipe
+from model_export.thin import Lesson
 from model_export.train import Trained
 from service.motion.detail import Level
 from service.motion.errors import TrainingError
@@ -33,83 +34,115 @@ class Laddered:
     levels: tuple[Level, ...]
 
 
+@dataclass(frozen=True)
+class Workshop:
+    """What levels are made with: what training left, judges of truncations and of answers, and
+    what a level's weights are fitted to.
+
+    model: of the finest level alone, its samples in the order in which they say most of the pose.
+    budgets: of the finest level, m, by name.
+    """
+
+    trained: Trained
+    model: Model
+    budgets: dict[str, float]
+    judge: Judge
+    exam: Exam
+    lesson: Lesson
+
+    def lowered(self, model: Model, joints: tuple[int, ...], times: float) -> Model:
+        """Model with one more level of the least work whose answers keep so many times the
+        budgets, or nearly; some joints move."""
+        allowed = {name: times * budget for name, budget in self.budgets.items()}
+        within, made = model.decoder.rungs[-1].ranks, []
+        for share in TRUNCATION:
+            parts = {name: share * most for name, most in allowed.items()}
+            rung = Rung(self._ranks(within, parts), joints)
+            made.append(self._thinned(model, rung, allowed))
+        kept = [lowered for lowered in made if self.exam.keeps(lowered, allowed)] or made[-1:]
+        return self._with_own_error(min(kept, key=lambda m: cost.work(m, len(m.bank.coarse))))
+
+    def level(self, model: Model, level: int) -> Level:
+        """What a level of a model is."""
+        rung, numbers = model.decoder.rungs[level], cost.read(model, level)
+        found = self.exam.errors(model, level, range(len(model.decoder.means)))
+        effector = self.exam.effector(model, level)
+        return Level(
+            rung.ranks,
+            model.bank.samples(level),
+            rung.joints,
+            numbers,
+            4 * numbers,
+            cost.work(model, level),
+            rms=_short(found.rms),
+            p99=_short(found.p99),
+            max=_short(found.max),
+            effector=None if effector is None else _short(effector),
+        )
+
+    def _with_own_error(self, model: Model) -> Model:
+        """Model whose last level counts in its sigma how far it lies from the whole model."""
+        bank, last = model.bank, len(model.bank.coarse)
+        error = self.exam.errors(model, last, range(len(model.decoder.means))).rms
+        rank = model.decoder.rungs[last].ranks[2]
+        weights = self.lesson.weights(bank.columns(last), rank, error)
+        return replace(model, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
+
+    def _ranks(self, within: Triple, allowed: dict[str, float]) -> Triple:
+        """Fewest multiply-adds within a finer level's ranks whose true errors are allowed."""
+        trained = self.trained
+
+        def strain(triple: Triple) -> float:
+            found = self.judge.of(trained.full.truncated(triple))
+            return max(getattr(found, name) / most for name, most in allowed.items())
+
+        price = cost.operations(trained.tensor, trained.laid.controls)
+        places = trained.tensor.weight * np.prod(self.judge.whole.shape[:2])
+        aim = min(allowed.values()) ** 2 * float(places)
+        return ranks.cheapest(ranks.front(trained.full.core, price, within), strain, aim)
+
+    def _thinned(self, model: Model, rung: Rung, allowed: dict[str, float]) -> Model:
+        """Model with one more level, of the fewest covariances whose answers are near enough."""
+        bank, decoder = model.bank, model.decoder
+        decoder = replace(decoder, coarse=(*decoder.coarse, rung))
+        for columns in _columns(model):
+            weights = self.lesson.weights(columns, rung.ranks[2], error=0.0)
+            coarse = (*bank.coarse, weights)
+            tried = replace(model, bank=replace(bank, coarse=coarse), decoder=decoder)
+            if self.exam.keeps(tried, allowed):
+                break
+        return tried
+
+
 def build(recipe: Recipe, trained: Trained) -> Laddered:
     """Model with the levels that a recipe asks for below its own size.
 
     Raises TrainingError for joints to keep still that there are not, and for the root.
     """
-    exam = exams.of(recipe, trained)
-    model = replace(trained.model, bank=thin.ordered(trained.model.bank))
-    judge = fidelity.judge(recipe, trained.examples, trained.tensor)
-    budgets = recipe.size.budgets or {"rms": trained.fidelity.rms}
+    shop = workshop(recipe, trained)
+    model = shop.model
     for detail in recipe.size.details:
-        allowed = {name: detail.times * budget for name, budget in budgets.items()}
         joints = _joints(trained, model.decoder.rungs[-1], detail)
-        model = _with_level(trained, judge, exam, model, joints, allowed)
+        model = shop.lowered(model, joints, detail.times)
     every = range(len(model.decoder.rungs))
-    return Laddered(model, tuple(_level(exam, model, level) for level in every))
+    return Laddered(model, tuple(shop.level(model, level) for level in every))
 
 
-def _level(exam: Exam, model: Model, level: int) -> Level:
-    rung, numbers = model.decoder.rungs[level], cost.read(model, level)
-    found = exam.errors(model, level, range(len(model.decoder.means)))
-    effector = exam.effector(model, level)
-    return Level(
-        rung.ranks,
-        model.bank.samples(level),
-        rung.joints,
-        numbers,
-        4 * numbers,
-        cost.work(model, level),
-        rms=_short(found.rms),
-        p99=_short(found.p99),
-        max=_short(found.max),
-        effector=None if effector is None else _short(effector),
+def workshop(recipe: Recipe, trained: Trained) -> Workshop:
+    """Workshop for the levels of a trained model."""
+    bank = thin.ordered(trained.model.bank)
+    return Workshop(
+        trained,
+        replace(trained.model, bank=bank),
+        recipe.size.budgets or {"rms": trained.fidelity.rms},
+        fidelity.judge(recipe, trained.examples, trained.tensor),
+        exams.of(recipe, trained),
+        thin.lesson(bank),
     )
 
 
 def _short(length: float) -> float:
     return float(f"{length:.4g}")
-
-
-def _with_level(
-    trained: Trained,
-    judge: Judge,
-    exam: Exam,
-    model: Model,
-    joints: tuple[int, ...],
-    allowed: dict[str, float],
-) -> Model:
-    """Model with one more level of the least work whose answers keep what is allowed, or nearly."""
-    within, made = model.decoder.rungs[-1].ranks, []
-    for share in TRUNCATION:
-        parts = {name: share * most for name, most in allowed.items()}
-        rung = Rung(_ranks(trained, judge, within, parts), joints)
-        made.append(_thinned(model, rung, exam, allowed))
-    kept = [laddered for laddered in made if exam.keeps(laddered, allowed)] or made[-1:]
-    return _with_own_error(exam, min(kept, key=lambda m: cost.work(m, len(m.bank.coarse))))
-
-
-def _with_own_error(exam: Exam, model: Model) -> Model:
-    """Model whose last level counts in its sigma how far it lies from the whole model."""
-    bank, last = model.bank, len(model.bank.coarse)
-    error = exam.errors(model, last, range(len(model.decoder.means))).rms
-    rank = model.decoder.rungs[last].ranks[2]
-    weights = thin.weights(bank, bank.columns(last), rank, error)
-    return replace(model, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
-
-
-def _ranks(trained: Trained, judge: Judge, within: Triple, allowed: dict[str, float]) -> Triple:
-    """Fewest multiply-adds within a finer level's ranks whose true errors are allowed."""
-
-    def strain(triple: Triple) -> float:
-        found = judge.of(trained.full.truncated(triple))
-        return max(getattr(found, name) / most for name, most in allowed.items())
-
-    price = cost.operations(trained.tensor, trained.laid.controls)
-    places = trained.tensor.weight * np.prod(judge.whole.shape[:2])
-    aim = min(allowed.values()) ** 2 * float(places)
-    return ranks.cheapest(ranks.front(trained.full.core, price, within), strain, aim)
 
 
 def _joints(trained: Trained, finer: Rung, detail: Detail) -> tuple[int, ...]:
@@ -124,18 +157,6 @@ def _joints(trained: Trained, finer: Rung, detail: Detail) -> tuple[int, ...]:
     for joint, parent in enumerate(parents[1:], start=1):
         still[joint] |= still[parent]
     return tuple(joint for joint in finer.joints if not still[joint])
-
-
-def _thinned(model: Model, rung: Rung, exam: Exam, allowed: dict[str, float]) -> Model:
-    """Model with one more level, of the fewest covariances whose answers are near enough."""
-    bank, decoder = model.bank, model.decoder
-    decoder = replace(decoder, coarse=(*decoder.coarse, rung))
-    for columns in _columns(model):
-        weights = thin.weights(bank, columns, rung.ranks[2], error=0.0)
-        tried = replace(model, bank=replace(bank, coarse=(*bank.coarse, weights)), decoder=decoder)
-        if exam.keeps(tried, allowed):
-            break
-    return tried
 
 
 def _columns(model: Model) -> list[int]:

@@ -5,7 +5,7 @@ of the tensor saves. A coarser level asks fewer samples, those that say most, of
 alone, and has all fields of them by the weights whose answers come nearest to what all fields say.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,14 +68,32 @@ def questions(bank: FieldBank, reach: float) -> Floats:
     return np.hstack([controls, labels])
 
 
-def weights(bank: FieldBank, columns: int, rank: int, error: float) -> Floats:
-    """Weights (p + 1 + d + m, M) of the first m covariances for a pose of so many coefficients.
+@dataclass(frozen=True)
+class Lesson:
+    """What a bank's fields say at points beyond its samples, for coarser levels to learn.
 
-    error: of the level's own, m; its variance counts it in.
+    basis (P, p + 1 + d + m): labels, one, controls and all covariances. said: values (P, m) by
+    name.
     """
+
+    basis: Floats
+    said: dict[str, Floats]
+    bank: FieldBank
+
+    def weights(self, columns: int, rank: int, error: float) -> Floats:
+        """Weights (p + 1 + d + m, M) of the first m covariances for a pose of so many coefficients.
+
+        error: of the level's own, m; its variance counts it in.
+        """
+        own = np.log(self.said[VARIANCE] + error**2 / self.bank.sill)
+        values = np.hstack(list({**self.said, VARIANCE: own}.values()))
+        kept = values.shape[1] - (self.bank.pose.dual.shape[1] - rank)
+        known = self.basis[:, : self.bank.linear + columns]
+        found = np.linalg.lstsq(known, values[:, :kept], rcond=FAINTEST)
+        return np.asarray(found[0], np.float64)
+
+
+def lesson(bank: FieldBank) -> Lesson:
+    """Lesson of a bank of one level."""
     points = np.vstack([questions(bank, BEYOND), bank.pose.samples])
-    basis, exact = bank.basis(points, columns), bank.numpy(points)
-    exact[VARIANCE] = np.log(exact[VARIANCE] + error**2 / bank.sill)
-    values = np.hstack(list(exact.values()))
-    kept = values.shape[1] - (bank.pose.dual.shape[1] - rank)
-    return np.asarray(np.linalg.lstsq(basis, values[:, :kept], rcond=FAINTEST)[0], np.float64)
+    return Lesson(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)

@@ -28,7 +28,7 @@ from service.motion.errors import (
     TrainingError,
     UnknownFormat,
 )
-from service.synthesis import library, session
+from service.synthesis import library, pace, session
 from service.synthesis.synthesizer import Policy, Synthesizer
 from service.synthesis.view import Camera
 
@@ -86,9 +86,14 @@ def _version(
 
 @app.command()
 def inspect(model: ModelPath, json: Json = False) -> None:
-    """Say what a model file is: its controls, its skeleton, its errors, where it comes from."""
+    """Say what a model file is: its controls, its skeleton, its errors, where it comes from, and
+    what a pose costs here."""
     opened = session.load(model)
-    plain = {"identity": f"{model.stem}@{opened.digest}", **cards.plain_values(opened.card)}
+    plain = {
+        "identity": f"{model.stem}@{opened.digest}",
+        **cards.plain_values(opened.card),
+        "seconds_per_pose": pace.seconds_per_pose(opened),
+    }
     typer.echo(as_json(plain) if json else _summary(plain))
 
 
@@ -281,17 +286,19 @@ def as_json(value: Any) -> str:
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
 
 
-def _level(number: int, level: dict[str, Any]) -> str:
+def _level(number: int, level: dict[str, Any], seconds: float) -> str:
     return (
         f"  {number}: ranks {level['ranks']} of {level['samples']} clips, {level['numbers']} "
         f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
-        f"one joint in a hundred by more than {100 * level['p99']:.1f} cm"
+        f"one joint in a hundred by more than {100 * level['p99']:.1f} cm, here "
+        f"{1e6 * seconds:.2f} µs a pose"
     )
 
 
 def _summary(plain: dict[str, Any]) -> str:
     """A model card on one screen."""
     diagnostics = plain["diagnostics"]
+    levels = zip(plain["levels"], plain["seconds_per_pose"], strict=True)
     lines = [
         f"{plain['identity']}: {plain['description']}",
         f"{plain['samples']} clips of {len(plain['skeleton']['names'])} joints, "
@@ -300,8 +307,8 @@ def _summary(plain: dict[str, Any]) -> str:
         f"ranks {plain['levels'][0]['ranks']} of {diagnostics['tensor']}: truncation costs "
         f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
         f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
-        "levels of detail:",
-        *(_level(number, level) for number, level in enumerate(plain["levels"])),
+        f"levels of detail, times in batches of {pace.BATCH}:",
+        *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
         *(
             f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"

@@ -261,6 +261,9 @@ def test_inspect_answers_as_json(posefield, model_path):
     assert [c["name"] for c in card["controls"]] == list(POINT)
     assert card["skeleton"]["names"][0] == "Hips"
     assert card["diagnostics"]["notes"] == []
+    costs = card["seconds_per_pose"]
+    assert len(costs) == len(card["levels"]) and min(costs) > 0.0
+    assert costs == sorted(costs, reverse=True)
 
 
 def test_inspect_tells_people_the_same(posefield, model_path):
@@ -269,6 +272,14 @@ def test_inspect_tells_people_the_same(posefield, model_path):
     assert "reaching@" in out and "46 clips of 33 joints" in out and "licence: CC0-1.0" in out
     for name in POINT:
         assert re.search(rf"^  {name}: [-0-9.]+ to [0-9.]+ (m|deg), ", out, re.MULTILINE)
+    levels = re.findall(r"^  (\d): ranks .*, here [0-9.]+ µs a pose$", out, re.MULTILINE)
+    assert levels == ["0", "1", "2", "3"]
+
+
+def test_what_a_pose_costs_is_not_in_the_file(model_path):
+    """It is the machine's, and would make files differ from run to run."""
+    assert b"seconds_per_pose" not in model_path.read_bytes()
+    assert b"operations" in model_path.read_bytes()
 
 
 def test_a_corrupt_model_is_refused_with_code_3(refused, model_path, tmp_path):

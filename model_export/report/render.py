@@ -18,6 +18,7 @@ from model_export.report import (
     warps,
 )
 from model_export.report.about import About, Step
+from model_export.report.detail import Ladder
 from model_export.report.page import Chapter
 from model_export.train import Trained
 
@@ -33,10 +34,10 @@ class Rendered:
     json: bytes
 
 
-def render(trained: Trained, exported: Exported, steps: Sequence[Step]) -> Rendered:
-    """Report of a model; the same model and steps give the same bytes."""
+def render(trained: Trained, exported: Exported, ladder: Ladder, steps: Sequence[Step]) -> Rendered:
+    """Report of a model; the same model, measured ladder and steps give the same bytes."""
     own = About(exported, tuple(steps))
-    chapters = _chapters(trained, own)
+    chapters = _chapters(trained, ladder, own)
     facts = {"report": FORMAT, **{name: part.facts() for name, part in chapters.items()}}
     sections = [part.section() for part in chapters.values()]
     card = exported.card
@@ -45,7 +46,7 @@ def render(trained: Trained, exported: Exported, steps: Sequence[Step]) -> Rende
     return Rendered(html.encode(), f"{text}\n".encode())
 
 
-def _chapters(trained: Trained, own: About) -> dict[str, Chapter]:
+def _chapters(trained: Trained, ladder: Ladder, own: About) -> dict[str, Chapter]:
     """Parts of the report by name, in the order of the page."""
     controls = own.exported.card.controls
     missed = clips.of(trained, controls)
@@ -58,6 +59,7 @@ def _chapters(trained: Trained, own: About) -> dict[str, Chapter]:
         "variograms": variograms.of(trained, controls),
         "spectra": spectra.of(trained),
         "sizes": sizes.of(trained),
+        "levels": ladder,
         "warps": warps.of(trained),
         "about": own,
     }

@@ -111,7 +111,9 @@ def test_as_many_covariances_as_there_are_answer_exactly(trained, rng):
     exact = bank.numpy(points)
 
     def away(columns):
-        own = replace(bank, coarse=(thin.weights(bank, columns, rank, 0.0),)).numpy(points, 1)
+        own = replace(bank, coarse=(thin.lesson(bank).weights(columns, rank, 0.0),)).numpy(
+            points, 1
+        )
         return max(np.abs(own[name] - exact[name]).max() for name in exact if name != VARIANCE)
 
     assert away(bank.columns(0)) < 2e-3

@@ -7,7 +7,7 @@ import pytest
 from minimal import recipe_with, small_clip, write_clips
 
 from model_export import export, ingest, train
-from model_export.report import render
+from model_export.report import detail, render
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
@@ -16,8 +16,10 @@ def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path, cyclic
     recipe = recipe_with(motion={"cyclic": cyclic})
     examples, notes = ingest.ingest(recipe, write_clips(tmp_path, clips))
     trained = train.train(recipe, examples, lambda _: None)
-    rendered = render.render(trained, export.export(recipe, trained, notes), [])
-    facts = json.loads(rendered.json)
+    exported = export.export(recipe, trained, notes)
+    ladder = detail.of(recipe, trained, exported)
+    facts = json.loads(render.render(trained, exported, ladder, []).json)
+    assert [level["effector_m"] for level in facts["levels"]["levels"]] == [None] * 4
     assert ("travel" in facts["fields"]) == cyclic
     assert facts["coverage"]["one_value_a_performer"] == []
     assert [clip["performer"] for clip in facts["clips"]["clips"]] == [""] * 8

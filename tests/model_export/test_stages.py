@@ -101,7 +101,8 @@ LEVELS = ((5, 4), (SAMPLES, 3), (3 * SAMPLES, 3), (4 * SAMPLES, 6))
 def coarse_bank():
     """A bank of coarser levels that ask some samples, all of them, and further fields."""
     own = thin.ordered(bank())
-    weights = tuple(thin.weights(own, columns, rank, 0.1) for columns, rank in LEVELS)
+    lesson = thin.lesson(own)
+    weights = tuple(lesson.weights(columns, rank, 0.1) for columns, rank in LEVELS)
     return replace(own, coarse=weights)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from model_export import export
-from model_export.report import render
+from model_export.report import detail, render
 from model_export.report.about import Step
 
 
@@ -26,6 +26,12 @@ def exported(small_recipe, trained, note):
 
 
 @pytest.fixture(scope="session")
-def rendered(trained, exported, steps):
+def ladder(small_recipe, trained, exported):
+    """Its levels of detail, measured once."""
+    return detail.of(small_recipe, trained, exported)
+
+
+@pytest.fixture(scope="session")
+def rendered(trained, exported, ladder, steps):
     """Its report."""
-    return render.render(trained, exported, steps)
+    return render.render(trained, exported, ladder, steps)

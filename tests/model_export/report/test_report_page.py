@@ -84,7 +84,7 @@ def test_names_of_two_pictures_would_meet(rendered):
 
 
 def test_every_picture_says_what_it_shows(page):
-    assert len(page.pictures) == page.tags["figcaption"] == 11
+    assert len(page.pictures) == page.tags["figcaption"] == 12
     for given in page.pictures:
         assert given["role"] == "img" and len(given["aria-label"]) > 30
         assert "width" not in given and "viewbox" in given
@@ -92,7 +92,7 @@ def test_every_picture_says_what_it_shows(page):
 
 def test_every_section_can_be_reached_from_the_top(rendered, page):
     sections = re.findall(r'<section id="([a-z]+)">', rendered.html.decode())
-    assert len(sections) == 10 and set(sections) <= set(page.meant)
+    assert len(sections) == 11 and set(sections) <= set(page.meant)
 
 
 def test_what_was_given_is_written_and_not_obeyed(rendered, note):
@@ -101,13 +101,14 @@ def test_what_was_given_is_written_and_not_obeyed(rendered, note):
     assert note in text and "reading <recipe>" in text
 
 
-def test_the_same_model_gives_the_same_bytes(trained, exported, steps, rendered):
-    assert render.render(trained, exported, steps) == rendered
+def test_the_same_model_gives_the_same_bytes(trained, exported, ladder, steps, rendered):
+    assert render.render(trained, exported, ladder, steps) == rendered
 
 
-def test_another_time_gives_other_bytes(trained, exported, steps, rendered):
+def test_another_time_gives_other_bytes(trained, exported, ladder, steps, rendered):
     """Negative control; and times are all that differs between two trainings of one recipe."""
-    slower = render.render(trained, exported, [*steps[:1], Step(steps[1].name, 9.75)])
+    late = [*steps[:1], Step(steps[1].name, 9.75)]
+    slower = render.render(trained, exported, ladder, late)
     assert slower.html != rendered.html and slower.json != rendered.json
     # The step's own, and both sums of them: at the top, and below the steps.
     kept = slower.html.replace(b">9.75<", b">1.50<").replace(b">10.00<", b">1.75<")
