@@ -8,6 +8,7 @@ posefield crowd MODEL --count 144 --seconds 4 --camera=-34,6,-20 -o CROWD.usd
 import json
 import math
 import sys
+from pathlib import Path
 
 FRAME = 60
 COLOURS = ((0.02, 0.2, 0.6), (0.05, 0.5, 0.25), (0.9, 0.5, 0.05), (0.8, 0.1, 0.05))
@@ -32,7 +33,7 @@ def draw(crowd: str, shown: str, picture: str) -> None:
     bpy.ops.wm.usd_import(filepath=crowd)
     scene = bpy.context.scene
     scene.frame_set(FRAME)
-    with open(shown, encoding="utf-8") as file:
+    with Path(shown).open(encoding="utf-8") as file:
         own = json.load(file)
     paints = [paint(bpy, level, colour) for level, colour in enumerate(COLOURS)]
     bodies = sorted((b for b in bpy.data.objects if b.type == "MESH"), key=number)
