@@ -21,8 +21,10 @@ from service.synthesis.crowd_question import Blending, CrowdQuestion, Truths
 from service.synthesis.synthesizer import FARTHEST, Synthesizer
 from service.synthesis.view import View
 
-# Poses of a call: more would not stay in a core's cache between one operator and the next.
-BATCH = 512
+# Poses of a call. With fewer, calls cost more than poses; more leave a core's cache between one
+# operator and the next. In between, so many calls that cores share them evenly: not as many as
+# there are cores, on which the rounding of answers would hang.
+FEWEST, BATCH, CALLS = 256, 1536, 8
 # Of a clip's duration: what float32 makes of a time that was read from an answer.
 SLACK = 1e-5
 
@@ -215,8 +217,9 @@ def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
     """A level and rows of it, for every call: rows that follow one another as a slice."""
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        for first in range(0, len(rows), BATCH):
-            part = rows[first : first + BATCH]
+        size = min(max(-(-len(rows) // CALLS), FEWEST), BATCH)
+        for first in range(0, len(rows), size):
+            part = rows[first : first + size]
             together = part[-1] - part[0] + 1 == len(part)
             yield level, slice(part[0], part[-1] + 1) if together else part
 
