@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from pxr import Usd, UsdSkel
 from typer.testing import CliRunner
 
 from service import cli, crowds
@@ -61,24 +62,61 @@ def test_routes_are_followed(walk_path, tmp_path):
 @pytest.mark.parametrize(
     ("words", "kind", "said"),
     [
-        (("-o", "crowd.usd"), InvalidField, "output: 'crowd.usd', expected a name that ends in"),
+        (("-o", "crowd.fbx"), InvalidField, "output: 'crowd.fbx' ends in none of usd, usda, usdc"),
+        (("-o", "c.usd", "--instancing", "clones"), InvalidField, "instancing: 'clones', expected"),
+        (("-o", "c.usd", "--camera", "1,2"), InvalidField, "camera/position: [1.0, 2.0], expected"),
+        (("-o", "c.usd", "--camera", "here"), InvalidField, "camera: 'here', expected X,Y,Z"),
+        (("-o", "c.usd", "--camera", "90,2,0", "--fov", 4), InvalidField, "camera/fov: 4 rad"),
+        (("-o", "c.usd", "--level", 4), InvalidField, "level: 4, expected 0 to 3"),
+        (
+            ("-o", "c.usd", "--count", 3, "--motions", 4),
+            InvalidField,
+            "motions: 4, expected 1 to 3",
+        ),
         (("-o", "c.npz", "--count", 0), InvalidField, "count: 0, expected"),
         (("-o", "c.npz", "--paths", "none.json"), FileError, "none.json: cannot be read"),
         (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),
     ],
 )
-def test_what_cannot_be_done_is_refused(walk_path, words, kind, said):
+def test_what_cannot_be_done_is_refused(walk_path, tmp_path, monkeypatch, words, kind, said):
+    monkeypatch.chdir(tmp_path)
     done = run(walk_path, *words)
     assert isinstance(done.exception, kind)
     assert said in str(done.exception)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_is_no_json_is_named(walk_path, tmp_path):
     path = tmp_path / "routes.json"
     path.write_text("[")
-    order = crowds.Order(None, path, 1.0, 30.0, 0)
     with pytest.raises(MotionError, match=r"routes\.json: not JSON"):
-        crowds.write(walk_path, order, tmp_path / "c.npz")
+        crowds.routes(path)
+
+
+@pytest.mark.parametrize("ending", ["usd", "usda", "usdc", "usdz"])
+def test_a_crowd_is_written_as_usd(walk_path, tmp_path, ending):
+    path = tmp_path / f"crowd.{ending}"
+    words = ("--count", 6, "--motions", 2, "--seconds", 0.5, "-o", path, "--json")
+    facts = json.loads(run(walk_path, *words).stdout)
+    assert (facts["characters"], facts["motions"], facts["frames"]) == (6, 2, 16)
+    stage = Usd.Stage.Open(str(path))
+    characters = stage.GetPrimAtPath("/Crowd/Characters").GetChildren()
+    played = [c.GetRelationship("skel:animationSource").GetTargets()[0] for c in characters]
+    assert len(played) == 6 and len(set(played)) == 2
+    animation = UsdSkel.Animation(stage.GetPrimAtPath(played[0]))
+    first, last = (np.array(animation.GetRotationsAttr().Get(code)) for code in (0, 15))
+    assert np.abs(first - last).max() > 0.05
+
+
+def test_a_camera_chooses_levels_and_they_are_told(walk_path, tmp_path):
+    words = ("--count", 9, "--seconds", 0.5, "--json", "-o", tmp_path / "crowd.usdc")
+    shares = [
+        json.loads(run(walk_path, *words, f"--camera={place}").stdout)["level_shares"]
+        for place in ("-9,1.7,0", "-90,1.7,0", "-2000,1.7,0")
+    ]
+    assert [sum(share) for share in shares] == pytest.approx([1.0] * 3, abs=1e-3)
+    finest = [share[0] for share in shares]
+    assert finest == sorted(finest, reverse=True) and finest[-1] == 0.0
 
 
 def test_a_model_that_does_not_walk_is_refused(model_path, tmp_path):
