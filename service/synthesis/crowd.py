@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.motion import blend
-from service.motion.card import Control, ModelCard
-from service.motion.conventions import Floats, Indices, Singles
+from service.motion.conventions import Indices, Singles
 from service.motion.crowd import CrowdPoses, Placement
-from service.motion.errors import InvalidField, OutsideSamples
-from service.synthesis import crowd_question, view
-from service.synthesis.crowd_question import Blending, CrowdQuestion, Truths
-from service.synthesis.synthesizer import FARTHEST, Synthesizer
+from service.synthesis import crowd_door, crowd_question, view
+from service.synthesis.crowd_question import Blending, CrowdQuestion
+from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import View
 
 # Poses of a call. With fewer, calls cost more than poses; more leave a core's cache between one
@@ -68,19 +66,19 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     one.
     """
     card = model.session.card
-    controls, said = _controls(card, question)
+    controls, said = crowd_door.controls(card, question)
     labels = crowd_question.labels(question, card.performers)
     crowd_question.check_levels(question, len(card.levels))
     early = question.times < 0.0
-    _refuse("time", question.times, early, "s, expected 0 s or later")
+    crowd_door.refuse("time", question.times, early, "s, expected 0 s or later")
     levels, error_px, sentences = _levels(model, question)
     asked = _Asked(controls.astype(np.float32), question.times.astype(np.float32)[:, None], labels)
     block = _answers(model, asked, levels)
     if question.blending is not None:
         _blend(model, asked, block, levels, question.blending)
-    _check_durations(card, block.duration)
+    crowd_door.check_durations(card, block.duration)
     late = question.times > block.duration * (1.0 + SLACK)
-    _refuse("time", question.times, late, "s, later than the end of the clip")
+    crowd_door.refuse("time", question.times, late, "s, later than the end of the clip")
     if question.root == "in_place":
         _stay(block)
     _place(block, question.placement)
@@ -96,70 +94,6 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         block.sigma,
         (*said, *sentences),
     )
-
-
-def _controls(card: ModelCard, question: CrowdQuestion) -> tuple[Floats, tuple[str, ...]]:
-    """Controls (N, d) in the card's order, and a sentence for each that some go beyond."""
-    for name in question.controls:
-        if card.control(name) is None:
-            known = ", ".join(c.name for c in card.controls)
-            raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
-    columns = [_column(control, question) for control in card.controls]
-    pairs = zip(card.controls, columns, strict=True)
-    said = tuple(filter(None, (_outside(control, column) for control, column in pairs)))
-    if said and question.extrapolate == "refuse":
-        raise OutsideSamples("controls", "; ".join(said))
-    return np.stack(columns, axis=1), said
-
-
-def _column(control: Control, question: CrowdQuestion) -> Floats:
-    field = f"controls/{control.name}"
-    low, high = control.minimum, control.maximum
-    if control.name not in question.controls:
-        raise InvalidField(
-            field,
-            f"missing; give numbers in {control.unit}, sampled from {low:g} to {high:g}",
-        )
-    values = question.controls[control.name]
-    # Where float32 would overflow there is no answer to give.
-    reach = 100.0 * (high - low)
-    far = (values < low - reach) | (values > high + reach)
-    expected = f"{control.unit}, expected {low - reach:g} to {high + reach:g} {control.unit}"
-    _refuse(field, values, far, expected)
-    return values
-
-
-def _outside(control: Control, values: Floats) -> str | None:
-    slack = 1e-6 * (control.maximum - control.minimum)
-    beyond = (values < control.minimum - slack) | (values > control.maximum + slack)
-    if not beyond.any():
-        return None
-    first = int(np.argmax(beyond))
-    return (
-        f"{control.name} of {np.count_nonzero(beyond)} characters lies outside what was sampled, "
-        f"{control.minimum:g} to {control.maximum:g} {control.unit}; "
-        f"the first is character {first}, {values[first]:g} {control.unit}"
-    )
-
-
-def _refuse(field: str, values: Floats, bad: Truths, expected: str) -> None:
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise InvalidField(field, f"{values[first]:g} {expected}", first)
-
-
-def _check_durations(card: ModelCard, durations: Singles) -> None:
-    """Refuse controls so far outside that extrapolation has lost all sense."""
-    low, high = card.durations
-    senseless = ~((durations >= low / FARTHEST) & (durations <= high * FARTHEST))
-    if senseless.any():
-        first = int(np.argmax(senseless))
-        raise OutsideSamples(
-            "controls",
-            f"so far outside what was sampled that the clip would last {durations[first]:.3g} s; "
-            f"captured clips last {low:.3g} to {high:.3g} s",
-            first,
-        )
 
 
 def _levels(
