@@ -3,7 +3,8 @@
     make bench
 
 Every ratio compares two things timed in turn in this one run; a row's baseline says in words what
-it is compared with. Medians, one thread inside onnxruntime; only the whole call of a crowd takes one for each core.
+it is compared with. Medians, one thread inside onnxruntime; the whole call of a crowd takes one for
+each core.
 """
 
 import shutil

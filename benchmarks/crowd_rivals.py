@@ -1,7 +1,7 @@
 """The same crowd by naive kriging and by SciPy's interpolator: controls in, quaternions out.
 
-One thread on every side. In NumPy naive kriging asks each frame's field of all the characters who are
-at that frame; in onnxruntime it is as in the rows of 256 poses.
+One thread on every side. In NumPy naive kriging asks each frame's field at once of all the
+characters who are at that frame; in onnxruntime it is as in the rows of 256 poses.
 """
 
 from collections.abc import Callable
