@@ -3,13 +3,16 @@
     make bench
 
 Every ratio compares two things timed in turn in this one run; a row's baseline says in words what
-it is compared with. Medians, one thread inside onnxruntime.
+it is compared with. Medians, one thread inside onnxruntime; the whole call of a crowd takes one for
+each core.
 """
 
 import shutil
 import sys
 from pathlib import Path
 
+import crowd
+import crowd_usd
 import newcomer
 import paper
 import precompute
@@ -30,6 +33,8 @@ def main() -> None:
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
+        *crowd.rows(made),
+        *crowd_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))

@@ -10,9 +10,10 @@ from functools import partial
 
 import numpy as np
 
-from model_export import align, decoder
+from model_export import align, decoder, field_graph
 from model_export.covariance import COVARIANCES
 from model_export.evaluate.table1_family import Family
+from model_export.ladder import Ladder
 from model_export.naive import Naive
 from model_export.net import Net
 from service.motion import quat
@@ -69,9 +70,10 @@ class Contents:
         """Graph of one question at many times, or of many questions at a time each."""
         model = self.made.trained.model
         net = Net()
-        _, fields = model.bank.onnx(net, "controls")
+        ends = Ladder(field_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]]))
+        fields = field_graph.onnx(model.bank, net, "controls", ends.onnx(net))
         duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
-        points = model.bank.points_onnx(net, "controls")
+        points = self._points(net)
         axes = net.indices(1, 2) if alone else net.indices(0, 2)
         numbers = poses(net, points, net("Squeeze", place, axes))
         net.named("rotations", self._rotations(net, numbers))
@@ -93,6 +95,14 @@ class Contents:
             {},
             ABOUT,
         )
+
+    def _points(self, net: Net) -> str:
+        """The controls (B, d), whose sampled range is -1 to 1."""
+        bank = self.made.trained.model.bank
+        gain = np.diag(2.0 / (bank.high - bank.low))
+        shift = -(bank.high + bank.low) / (bank.high - bank.low)
+        own = net.weights("naive_gain", gain), net.weights("naive_shift", shift)
+        return net("Gemm", "controls", *own)
 
     def _own(self, poses: Callable[[Net, str, str], str], net: Net, points: str, place: str) -> str:
         """Pose vectors (B, D) of each question's two frames, and a line between them."""
@@ -167,7 +177,9 @@ class Contents:
         means = self.made.trained.model.decoder.means
         end = net.indices(3 + 4 * len(means))
         turned = net("Slice", numbers, net.indices(3), end, net.indices(1))
-        return decoder.quaternions(net, net("Transpose", turned, perm=[1, 0]), means)
+        rows = net("Transpose", turned, perm=[1, 0])
+        innermost = net.weights("naive_means", means[:, :, None])
+        return decoder.innermost_joints(net, decoder.quaternions(net, rows, innermost), len(means))
 
 
 def check(

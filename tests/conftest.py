@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import walker
 
 from model_export import export, ingest, recipe, train
 from model_export.export import Exported
 from model_export.ingest import Example
 from model_export.recipe import Recipe
-from model_export.sample import write
+from model_export.sample import stroll, write
 from model_export.train import Trained
 
 
@@ -94,16 +93,16 @@ def labelled_path(labelled_exported: Exported, tmp_path_factory: pytest.TempPath
 @pytest.fixture(scope="session")
 def strides(tmp_path_factory: pytest.TempPathFactory) -> list[Example]:
     """Strides of the procedural walk."""
-    folder = walker.write(tmp_path_factory.mktemp("strides"))
-    return ingest.ingest(walker.recipe(), folder)[0]
+    folder = stroll.write(tmp_path_factory.mktemp("strides"))
+    return ingest.ingest(stroll.recipe(), folder)[0]
 
 
 @pytest.fixture(scope="session")
 def walk_path(strides: list[Example], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small model of the procedural walk as a file, stroll.onnx."""
-    trained = train.train(walker.recipe(), strides, lambda _: None)
+    trained = train.train(stroll.recipe(), strides, lambda _: None)
     path = tmp_path_factory.mktemp("walk") / "stroll.onnx"
-    path.write_bytes(export.export(walker.recipe(), trained, []).content)
+    path.write_bytes(export.export(stroll.recipe(), trained, []).content)
     return path
 
 

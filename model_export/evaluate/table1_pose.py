@@ -76,7 +76,7 @@ def naive(field: Naive, question: Asked) -> dict[str, Callable[[], Floats]]:
     samples, values = field.fields[0].samples.T, field.values.transpose(1, 0, 2)
     n = samples.shape[1]
     scales = np.stack([one.hyper.scales for one in field.fields])
-    systems = np.stack([_system(one) for one in field.fields])
+    systems = np.stack([system(one) for one in field.fields])
     factors = _factors(systems)
     inverses = np.linalg.inv(systems)[:, :, :n]
     duals = np.stack([one.dual for one in field.fields])
@@ -131,7 +131,7 @@ def _factors(systems: Floats) -> tuple[Floats, Floats, Floats]:
     return stacked, np.stack(orders), 1.0 / np.diagonal(stacked, axis1=1, axis2=2)
 
 
-def _system(field: Kriging) -> Floats:
+def system(field: Kriging) -> Floats:
     """Kriging system (m, m) of a naive field, its drift linear."""
     n, drift = len(field.samples), np.insert(field.samples, 0, 1.0, axis=1)
     near = kriging.covariances(field.hyper, field.samples, field.samples)

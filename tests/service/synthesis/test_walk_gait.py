@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import walker
 
+from model_export.sample import stroll
 from service.motion.errors import InvalidField
 from service.synthesis import session
 from service.synthesis.walk import gait, region, stride
@@ -98,4 +98,4 @@ def test_nobody_in_particular_walks_too(opened):
         "LeftFoot",
         "RightFoot",
     ]
-    assert walker.SKELETON.same_tree(opened.card.skeleton)
+    assert stroll.SKELETON.same_tree(opened.card.skeleton)

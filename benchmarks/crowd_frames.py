@@ -1,0 +1,106 @@
+"""Naive kriging of a crowd in NumPy, in float32: each frame's field is asked at once of all the
+characters who are at that frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from model_export import naive
+from model_export.covariance import COVARIANCES
+from model_export.evaluate import table1_pose
+from model_export.evaluate.table1_family import Family
+from model_export.kriging import Kriging
+from service.motion.conventions import Indices, Singles
+
+Answer = Callable[[], list[Singles]]
+"""What answers with rotations (N, J, 4)."""
+
+
+@dataclass(frozen=True)
+class Questions:
+    """Points (N, d) in half-ranges, whole canonical frames before the times (N,), and shares (N, 1)
+    of the next. To find frames is ours to pay: the rivals are given them."""
+
+    points: Singles
+    below: Indices
+    share: Singles
+
+
+def solved(made: Family, field: naive.Naive, questions: Questions) -> Answer:
+    """Poses by LU factors of each frame's system, made beforehand, and averages of the samples."""
+    factors = [linalg.lu_factor(table1_pose.system(one).astype(np.float32)) for one in field.fields]
+    values = field.values.astype(np.float32)
+    n = values.shape[0]
+
+    def frame(index: int, basis: Singles) -> Singles:
+        weights = linalg.lu_solve(factors[index], basis.T, check_finite=False)[:n]
+        return weights.T @ values[:, index]
+
+    return _by_frame(made, field, questions, frame)
+
+
+def dual(made: Family, field: naive.Naive, questions: Questions) -> Answer:
+    """Poses by inverse and samples multiplied beforehand."""
+    duals = [one.dual.astype(np.float32) for one in field.fields]
+    return _by_frame(made, field, questions, lambda index, basis: basis @ duals[index])
+
+
+def _by_frame(
+    made: Family,
+    field: naive.Naive,
+    questions: Questions,
+    frame: Callable[[int, Singles], Singles],
+) -> Answer:
+    """Poses of everybody, frame after frame, where `frame` makes pose vectors of a basis."""
+    means = made.trained.model.decoder.means.astype(np.float32)
+    fields = [_singles(one) for one in field.fields]
+
+    def run() -> list[Singles]:
+        order = np.argsort(questions.below, kind="stable")
+        firsts = np.searchsorted(questions.below[order], np.arange(len(fields)))
+        found = np.empty((len(order), field.values.shape[2]), np.float32)
+        for index, rows in enumerate(np.split(order, firsts[1:])):
+            if not len(rows):
+                continue
+            before, after = (
+                frame(at, _basis(fields[at], questions.points[rows])) for at in (index, index + 1)
+            )
+            found[rows] = before + questions.share[rows] * (after - before)
+        return [decoded(found[:, 3:], means)]
+
+    return run
+
+
+@dataclass(frozen=True)
+class Single:
+    """Samples (n, d) of a field in float32, so that distances are the covariance's squared."""
+
+    samples: Singles
+    scale: np.float32
+    covariance: Callable[[Singles], Singles]
+
+
+def _singles(field: Kriging) -> Single:
+    hyper = field.hyper
+    scale = np.float32(hyper.scales[0])
+    samples = field.samples.astype(np.float32) * scale
+    return Single(samples, scale, COVARIANCES[hyper.covariance].numpy)
+
+
+def _basis(field: Single, points: Singles) -> Singles:
+    """Covariances and drift (K, n + 1 + d)."""
+    own = points * field.scale
+    squared = np.square(own).sum(axis=1)[:, None] + np.square(field.samples).sum(axis=1)
+    squared -= 2.0 * own @ field.samples.T
+    near = field.covariance(np.maximum(squared, np.float32(0.0)))
+    return np.hstack([near, np.ones((len(points), 1), np.float32), points])
+
+
+def decoded(turned: Singles, means: Singles) -> Singles:
+    """Quaternions (N, J, 4) as the model's decoder makes them, poses innermost while it does."""
+    joints = np.ascontiguousarray(turned.T).reshape(*means.shape, -1)
+    half = np.sqrt(np.sum(np.square(joints), axis=1, keepdims=True) + np.float32(1e-12))
+    found = joints * (np.sin(half) / half) + means[..., None] * np.cos(half)
+    return np.ascontiguousarray(found.transpose(2, 0, 1))
