@@ -12,16 +12,16 @@ from model_export.recipe import Recipe
 from model_export.train import Trained
 from service.motion.conventions import Floats
 
-QUESTIONS = 1_000
-
 
 @dataclass(frozen=True)
 class Errors:
-    """Distances of joints, m: root mean square, 99th percentile, largest."""
+    """Distances of joints, m: root mean square, 99th percentile, largest; and the largest root mean
+    square over the joints of one pose."""
 
     rms: float
     p99: float
     max: float
+    pose: float
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,9 @@ class Exam:
         answer = model.evaluate(self.controls, self.times, self.labels, level)
         found = answer.positions(self.parents)[:, 0]
         gaps = np.linalg.norm(found - self.whole, axis=-1)[:, list(joints)]
-        rms = float(np.sqrt(np.mean(np.square(gaps))))
-        return Errors(rms, float(np.quantile(gaps, 0.99)), float(gaps.max()))
+        poses = np.sqrt(np.mean(np.square(gaps), axis=1))
+        rms = float(np.sqrt(np.mean(np.square(poses))))
+        return Errors(rms, float(np.quantile(gaps, 0.99)), float(gaps.max()), float(poses.max()))
 
     def effector(self, model: Model, level: int) -> float | None:
         """Root mean square distance, m, of the event's joint at its event, where there is one."""
@@ -64,10 +65,10 @@ class Exam:
         return all(found[name] <= most for name, most in allowed.items())
 
 
-def of(recipe: Recipe, trained: Trained) -> Exam:
-    """Exam of a trained model's levels."""
+def of(recipe: Recipe, trained: Trained, questions: int) -> Exam:
+    """Exam of a trained model's levels, of so many questions."""
     whole, bank = _whole(trained), trained.model.bank
-    points, d = thin.questions(bank, 1.0)[:QUESTIONS], len(bank.low)
+    points, d = thin.questions(bank, 1.0, questions), len(bank.low)
     controls = (points[:, :d] * (bank.high - bank.low) + bank.high + bank.low) / 2.0
     labels = points[:, d:]
     rng = np.random.Generator(np.random.PCG64(len(points)))

@@ -23,6 +23,8 @@ from service.motion.errors import TrainingError
 # Truncation may take so much of a budget, and the samples that are not asked the rest; where these
 # need more, it takes less.
 TRUNCATION = (0.85, 0.7, 0.5)
+# Questions to a level that is tried, and to one that was made: rare poses show in many alone.
+QUESTIONS, FINALS = 1_000, 4_000
 SAMPLES = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
 
 
@@ -37,7 +39,7 @@ class Laddered:
 @dataclass(frozen=True)
 class Workshop:
     """What levels are made with: what training left, judges of truncations and of answers, and
-    what a level's weights are fitted to.
+    what a level's weights are fitted to. finals: the exam of what was made.
 
     model: of the finest level alone, its samples in the order in which they say most of the pose.
     budgets: of the finest level, m, by name.
@@ -48,6 +50,7 @@ class Workshop:
     budgets: dict[str, float]
     judge: Judge
     exam: Exam
+    finals: Exam
     lesson: Lesson
 
     def lowered(self, model: Model, joints: tuple[int, ...], times: float) -> Model:
@@ -65,8 +68,8 @@ class Workshop:
     def level(self, model: Model, level: int) -> Level:
         """What a level of a model is."""
         rung, numbers = model.decoder.rungs[level], cost.read(model, level)
-        found = self.exam.errors(model, level, range(len(model.decoder.means)))
-        effector = self.exam.effector(model, level)
+        found = self.finals.errors(model, level, range(len(model.decoder.means)))
+        effector = self.finals.effector(model, level)
         return Level(
             rung.ranks,
             model.bank.samples(level),
@@ -77,6 +80,7 @@ class Workshop:
             rms=_short(found.rms),
             p99=_short(found.p99),
             max=_short(found.max),
+            pose=_short(found.pose),
             effector=None if effector is None else _short(effector),
         )
 
@@ -136,7 +140,8 @@ def workshop(recipe: Recipe, trained: Trained) -> Workshop:
         replace(trained.model, bank=bank),
         recipe.size.budgets or {"rms": trained.fidelity.rms},
         fidelity.judge(recipe, trained.examples, trained.tensor),
-        exams.of(recipe, trained),
+        exams.of(recipe, trained, QUESTIONS),
+        exams.of(recipe, trained, FINALS),
         thin.lesson(bank),
     )
 

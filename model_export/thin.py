@@ -58,13 +58,13 @@ def _permuted(field: Kriging, order: Indices) -> Kriging:
     )
 
 
-def questions(bank: FieldBank, reach: float) -> Floats:
+def questions(bank: FieldBank, reach: float, count: int) -> Floats:
     """Random points (Q, d + p) within so many half-ranges; nobody moves as often as each performer
     does."""
-    rng = np.random.Generator(np.random.PCG64(QUESTIONS))
-    controls = rng.uniform(-reach, reach, (QUESTIONS, len(bank.low)))
+    rng = np.random.Generator(np.random.PCG64(count))
+    controls = rng.uniform(-reach, reach, (count, len(bank.low)))
     performers = len(bank.performers)
-    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, QUESTIONS)]
+    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, count)]
     return np.hstack([controls, labels])
 
 
@@ -95,5 +95,5 @@ class Lesson:
 
 def lesson(bank: FieldBank) -> Lesson:
     """Lesson of a bank of one level."""
-    points = np.vstack([questions(bank, BEYOND), bank.pose.samples])
+    points = np.vstack([questions(bank, BEYOND, QUESTIONS), bank.pose.samples])
     return Lesson(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)

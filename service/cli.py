@@ -290,8 +290,7 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
     return (
         f"  {number}: ranks {level['ranks']} of {level['samples']} clips, {level['numbers']} "
         f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
-        f"one joint in a hundred by more than {100 * level['p99']:.1f} cm, here "
-        f"{1e6 * seconds:.2f} µs a pose"
+        f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
     )
 
 

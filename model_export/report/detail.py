@@ -70,9 +70,9 @@ class Ladder:
 
     @property
     def distances(self) -> tuple[float, ...]:
-        """Metres from which all but one of a hundred joints of each level are off by less than a
-        pixel; never nearer than a finer level's."""
-        found = [CAMERA.pixels * own.p99 for own in self.chosen.levels]
+        """Metres from which the worst pose of each level is off by less than a pixel; never nearer
+        than a finer level's."""
+        found = [CAMERA.pixels * own.pose for own in self.chosen.levels]
         return tuple(np.maximum.accumulate(found).tolist())
 
     def facts(self) -> dict[str, Any]:
@@ -115,9 +115,8 @@ class Ladder:
             return f"Level 0 is for all that is exported or measured{near}."
         share = self.chosen.seconds[number] / self.chosen.seconds[0]
         return (
-            f"Level {number} is for characters from {start:.0f} m{until or ' on'}: of a hundred "
-            f"joints 99 are off by less than a pixel there, in {100 * share:.0f} % of the finest "
-            "level's time."
+            f"Level {number} is for characters from {start:.0f} m{until or ' on'}: the worst pose "
+            f"is off by less than a pixel there, in {100 * share:.0f} % of the finest level's time."
         )
 
     def _said(self) -> str:
@@ -132,7 +131,7 @@ class Ladder:
         return _numbered((*heading, "multiply-adds a pose", "µs a pose"), cells)
 
     def _errors(self) -> Table:
-        heading = ("RMS (cm)", "99th percentile", "largest", "effector at its event")
+        heading = ("RMS (cm)", "99th percentile", "worst pose", "largest", "effector at its event")
         cells = map(_errors, self.chosen.levels, self.distances)
         return _numbered((*heading, "less than a pixel from (m)"), cells)
 
@@ -183,13 +182,15 @@ def _kept(level: Level, seconds: float) -> tuple[str, ...]:
 
 def _errors(level: Level, distance: float) -> tuple[str, ...]:
     effector = "" if level.effector is None else f"{100 * level.effector:.2f}"
-    lengths = (f"{100 * level.rms:.2f}", f"{100 * level.p99:.1f}", f"{100 * level.max:.0f}")
-    return (*lengths, effector, f"{distance:.0f}")
+    lengths = (level.rms, level.p99, level.pose, level.max)
+    return (*(f"{100 * length:.3g}" for length in lengths), effector, f"{distance:.0f}")
 
 
 def _facts(level: Level, seconds: float) -> dict[str, Any]:
     """A level as in the card, its joints counted, and what a pose takes."""
-    lengths = {f"{name}_m": getattr(level, name) for name in ("rms", "p99", "max", "effector")}
+    lengths = {
+        f"{name}_m": getattr(level, name) for name in ("rms", "p99", "pose", "max", "effector")
+    }
     return {
         "ranks": list(level.ranks),
         "clips_asked": level.samples,

@@ -11,7 +11,8 @@ class Level:
     that move; the others keep the family's mean rotation. numbers: what the level reads of the
     file; bytes: the same in float32. operations: multiply-adds of one pose. rms, p99, max: of the
     distances, m, between its joints and those of the model that nothing is cut from, over random
-    controls, performers and times. effector: root mean square of the event's joint at its event, m.
+    controls, performers and times. pose: the largest root mean square over the joints of one pose,
+    m. effector: root mean square of the event's joint at its event, m.
     """
 
     ranks: tuple[int, int, int]
@@ -22,5 +23,6 @@ class Level:
     operations: int
     rms: float
     p99: float
+    pose: float
     max: float
     effector: float | None

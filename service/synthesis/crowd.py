@@ -25,6 +25,9 @@ from service.synthesis.view import View
 FEWEST, BATCH, CALLS = 256, 1536, 8
 # Of a clip's duration: what float32 makes of a time that was read from an answer.
 SLACK = 1e-5
+# Coarser levels differ from the finest in how long a clip takes, and who asks need not know which
+# level he will be answered at.
+COARSE_SLACK = 0.1
 
 # onnxruntime and NumPy let go of the interpreter while they work.
 _WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
@@ -77,7 +80,7 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     if question.blending is not None:
         _blend(model, asked, block, levels, question.blending)
     crowd_door.check_durations(card, block.duration)
-    late = question.times > block.duration * (1.0 + SLACK)
+    late = question.times > block.duration * (1.0 + np.where(levels > 0, COARSE_SLACK, SLACK))
     crowd_door.refuse("time", question.times, late, "s, later than the end of the clip")
     if question.root == "in_place":
         _stay(block)

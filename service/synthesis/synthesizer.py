@@ -57,9 +57,10 @@ class Synthesizer:
     def ladder(self) -> Ladder:
         """What each level of detail errs and costs, for a view to choose by.
 
-        An error is the one that a joint in a hundred exceeds; costs are measured when first asked.
+        An error is that of the worst pose: nobody's exceeds it, as far as was asked. Costs are
+        measured when first wanted.
         """
-        errors = np.array([level.p99 for level in self.session.card.levels])
+        errors = np.array([level.pose for level in self.session.card.levels])
         return Ladder(errors, np.array(pace.seconds_per_pose(self.session)))
 
     @property

@@ -40,7 +40,7 @@ def test_the_levels_are_those_of_the_card(facts, exported):
         assert found["joints_that_move"] == len(level.joints)
         for name in ("numbers", "bytes", "operations"):
             assert found[name] == getattr(level, name)
-        for name in ("rms", "p99", "max", "effector"):
+        for name in ("rms", "p99", "pose", "max", "effector"):
             assert found[f"{name}_m"] == getattr(level, name)
 
 
@@ -54,13 +54,13 @@ def test_a_pixel_is_as_large_as_the_error_at_its_distance(facts, exported):
     """By the tangent, along the ray to the image's upper edge: 540 pixels at 30 degrees."""
     for found, level in zip(facts["levels"], exported.card.levels, strict=True):
         half_image = found["one_pixel_from_m"] * math.tan(math.radians(30.0))
-        assert 540 * level.p99 / half_image == pytest.approx(1.0, rel=1e-4)
+        assert 540 * level.pose / half_image == pytest.approx(1.0, rel=1e-4)
         assert 540 * level.rms / half_image < 0.5
 
 
 def test_a_level_is_for_no_nearer_than_the_finer_one(ladder):
     first, *others = ladder.chosen.levels
-    odd = replace(ladder, chosen=replace(ladder.chosen, levels=(replace(first, p99=9.0), *others)))
+    odd = replace(ladder, chosen=replace(ladder.chosen, levels=(replace(first, pose=9.0), *others)))
     assert odd.distances == pytest.approx([9.0 * detail.CAMERA.pixels] * 4)
     assert ladder.distances != pytest.approx([ladder.distances[0]] * 4)
 
