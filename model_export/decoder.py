@@ -84,10 +84,10 @@ class Decoder:
         """What the decoder's graph asks of a ladder."""
         ranks, joints = [rung.ranks for rung in self.rungs], [len(r.joints) for r in self.rungs]
         return {
-            "core": [[r3, r2, r1] for r1, r2, r3 in ranks],
-            "core_rows": [[r3, -1] for _, _, r3 in ranks],
-            "motion": [[-1, r2, r1] for r1, r2, _ in ranks],
-            "flat": [[-1, r1] for r1, _, _ in ranks],
+            "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
+            "core_rows": [[-1, r3] for _, _, r3 in ranks],
+            "motion": [[r2, r1, -1, 1] for r1, r2, _ in ranks],
+            "flat": [[r1, -1] for r1, _, _ in ranks],
             "time": [[r2] for _, r2, _ in ranks],
             "root": [[3, r1] for r1, _, _ in ranks],
             "turning": [[4 * n, r1] for n, (r1, _, _) in zip(joints, ranks, strict=True)],
@@ -99,16 +99,12 @@ class Decoder:
         self, net: Net, coefficients: str, place: str, ends: dict[str, str]
     ) -> tuple[str, str]:
         """The same in a graph, from canonical frames (B, S, 1); `ends` are a ladder's."""
-        zeros = net.indices(0, 0, 0)
-        whole = net.weights("core", self.reduced.core.transpose(2, 1, 0))
-        core = net("Reshape", net("Slice", whole, zeros, ends["core"]), ends["core_rows"])
-        motion = net("Reshape", net("MatMul", coefficients, core), ends["motion"])
-        poses = net("MatMul", self._time(net, place, ends["time"]), motion)
-        flat = net("Reshape", poses, ends["flat"])
+        flat = self._reduced(net, coefficients, place, ends)
         directions = self._directions(net)
         three, end = net.indices(3), net.indices(len(self.mean))
         of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
-        root = net("Gemm", flat, of_root, net.weights("root_mean", self.mean[:3]), transB=1)
+        mean = net.weights("root_mean", self.mean[:3])
+        root = net("Gemm", flat, of_root, mean, transA=1, transB=1)
         steps = net("Shape", place, start=0, end=2)
         root_shape = net("Concat", steps, net.indices(3), axis=0)
         joint_shape = net("Concat", steps, net.indices(len(self.means), 4), axis=0)
@@ -118,17 +114,34 @@ class Decoder:
             net("Reshape", root, root_shape),
         )
 
+    def _reduced(self, net: Net, coefficients: str, place: str, ends: dict[str, str]) -> str:
+        """Coefficients of the first mode (r1, B S).
+
+        Poses lie innermost: a product of small matrices for each of them would take longer than
+        all that is in it.
+        """
+        whole = net.weights("core", self.reduced.core.transpose(1, 0, 2))
+        core = net("Slice", whole, net.indices(0, 0, 0), ends["core"])
+        rows = net("Reshape", core, ends["core_rows"])
+        motion = net("Reshape", net("Gemm", rows, coefficients, transB=1), ends["motion"])
+        time = net("Unsqueeze", self._time(net, place, ends["time"]), net.indices(1))
+        terms = net("Mul", motion, time)
+        poses = net("ReduceSum", terms, net.indices(0), keepdims=0)
+        return net("Reshape", poses, ends["flat"])
+
     def _time(self, net: Net, place: str, end: str) -> str:
-        """Time coefficients (B, S, r2): two rows of the table, and a line between them."""
-        table = net.weights("time_basis", self.reduced.bases[1])
+        """Time coefficients (r2, B, S): two columns of the table, and a line between them."""
+        table = net.weights("time_basis", self.reduced.bases[1].T)
         last = len(self.reduced.bases[1]) - 1
-        zero, one, two = net.indices(0), net.indices(1), net.indices(2)
-        first = net("Slice", table, zero, net.indices(last), zero)
-        steps = net("Sub", net("Slice", table, one, net.indices(last + 1), zero), first)
-        before = net("Min", net("Floor", place), net.number(last - 1.0))
-        row = net("Cast", net("Squeeze", before, two), to=6)
-        rise = net("Mul", net("Gather", steps, row), net("Sub", place, before))
-        return net("Slice", net("Add", net("Gather", first, row), rise), zero, end, two)
+        zero, one = net.indices(0), net.indices(1)
+        kept = net("Slice", table, zero, end, zero)
+        first = net("Slice", kept, zero, net.indices(last), one)
+        steps = net("Sub", net("Slice", kept, one, net.indices(last + 1), one), first)
+        when = net("Squeeze", place, net.indices(2))
+        before = net("Min", net("Floor", when), net.number(last - 1.0))
+        column = net("Cast", before, to=6)
+        rise = net("Mul", net("Gather", steps, column, axis=1), net("Sub", when, before))
+        return net("Add", net("Gather", first, column, axis=1), rise)
 
     def _directions(self, net: Net) -> str:
         """Directions (D, r1), put together when the session loads: what is zero is not stored."""
@@ -140,7 +153,7 @@ class Decoder:
         return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
 
     def _rotations(self, net: Net, flat: str, directions: str, ends: dict[str, str]) -> str:
-        """Quaternions (B S, J, 4) of the first mode's coefficients (B S, r1)."""
+        """Quaternions (B S, J, 4) of the first mode's coefficients (r1, B S)."""
         turning = turned_onnx(net, self.means, directions)
         offset = turned(self.means, self.mean[3:])
         if any(len(rung.joints) < len(self.means) for rung in self.rungs):
@@ -150,7 +163,7 @@ class Decoder:
         constant = net.weights("rotation_mean", offset[:, None])
         return innermost_joints(
             net,
-            quaternions(net, net("Gemm", turning, flat, constant, transB=1), means),
+            quaternions(net, net("Gemm", turning, flat, constant), means),
             len(self.means),
         )
 
@@ -166,7 +179,7 @@ class Decoder:
         ordered = net.weights("mean_rotations", self.means[:, :, None])
         ordered = net("Gather", ordered, net.weights("joint_order", order))
         moving = net("Slice", ordered, zero, ends["joints"], zero)
-        found = quaternions(net, net("Gemm", turning, flat, constant, transB=1), moving)
+        found = quaternions(net, net("Gemm", turning, flat, constant), moving)
         still = quat.mul(self.means, quat.exp(self.mean[3:].reshape(-1, 3)))[order][:, :, None]
         still_ones = net(
             "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
