@@ -23,7 +23,7 @@ def with_levels(recipe, *details):
 
 @pytest.fixture(scope="module")
 def exam(small_recipe, trained):
-    return exams.of(small_recipe, trained)
+    return exams.of(small_recipe, trained, 2_000)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,8 @@ def test_errors_keep_the_budgets_times_what_the_level_may_cost(small_recipe, exp
     budgets = small_recipe.size.budgets
     for times, level in zip((1, 2, 4, 8), exported.card.levels, strict=True):
         for name, budget in budgets.items():
-            assert getattr(level, name) <= times * budget
+            # Levels are tried with some questions, and measured with others.
+            assert getattr(level, name) <= 1.05 * times * budget
         # Negative control: half of it would not do.
         assert level.rms > 0.5 * times * budgets["rms"]
         assert level.rms < level.p99 < level.max

@@ -90,7 +90,8 @@ def test_the_curve_is_of_levels_made_alone_from_fine_to_coarse(facts, small_reci
         assert finer["times_budget"] < coarser["times_budget"]
         assert finer["rms_m"] < coarser["rms_m"] and finer["numbers"] > coarser["numbers"]
     budget = small_recipe.size.budgets["rms"]
-    kept = [own["rms_m"] <= own["times_budget"] * budget for own in others]
+    # Levels are tried with some questions, and measured with others.
+    kept = [own["rms_m"] <= 1.05 * own["times_budget"] * budget for own in others]
     assert all(kept)
     # Negative control: a finer level's budget would not do.
     assert not any(own["rms_m"] <= 0.5 * own["times_budget"] * budget for own in others[:5])
