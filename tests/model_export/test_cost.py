@@ -52,7 +52,7 @@ def test_levels_read_what_the_file_holds_for_them(held, exported):
     assert levels[0].numbers == whole + drift
     for number, level in enumerate(levels[1:], start=1):
         r1, r2, r3 = level.ranks
-        bases = r1 * len(held["directions"]) + r2 * len(held["time_basis"])
+        bases = r1 * len(held["directions"]) + r2 * held["time_basis"].shape[1]
         own = held[f"weights_{number}"].size + 4 * level.samples
         assert level.numbers == r1 * r2 * r3 + bases + own < levels[number - 1].numbers
         assert level.bytes == 4 * level.numbers
