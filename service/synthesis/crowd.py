@@ -152,11 +152,10 @@ _TIMED = ("rotations", "root_position", "travel")
 
 def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
     """A level and rows of it, for every call: rows that follow one another as a slice."""
+    most = min(max(len(levels) // CALLS, FEWEST), BATCH)
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        size = min(max(-(-len(rows) // CALLS), FEWEST), BATCH)
-        for first in range(0, len(rows), size):
-            part = rows[first : first + size]
+        for part in np.array_split(rows, -(-len(rows) // most)):
             together = part[-1] - part[0] + 1 == len(part)
             yield level, slice(part[0], part[-1] + 1) if together else part
 
