@@ -209,3 +209,11 @@ def test_a_frozen_file_has_no_level_to_feed(model_path):
 def test_half_a_file_cannot_be_frozen(model_path, cut):
     with pytest.raises((ValueError, IndexError)):
         freeze.at_level(model_path.read_bytes()[:-cut], 0)
+
+
+def test_the_worst_pose_is_off_by_no_more_than_some_times_the_rest(exported, small_recipe):
+    """Levels are chosen by it: one bad pose would keep a level from being taken at all."""
+    budget = small_recipe.size.budgets["rms"]
+    for times, level in zip((2, 4, 8), exported.card.levels[1:], strict=True):
+        # Others than it was tried with may be somewhat worse.
+        assert level.rms < level.pose < 1.3 * exams.TAIL * times * budget
