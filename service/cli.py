@@ -158,7 +158,9 @@ def crowd(
     seconds: Annotated[float, typer.Option(help="how long they walk")] = 10.0,
     fps: Annotated[float, typer.Option(help="frames a second")] = 30.0,
     seed: Annotated[int, typer.Option(help="of all that is random")] = 0,
-    level: LevelOfDetail = 0,
+    level: Annotated[
+        int | None, typer.Option(help="level of detail: 0 is the finest, and what is not said")
+    ] = None,
     camera: Annotated[
         str | None,
         typer.Option(

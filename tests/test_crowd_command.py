@@ -73,6 +73,15 @@ def test_routes_are_followed(walk_path, tmp_path):
             InvalidField,
             "motions: 4, expected 1 to 3",
         ),
+        (
+            ("-o", "c.usd", "--level", 1, "--camera", "90,2,0"),
+            InvalidField,
+            "level: 1, expected none",
+        ),
+        (("-o", "c.usd", "--seconds", "1e308"), InvalidField, "poses, expected"),
+        (("-o", "c.usd", "--seconds", "1e6", "--fps", 1), InvalidField, "poses, expected"),
+        (("-o", "c.usd", "--seed", 2**64), InvalidField, "seed: 18446744073709551616, expected"),
+        (("-o", "c.usd", "--count", 10**8, "--motions", 1), InvalidField, "count: 100000000,"),
         (("-o", "c.npz", "--count", 0), InvalidField, "count: 0, expected"),
         (("-o", "c.npz", "--paths", "none.json"), FileError, "none.json: cannot be read"),
         (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),
@@ -106,6 +115,42 @@ def test_a_crowd_is_written_as_usd(walk_path, tmp_path, ending):
     animation = UsdSkel.Animation(stage.GetPrimAtPath(played[0]))
     first, last = (np.array(animation.GetRotationsAttr().Get(code)) for code in (0, 15))
     assert np.abs(first - last).max() > 0.05
+
+
+def test_a_single_pose_alone_is_written_as_it_is(walk_path, tmp_path):
+    """One character of one frame: nothing of it is turned while its box is sought."""
+    paths = [tmp_path / f"one.{ending}" for ending in ("usdc", "npz")]
+    for path in paths:
+        assert run(walk_path, "--count", 1, "--seconds", 0.001, "-o", path).exit_code == 0
+    stage = Usd.Stage.Open(str(paths[0]))
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Crowd/Motions/m00000"))
+    found = np.array(animation.GetRotationsAttr().Get(0))[:, [3, 0, 1, 2]]
+    with np.load(paths[1]) as crowd:
+        expected = crowd["rotations"][0, 0]
+    # The root's is in the world there.
+    assert np.abs(np.abs(np.sum(found * expected, axis=-1)[1:]) - 1.0).max() < 1e-5
+
+
+def test_a_route_that_ends_too_soon_is_refused_whoever_comes_after(walk_path, tmp_path):
+    routes = tmp_path / "routes.json"
+    fast = {"waypoints": [[0, 0], [0, 20]], "speed": 1.4}
+    slow = {"waypoints": [[9, 0], [9, 21]], "speed": 0.8}
+    routes.write_text(json.dumps([fast, slow]))
+    for seconds, exit_code in ((10, 0), (22, 1)):
+        done = run(walk_path, "--paths", routes, "--seconds", seconds, "-o", tmp_path / "c.npz")
+        assert done.exit_code == exit_code, done.output
+    assert "paths/0" in str(done.exception)
+
+
+@pytest.mark.parametrize(
+    "waypoints",
+    [[["0", "0"], ["0", "9"]], [[0, 0], [0, 1e300]], [[0, 0], [0, 1e5]]],
+)
+def test_waypoints_that_are_no_way_are_refused(walk_path, tmp_path, waypoints):
+    routes = tmp_path / "routes.json"
+    routes.write_text(json.dumps([{"waypoints": waypoints, "speed": 1.0}]))
+    done = run(walk_path, "--paths", routes, "--seconds", 1, "-o", tmp_path / "c.npz")
+    assert isinstance(done.exception, InvalidField)
 
 
 def test_a_camera_chooses_levels_and_they_are_told(walk_path, tmp_path):

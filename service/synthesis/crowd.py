@@ -7,17 +7,17 @@ columns, and named by its index.
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from service.motion import blend
-from service.motion.conventions import Indices, Singles
+from service.motion.conventions import Floats, Indices, Singles
 from service.motion.crowd import CrowdPoses, Placement
 from service.synthesis import crowd_door, crowd_question, view
 from service.synthesis.crowd_question import Blending, CrowdQuestion
 from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.view import View
+from service.synthesis.view import Ladder, View
 
 # Poses of a call. With fewer, calls cost more than poses; more leave a core's cache between one
 # operator and the next. In between, so many calls that cores share them evenly: not as many as
@@ -25,8 +25,8 @@ from service.synthesis.view import View
 FEWEST, BATCH, CALLS = 256, 1536, 8
 # Of a clip's duration: what float32 makes of a time that was read from an answer.
 SLACK = 1e-5
-# Coarser levels differ from the finest in how long a clip takes, and who asks need not know which
-# level he will be answered at.
+# Levels differ in how long a clip takes, and who lets a view choose, or mixes two, cannot know by
+# which one his time will be judged.
 COARSE_SLACK = 0.1
 
 # onnxruntime and NumPy let go of the interpreter while they work.
@@ -80,7 +80,8 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     if question.blending is not None:
         _blend(model, asked, block, levels, question.blending)
     crowd_door.check_durations(card, block.duration)
-    late = question.times > block.duration * (1.0 + np.where(levels > 0, COARSE_SLACK, SLACK))
+    exact = (levels == 0) & (not isinstance(question.detail, View)) & (question.blending is None)
+    late = question.times > block.duration * (1.0 + np.where(exact, SLACK, COARSE_SLACK))
     crowd_door.refuse("time", question.times, late, "s, later than the end of the clip")
     if question.root == "in_place":
         _stay(block)
@@ -108,13 +109,30 @@ def _levels(
     ladder, asked = model.ladder, question.detail
     middle = question.placement.positions + model.middle
     scale = view.pixels_per_metre(asked.camera, middle, model.radius)
-    choice = view.see(ladder, scale, asked)
-    levels = choice.levels
-    if question.blending is not None and asked.previous is not None:
-        # Who is still on the way from one level to another goes to no third.
-        levels = np.where(question.blending.shares < 1.0, asked.previous, levels)
-    shown = view.error_pixels(ladder.errors, scale, levels)
-    return levels, shown, view.warnings(choice, ladder, asked)
+    if question.blending is None or asked.previous is None:
+        choice = view.see(ladder, scale, asked)
+        levels, said = choice.levels, view.warnings(choice, ladder, asked)
+    else:
+        levels, said = _held(ladder, scale, asked, asked.previous, question.blending)
+    return levels, view.error_pixels(ladder.errors, scale, levels), said
+
+
+def _held(
+    ladder: Ladder, scale: Floats, asked: View, previous: Indices, blending: Blending
+) -> tuple[Indices, tuple[str, ...]]:
+    """Levels where some are still on the way from one to another: they go to no third, and what
+    their two poses cost is no longer there for the others."""
+    free = blending.shares >= 1.0
+    levels, budget = previous.copy(), asked.budget
+    if budget is not None:
+        spent = ladder.costs[previous[~free]] + ladder.costs[blending.levels[~free]]
+        budget = max(budget - float(spent.sum()), 0.0)
+    if not free.any():
+        return levels, ()
+    rest = replace(asked, previous=previous[free], budget=budget)
+    choice = view.see(ladder, scale[free], rest)
+    levels[free] = choice.levels
+    return levels, view.warnings(choice, ladder, rest)
 
 
 def _answers(model: Synthesizer, asked: _Asked, levels: Indices) -> _Block:
@@ -168,7 +186,8 @@ def _stay(block: _Block) -> None:
 
 def _place(block: _Block, placement: Placement) -> None:
     """Put the poses, in place, where the characters stand."""
-    angles = placement.headings.astype(np.float32)
+    # Within a turn, where float32 still tells small angles apart.
+    angles = np.remainder(placement.headings, 2.0 * np.pi).astype(np.float32)
     _turn_roots(block, angles)
     _turn_paths(block, angles)
     np.add(block.root_position, placement.positions, out=block.root_position, casting="same_kind")

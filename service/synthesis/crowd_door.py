@@ -17,9 +17,7 @@ def controls(card: ModelCard, question: CrowdQuestion) -> tuple[Floats, tuple[st
             raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
     columns = [_column(control, question) for control in card.controls]
     pairs = zip(card.controls, columns, strict=True)
-    said = tuple(filter(None, (_outside(control, column) for control, column in pairs)))
-    if said and question.extrapolate == "refuse":
-        raise OutsideSamples("controls", "; ".join(said))
+    said = tuple(filter(None, (_outside(question, *pair) for pair in pairs)))
     return np.stack(columns, axis=1), said
 
 
@@ -40,17 +38,21 @@ def _column(control: Control, question: CrowdQuestion) -> Floats:
     return values
 
 
-def _outside(control: Control, values: Floats) -> str | None:
+def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str | None:
+    """What to say of a control that some go beyond; OutsideSamples where that is refused."""
     slack = 1e-6 * (control.maximum - control.minimum)
     beyond = (values < control.minimum - slack) | (values > control.maximum + slack)
     if not beyond.any():
         return None
     first = int(np.argmax(beyond))
-    return (
+    said = (
         f"{control.name} of {np.count_nonzero(beyond)} characters lies outside what was sampled, "
         f"{control.minimum:g} to {control.maximum:g} {control.unit}; "
         f"the first is character {first}, {values[first]:g} {control.unit}"
     )
+    if question.extrapolate == "refuse":
+        raise OutsideSamples(f"controls/{control.name}", said, first)
+    return said
 
 
 def refuse(field: str, values: Floats, bad: Truths, expected: str) -> None:

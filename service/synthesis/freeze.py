@@ -21,7 +21,7 @@ Field = tuple[int, bytes, bytes]
 def at_level(model: bytes, level: int) -> bytes:
     """The same model, whose input `level` is a constant.
 
-    Raises ValueError where the bytes are no model.
+    Raises ValueError or LookupError where the bytes are no protocol buffer.
     """
     return b"".join(
         _field(GRAPH, _graph(content, level)) if number == GRAPH else whole

@@ -78,7 +78,11 @@ def open_bytes(content: bytes, source: str) -> Session:
         raise ModelError(source, str(fault)) from fault
     _check_ports(runtime, card, source)
     levels = range(len(card.levels))
-    runtimes = tuple(_start(freeze.at_level(content, level), source) for level in levels)
+    try:
+        frozen = [freeze.at_level(content, level) for level in levels]
+    except (ValueError, LookupError) as fault:
+        raise ModelError(source, f"no protocol buffer: {fault}") from fault
+    runtimes = tuple(_start(own, source) for own in frozen)
     session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes)
     for level in levels:
         _check_answer(session, source, level)

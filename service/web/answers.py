@@ -1,7 +1,7 @@
 """Answers as they travel: JSON documents, and the headers that say how far a clip is trusted."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from typing import Any
 
 import orjson
@@ -40,12 +40,17 @@ def attachment(content: bytes, media_type: str, name: str) -> Response:
     return Response(content, headers=headers, media_type=media_type)
 
 
-def streamed(pieces: Iterator[bytes], media_type: str, name: str, model: str) -> Response:
-    """A file to save, sent while it is made."""
+def streamed(
+    pieces: AsyncIterator[bytes], media_type: str, name: str, model: str, outside: float
+) -> Response:
+    """A file to save, sent while it is made; outside: share of poses beyond what was sampled."""
     headers = {
         "Content-Disposition": f'attachment; filename="{name}"',
         "Posefield-Model": model,
     }
+    if outside:
+        said = f"{100 * outside:.1f} % of the poses have some control outside what was sampled"
+        headers["Posefield-Warning"] = json.dumps(said)
     return StreamingResponse(pieces, headers=headers, media_type=media_type)
 
 

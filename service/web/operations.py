@@ -1,10 +1,12 @@
 """What each operation of the contract does: decode, ask, encode."""
 
-from collections.abc import Awaitable, Callable, Iterator
+import os
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import ParamSpec, TypeVar
 
+from anyio import CapacityLimiter, to_thread
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
@@ -12,6 +14,7 @@ from starlette.responses import Response
 from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
 from service.encode import crowd as crowd_usd
 from service.motion.answer import ClipAnswer, PoseAnswer
+from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
@@ -33,6 +36,9 @@ class Service:
     settings: Settings
     source: bytes
 
+
+# Crowds take as long as many clips: of their own, these threads hold nobody else up.
+CROWDS = CapacityLimiter(os.cpu_count() or 1)
 
 Handler = Callable[[Service, Request], Awaitable[Response]]
 Given = ParamSpec("Given")
@@ -82,7 +88,7 @@ async def query_crowd(encoder: CrowdEncoder, service: Service, request: Request)
     model, settings = _model(service, request), service.settings
     content = await body.read(request, settings.crowd_body_limit)
     most = min(settings.crowd_limit, encoder.most)
-    made = await run_in_threadpool(_crowd, model, encoder, content, most)
+    made = await to_thread.run_sync(_crowd, model, encoder, content, most, limiter=CROWDS)
     return answers.attachment(made, encoder.media_type, f"{model.name}.{encoder.extension}")
 
 
@@ -94,14 +100,23 @@ async def get_crowd(ending: str, service: Service, request: Request) -> Response
     """A crowd that walks, as USD that is sent while it is made."""
     model, pairs = _model(service, request), request.query_params.multi_items()
     question = walk_query.of_pairs(pairs, service.settings)
-    pieces = await run_in_threadpool(_walking, model, question, ending)
+    made, pieces = await to_thread.run_sync(_walking, model, question, ending, limiter=CROWDS)
     name, media_type = f"{model.name}.{ending}", ENCODERS[ending].media_type
-    return answers.streamed(pieces, media_type, name, model.identity)
+    outside = float(made.facts["outside_share"])
+    return answers.streamed(_sent(pieces), media_type, name, model.identity, outside)
 
 
-def _walking(model: Synthesizer, question: WalkQuestion, ending: str) -> Iterator[bytes]:
+def _walking(
+    model: Synthesizer, question: WalkQuestion, ending: str
+) -> tuple[CrowdClip, Iterator[bytes]]:
     made = order.crowd(model, gait.of(model.session), question.order)
-    return crowd_usd.stream(made, ending, question.instancing)
+    return made, crowd_usd.stream(made, ending, question.instancing)
+
+
+async def _sent(pieces: Iterator[bytes]) -> AsyncIterator[bytes]:
+    """The pieces, each made where crowds are."""
+    while piece := await to_thread.run_sync(next, pieces, b"", limiter=CROWDS):
+        yield piece
 
 
 async def live(service: Service, request: Request) -> Response:

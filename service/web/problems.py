@@ -99,6 +99,8 @@ def _place(error: QueryError, in_body: bool) -> dict[str, str]:
     if in_body:
         index = "" if error.index is None else str(error.index)
         return {"pointer": pointer(*filter(None, (head, rest, index)))}
+    if head == "camera":
+        return {"parameter": "camera" if rest == "position" else rest or head}
     if head == "times":
         return {"parameter": "time"}
     return {"parameter": rest or head}

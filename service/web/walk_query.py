@@ -6,6 +6,7 @@ import numpy as np
 
 from service.motion.errors import InvalidField
 from service.synthesis.view import Camera
+from service.synthesis.walk import company
 from service.synthesis.walk.order import FPS, PIXELS, SEED, Order
 from service.web import query
 from service.web.query import Pairs
@@ -35,12 +36,13 @@ def of_pairs(pairs: Pairs, settings: Settings) -> WalkQuestion:
         seconds=numbers.get("seconds", SECONDS),
         fps=numbers.get("fps", FPS),
         seed=_whole(given, "seed", SEED),
-        level=_whole(given, "level", 0),
+        level=_whole(given, "level", 0) if "level" in given else None,
         camera=_camera(given, numbers),
         pixels=numbers.get("pixels", PIXELS),
     )
-    _check_size(order, settings)
-    return WalkQuestion(order, given.get("instancing", INSTANCING))
+    instancing = given.get("instancing", INSTANCING)
+    _check_size(order, instancing, settings)
+    return WalkQuestion(order, instancing)
 
 
 _NUMBERS = ("seconds", "fps", "fov", "height", "pixels")
@@ -63,11 +65,13 @@ def _camera(given: dict[str, str], numbers: dict[str, float]) -> Camera | None:
     return Camera(place, numbers.get("fov", FOV), numbers.get("height", HEIGHT))
 
 
-def _check_size(order: Order, settings: Settings) -> None:
+def _check_size(order: Order, instancing: str, settings: Settings) -> None:
     if order.count > settings.crowd_limit:
         raise InvalidField("count", f"{order.count}, expected at most {settings.crowd_limit}")
-    poses = (order.motions or order.count) * order.seconds * order.fps
+    # Flattened, each character has a copy of what it shares.
+    shared = order.motions if instancing != "flatten" else None
+    poses = company.poses(shared or order.count, order.seconds, order.fps)
     if poses > settings.crowd_poses:
         raise InvalidField(
-            "count", f"{poses:.0f} poses of all motions, expected at most {settings.crowd_poses}"
+            "count", f"{poses:.3g} poses of all motions, expected at most {settings.crowd_poses}"
         )

@@ -109,6 +109,20 @@ def test_more_characters_than_the_service_takes_are_refused(loaded, controls):
     assert small("GET", f"{WALK}.usdc?count=2&seconds=1").status_code == 200
 
 
+@pytest.mark.parametrize(
+    "query",
+    [
+        "count=50&motions=1&seconds=1&instancing=flatten",
+        "count=2&seconds=40&fps=1",
+        "count=200&seconds=1e-9",
+    ],
+)
+def test_what_a_crowd_takes_is_counted_before_it_is_made(loaded, query):
+    small = asker(create_app(loaded, Settings(crowd_poses=100)))
+    answer = small("GET", f"{WALK}.usdc?{query}")
+    assert answer.status_code == 422 and "expected at most 100" in answer.text
+
+
 def skeletons(path):
     """Animated skeletons of a stage, instances looked into."""
     stage = Usd.Stage.Open(str(path))
@@ -158,6 +172,8 @@ def test_shared_motions_are_sent_once(ask):
         ("seconds=0", 422, "seconds"),
         ("fps=0.5", 422, "fps"),
         ("level=9", 422, "level"),
+        ("level=1&camera=90,2,0", 422, "level"),
+        ("camera=1e7,0,0", 422, "camera"),
         ("camera=1,2", 400, "camera"),
         ("camera=1,2,x", 400, "camera"),
         ("camera=90,2,0&fov=0", 422, "fov"),

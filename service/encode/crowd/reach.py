@@ -86,7 +86,7 @@ def _positions(parents: tuple[int, ...], motions: Motions) -> Singles:
 
     Components come first, unlike elsewhere: it is eight times as fast for crowds.
     """
-    turns = np.ascontiguousarray(motions.rotations.transpose(2, 3, 0, 1))
+    turns = motions.rotations.transpose(2, 3, 0, 1).copy()
     arms = motions.bone_offsets.transpose(1, 2, 0)[..., None]
     places = np.empty((len(parents), 3, *motions.rotations.shape[:2]), np.float32)
     places[0] = motions.root_position.transpose(2, 0, 1)

@@ -25,7 +25,10 @@ TOGETHER = 50
 
 
 # Poses that one plan may be of: its own numbers take some hundred bytes each.
-MOST_POSES = 50_000_000
+MOST_POSES = 20_000_000
+# Ways are planned every so often, s, however few frames there are of them.
+PLANNED = 0.05
+LARGEST_SEED = 2**63
 Pairs = tuple[Indices, Indices]
 """Characters (K,) and frames (K,)."""
 RATES = (1.0, 1000.0)
@@ -56,19 +59,22 @@ def following(gait: Gait, routes: Sequence[Route], seconds: float, rate: float, 
 def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
     if count < 1:
         raise InvalidField("count", f"{count}, expected at least 1 character")
-    if seed < 0:
-        raise InvalidField("seed", f"{seed}, expected at least 0")
+    if not 0 <= seed < LARGEST_SEED:
+        raise InvalidField("seed", f"{seed}, expected 0 to less than {LARGEST_SEED}")
     if not RATES[0] <= rate <= RATES[1]:
         raise InvalidField("fps", f"{rate:g}, expected {RATES[0]:g} to {RATES[1]:g}")
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InvalidField("seconds", f"{seconds:g}, expected a time above 0")
+    most = poses(count, seconds, rate)
+    if most > MOST_POSES:
+        raise InvalidField("count", f"{most:.3g} poses, expected {MOST_POSES} at most")
     # A millionth of a frame forgives the rounding of seconds * rate.
-    frames = math.floor(seconds * rate + 1e-6) + 1
-    if count * frames > MOST_POSES:
-        raise InvalidField(
-            "count", f"{count} characters of {frames} frames, expected {MOST_POSES} poses at most"
-        )
-    return frames
+    return math.floor(seconds * rate + 1e-6) + 1
+
+
+def poses(count: int, seconds: float, rate: float) -> float:
+    """How many poses a crowd is of, or what as many take to plan where its frames are few."""
+    return count * (seconds * max(rate, 1.0 / PLANNED) + 1.0)
 
 
 def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:

@@ -8,12 +8,15 @@ import numpy as np
 
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
+from service.synthesis.view import FARTHEST
 from service.synthesis.walk import plane
 from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.paths import STEP, Paths
 
 # Points of a curve to each STEP of the straight lines between its waypoints.
 DENSE = 10
+# A way of so many metres is walked in hours, and through so many points it is drawn in seconds.
+LONGEST, MOST_WAYPOINTS = 10_000.0, 1_000
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,10 @@ def _parsed(field: str, entry: Any) -> Route:
     if not isinstance(entry, dict) or set(entry) != {"waypoints", "speed"}:
         raise InvalidField(field, "expected an object of waypoints and speed")
     try:
-        return Route(np.array(entry["waypoints"], dtype=float), float(entry["speed"]))
+        waypoints = np.array(entry["waypoints"])
+        if waypoints.dtype.kind not in "if" or isinstance(entry["speed"], str | bool):
+            raise ValueError(waypoints.dtype)
+        return Route(waypoints.astype(float), float(entry["speed"]))
     except (TypeError, ValueError) as fault:
         raise InvalidField(field, "expected pairs of numbers and a number") from fault
 
@@ -66,11 +72,20 @@ def through(gait: Gait, routes: Sequence[Route]) -> Paths:
 
 def _check(gait: Gait, index: int, route: Route) -> None:
     points, (low, high) = route.waypoints, gait.region.speeds
+    field = f"paths/{index}/waypoints"
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
         raise InvalidField(
-            f"paths/{index}/waypoints",
-            f"numbers {points.shape}, expected two or more pairs of finite ones",
+            field, f"numbers {points.shape}, expected two or more pairs of finite ones"
         )
+    if len(points) > MOST_WAYPOINTS or not (np.abs(points) <= FARTHEST).all():
+        raise InvalidField(
+            field,
+            f"{len(points)} up to {np.abs(points).max():g} m away, expected at most "
+            f"{MOST_WAYPOINTS} up to {FARTHEST:g} m",
+        )
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    if length > LONGEST:
+        raise InvalidField(field, f"{length:.0f} m from one to the last, expected {LONGEST:g} m")
     if not low <= route.speed <= high:
         raise InvalidField(
             f"paths/{index}/speed", f"{route.speed:g} m/s, expected {low:.3g} to {high:.3g} m/s"

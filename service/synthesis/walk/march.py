@@ -129,7 +129,8 @@ def _gone(speeds: Floats, frames: int, rate: float) -> Floats:
     # One interpolation for all: each row's times come after those of the row before.
     apart = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
     ways = np.tile(STEP * np.arange(speeds.shape[1]), len(speeds))
-    when = np.arange(frames) / rate
+    # Whoever has arrived stays there: between two rows nothing is known.
+    when = np.minimum(np.arange(frames) / rate, arrived[:, -1:])
     return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
 
 

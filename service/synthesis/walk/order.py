@@ -13,6 +13,8 @@ from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.given import Route
 from service.synthesis.walk.march import Plan
 
+MOST = 1_000_000
+"""Characters of one crowd, who may share their motions."""
 COUNT, SECONDS, FPS, SEED, PIXELS = 500, 10.0, 30.0, 0, 1.0
 
 
@@ -22,8 +24,8 @@ class Order:
 
     count: characters, each on a way of its own; or as many as there are routes. motions: how many
     different ones they share, all of their own if none is said. seconds, fps: how long, and frames
-    a second. seed: of all that is random. level: of detail, if not chosen by a camera for errors of
-    at most so many pixels.
+    a second. seed: of all that is random. level: of detail, the finest if not said, if not chosen
+    by a camera for errors of at most so many pixels.
     """
 
     count: int = COUNT
@@ -32,11 +34,15 @@ class Order:
     seconds: float = SECONDS
     fps: float = FPS
     seed: int = SEED
-    level: int = 0
+    level: int | None = None
     camera: Camera | None = None
     pixels: float = PIXELS
 
     def __post_init__(self) -> None:
+        if not 1 <= self.count <= MOST:
+            raise InvalidField("count", f"{self.count}, expected 1 to {MOST} characters")
+        if self.level is not None and self.camera is not None:
+            raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
         if self.motions is not None and not 1 <= self.motions <= self.count:
             raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
         if self.motions is not None and self.routes:
@@ -72,10 +78,10 @@ def _plan(gait: Gait, order: Order) -> Plan:
 
 
 def _detail(model: Synthesizer, plan: Plan, order: Order) -> Detail:
-    coarsest = len(model.session.card.levels) - 1
-    if not 0 <= order.level <= coarsest:
-        raise InvalidField("level", f"{order.level}, expected 0 to {coarsest}")
+    level, coarsest = order.level or 0, len(model.session.card.levels) - 1
+    if not 0 <= level <= coarsest:
+        raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
     if order.camera is None:
-        return detail.constant(order.level, plan.phases.shape)
+        return detail.constant(level, plan.phases.shape)
     scale = detail.scale(order.camera, plan.roots + model.middle, model.radius)
     return detail.seen(model.ladder, scale, order.pixels, order.fps)

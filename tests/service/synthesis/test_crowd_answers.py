@@ -305,8 +305,47 @@ def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     assert len(found.warnings) == 1
     assert "stature of 1 characters" in found.warnings[0]
     assert "the first is character 9" in found.warnings[0]
-    with pytest.raises(OutsideSamples, match="the first is character 9"):
+    with pytest.raises(OutsideSamples, match="the first is character 9") as caught:
         crowd.poses(model, replace(question, extrapolate="refuse"))
+    assert (caught.value.field, caught.value.index) == ("controls/stature", 9)
+
+
+def test_a_heading_of_many_turns_is_the_one_within_a_turn(model):
+    question = asked(model)
+    turns = 2.0 * np.pi * np.arange(COUNT)
+    wound = replace(question.placement, headings=question.placement.headings + 1e4 * turns)
+    found = crowd.poses(model, replace(question, placement=wound))
+    assert np.abs(of(model, found) - of(model, crowd.poses(model, question))).max() < 10 * FLOAT32
+    endless = replace(question.placement, headings=np.full(COUNT, 1e300))
+    far = crowd.poses(model, replace(question, placement=endless))
+    assert np.isfinite(far.rotations).all()
+
+
+def test_who_lets_the_camera_choose_need_not_know_the_levels_end(model):
+    camera = Camera(np.array([0.0, 1.7, -4.0]), math.radians(60.0), 1080.0)
+    placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
+    seen = asked(model, placement=placed, detail=View(camera, 1.0, None, None))
+    late = 1.05 * crowd.poses(model, seen).duration.astype(float)
+    assert set(crowd.poses(model, replace(seen, times=late)).levels) == {0}
+    numbered = replace(seen, times=late, detail=np.zeros(COUNT, dtype=int))
+    with pytest.raises(InvalidField, match="later than the end"):
+        crowd.poses(model, numbered)
+    with pytest.raises(InvalidField, match="later than the end"):
+        crowd.poses(model, replace(seen, times=1.2 * late))
+
+
+def test_a_budget_counts_who_is_on_the_way(model):
+    camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
+    held = np.zeros(COUNT, dtype=int)
+    view = View(camera, 1.0, 1e-9, held)
+    blending = Blending(np.ones(COUNT, dtype=int), np.full(COUNT, 0.5))
+    placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
+    found = crowd.poses(model, asked(model, placement=placed, detail=view, blending=blending))
+    assert set(found.levels) == {0} and found.warnings == ()
+    shares = np.where(np.arange(COUNT) % 2, 1.0, 0.5)
+    some = replace(blending, shares=shares)
+    found = crowd.poses(model, asked(model, placement=placed, detail=view, blending=some))
+    assert set(found.levels[shares == 1.0]) == {3} and "budget" in found.warnings[0]
 
 
 def test_a_camera_in_a_character_names_it(model):
