@@ -21,11 +21,6 @@ class Ladder:
 
     entries: dict[str, list[Numbers]]
 
-    @property
-    def levels(self) -> int:
-        """How many levels there are."""
-        return len(next(iter(self.entries.values())))
-
     def onnx(self, net: Net) -> dict[str, str]:
         """The chosen level's lists by name.
 

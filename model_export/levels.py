@@ -57,13 +57,15 @@ class Workshop:
         """Model with one more level of the least work whose answers keep so many times the
         budgets, or nearly; some joints move."""
         allowed = {name: times * budget for name, budget in self.budgets.items()}
-        within, made = model.decoder.rungs[-1].ranks, []
+        within, kept = model.decoder.rungs[-1].ranks, []
         for share in TRUNCATION:
             parts = {name: share * most for name, most in allowed.items()}
             rung = Rung(self._ranks(within, parts), joints)
-            made.append(self._thinned(model, rung, allowed))
-        kept = [lowered for lowered in made if self.exam.keeps(lowered, allowed)] or made[-1:]
-        return self._with_own_error(min(kept, key=lambda m: cost.work(m, len(m.bank.coarse))))
+            lowered, keeps = self._thinned(model, rung, allowed)
+            kept += [lowered] if keeps else []
+        return self._with_own_error(
+            min(kept or [lowered], key=lambda m: cost.work(m, len(m.bank.coarse)))
+        )
 
     def level(self, model: Model, level: int) -> Level:
         """What a level of a model is."""
@@ -105,8 +107,9 @@ class Workshop:
         aim = min(allowed.values()) ** 2 * float(places)
         return ranks.cheapest(ranks.front(trained.full.core, price, within), strain, aim)
 
-    def _thinned(self, model: Model, rung: Rung, allowed: dict[str, float]) -> Model:
-        """Model with one more level, of the fewest covariances whose answers are near enough."""
+    def _thinned(self, model: Model, rung: Rung, allowed: dict[str, float]) -> tuple[Model, bool]:
+        """Model with one more level, of the fewest covariances whose answers are near enough, and
+        whether any are."""
         bank, decoder = model.bank, model.decoder
         decoder = replace(decoder, coarse=(*decoder.coarse, rung))
         for columns in _columns(model):
@@ -114,8 +117,8 @@ class Workshop:
             coarse = (*bank.coarse, weights)
             tried = replace(model, bank=replace(bank, coarse=coarse), decoder=decoder)
             if self.exam.keeps(tried, allowed):
-                break
-        return tried
+                return tried, True
+        return tried, False
 
 
 def build(recipe: Recipe, trained: Trained) -> Laddered:

@@ -59,14 +59,6 @@ class Body:
     face_points: Integers
 
 
-def rest_positions(skeleton: Skeleton, offsets: Floats) -> Floats:
-    """Joint positions (J, 3) where no joint turns and offsets (J, 3) lead from the parents, m."""
-    positions = offsets.copy()
-    for joint, parent in enumerate(skeleton.parents[1:], start=1):
-        positions[joint] += positions[parent]
-    return positions
-
-
 def bones(skeleton: Skeleton, rest: Floats) -> Bones:
     """Boxes from joint to joint and to end sites, and stubs on joints where nothing follows.
 

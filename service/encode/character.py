@@ -35,7 +35,7 @@ class Rig:
 
 def rig(skeleton: Skeleton, offsets: Floats) -> Rig:
     """Rig of a skeleton whose joints rest at offsets (J, 3) from their parents, m."""
-    rest = body.rest_positions(skeleton, offsets)
+    rest = skeleton.at_rest(offsets)
     bones = body.bones(skeleton, rest)
     return Rig(
         names=skeleton.names,

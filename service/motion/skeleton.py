@@ -43,6 +43,13 @@ class Skeleton:
     def __len__(self) -> int:
         return len(self.names)
 
+    def at_rest(self, offsets: Floats) -> Floats:
+        """Joint positions (J, 3) where none turns and offsets (J, 3) lead from the parents, m."""
+        positions = offsets.copy()
+        for joint, parent in self._children():
+            positions[joint] += positions[parent]
+        return positions
+
     def same_tree(self, other: "Skeleton") -> bool:
         """Whether both have the same joints in the same places of the tree, of whatever size."""
         return self.names == other.names and self.parents == other.parents

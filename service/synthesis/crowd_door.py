@@ -5,16 +5,13 @@ import numpy as np
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats, Singles
 from service.motion.errors import InvalidField, OutsideSamples
+from service.synthesis import limits
 from service.synthesis.crowd_question import CrowdQuestion, Truths
-from service.synthesis.synthesizer import FARTHEST
 
 
 def controls(card: ModelCard, question: CrowdQuestion) -> tuple[Floats, tuple[str, ...]]:
     """Controls (N, d) in the card's order, and a sentence for each that some go beyond."""
-    for name in question.controls:
-        if card.control(name) is None:
-            known = ", ".join(c.name for c in card.controls)
-            raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+    limits.check_names(card, question.controls)
     columns = [_column(control, question) for control in card.controls]
     pairs = zip(card.controls, columns, strict=True)
     said = tuple(filter(None, (_outside(question, *pair) for pair in pairs)))
@@ -30,18 +27,17 @@ def _column(control: Control, question: CrowdQuestion) -> Floats:
             f"missing; give numbers in {control.unit}, sampled from {low:g} to {high:g}",
         )
     values = question.controls[control.name]
-    # Where float32 would overflow there is no answer to give.
-    reach = 100.0 * (high - low)
-    far = (values < low - reach) | (values > high + reach)
-    expected = f"{control.unit}, expected {low - reach:g} to {high + reach:g} {control.unit}"
+    least, most = limits.reach(control)
+    far = (values < least) | (values > most)
+    expected = f"{control.unit}, expected {least:g} to {most:g} {control.unit}"
     refuse(field, values, far, expected)
     return values
 
 
 def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str | None:
     """What to say of a control that some go beyond; OutsideSamples where that is refused."""
-    slack = 1e-6 * (control.maximum - control.minimum)
-    beyond = (values < control.minimum - slack) | (values > control.maximum + slack)
+    low, high = limits.sampled(control)
+    beyond = (values < low) | (values > high)
     if not beyond.any():
         return None
     first = int(np.argmax(beyond))
@@ -64,13 +60,8 @@ def refuse(field: str, values: Floats, bad: Truths, expected: str) -> None:
 
 def check_durations(card: ModelCard, durations: Singles) -> None:
     """Refuse controls so far outside that extrapolation has lost all sense."""
-    low, high = card.durations
-    senseless = ~((durations >= low / FARTHEST) & (durations <= high * FARTHEST))
+    low, high = limits.durations(card)
+    senseless = ~((durations >= low) & (durations <= high))
     if senseless.any():
         first = int(np.argmax(senseless))
-        raise OutsideSamples(
-            "controls",
-            f"so far outside what was sampled that the clip would last {durations[first]:.3g} s; "
-            f"captured clips last {low:.3g} to {high:.3g} s",
-            first,
-        )
+        raise OutsideSamples("controls", limits.senseless(card, durations[first]), first)

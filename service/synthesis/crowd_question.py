@@ -10,6 +10,7 @@ import numpy.typing as npt
 from service.motion.conventions import Floats, Indices, Singles
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
+from service.synthesis import limits
 from service.synthesis.view import FARTHEST, View
 
 Truths = npt.NDArray[np.bool_]
@@ -98,8 +99,7 @@ def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
     for index, name in enumerate(question.performers):
         if name is not None and name not in known:
             first = int(np.argmax(question.performer == index))
-            those = f"one of {', '.join(known)}" if known else "none: this model knows none"
-            raise InvalidField("performer", f"{name!r}, expected {those}", first)
+            raise InvalidField("performer", f"{name!r}, expected {limits.known(known)}", first)
     rows = [[name == other for other in known] for name in question.performers]
     return np.array(rows, dtype=np.float32)[question.performer]
 

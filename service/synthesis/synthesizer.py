@@ -8,13 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from service.motion import skeleton
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
 from service.motion.card import Control
 from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
-from service.synthesis import pace
+from service.synthesis import limits, pace
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
 
@@ -22,8 +21,6 @@ Policy = Literal["warn", "refuse"]
 """What to do with controls outside what was sampled."""
 
 RATES = (1.0, 1000.0)
-# A clip this many times longer or shorter than any that was captured is no motion any more.
-FARTHEST = 10.0
 MOST_POSES = 10_000
 ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
@@ -72,10 +69,8 @@ class Synthesizer:
     def radius(self) -> float:
         """Of a sphere about the root that holds the body at rest, m."""
         joints = self.session.card.skeleton
-        from_root = np.concatenate([np.zeros((1, 3)), joints.offsets[1:]])
-        still = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(joints), 4))
-        positions, _ = skeleton.forward(joints.parents, still, from_root)
-        return float(np.linalg.norm(positions, axis=-1).max())
+        rest = joints.at_rest(joints.offsets)
+        return float(np.linalg.norm(rest - rest[0], axis=-1).max())
 
     def pose(
         self,
@@ -139,10 +134,7 @@ class Synthesizer:
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> _Question:
         card = self.session.card
-        for name in controls:
-            if card.control(name) is None:
-                known = ", ".join(c.name for c in card.controls)
-                raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+        limits.check_names(card, controls)
         labels, coarsest = _labels(card.performers, performer), len(card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
@@ -157,13 +149,9 @@ class Synthesizer:
     def _duration(self, question: _Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
         duration = float(self._run(question, np.zeros((1, 1)), "duration")[0][0])
-        low, high = self.session.card.durations
-        if not low / FARTHEST <= duration <= high * FARTHEST:
-            raise OutsideSamples(
-                "controls",
-                f"so far outside what was sampled that the clip would last {duration:.3g} s; "
-                f"captured clips last {low:.3g} to {high:.3g} s",
-            )
+        low, high = limits.durations(self.session.card)
+        if not low <= duration <= high:
+            raise OutsideSamples("controls", limits.senseless(self.session.card, duration))
         return duration
 
     def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
@@ -188,8 +176,7 @@ class Synthesizer:
 def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
     if asked is not None and asked not in performers:
-        known = f"one of {', '.join(performers)}" if performers else "none: this model knows none"
-        raise InvalidField("performer", f"{asked!r}, expected {known}")
+        raise InvalidField("performer", f"{asked!r}, expected {limits.known(performers)}")
     return np.array([[float(name == asked) for name in performers]])
 
 
@@ -202,9 +189,7 @@ def _required(control: Control, controls: Mapping[str, float]) -> float:
             f"sampled from {control.minimum:g} to {control.maximum:g}",
         )
     value = _number(field, controls[control.name])
-    # Where float32 would overflow there is no answer to give.
-    reach = 100.0 * (control.maximum - control.minimum)
-    _within(field, value, control.minimum - reach, control.maximum + reach, control.unit)
+    _within(field, value, *limits.reach(control), control.unit)
     return value
 
 
@@ -226,9 +211,8 @@ def _within(field: str, value: float, low: float, high: float, unit: str) -> Non
 
 
 def _outside(control: Control, value: float) -> str | None:
-    # The width of a rounding error in what a client read from the card.
-    slack = 1e-6 * (control.maximum - control.minimum)
-    if control.minimum - slack <= value <= control.maximum + slack:
+    low, high = limits.sampled(control)
+    if low <= value <= high:
         return None
     return (
         f"{control.name} = {value:g} {control.unit} lies outside what was sampled, "

@@ -63,7 +63,7 @@ def of(session: Session) -> Gait:
     if card.root != "travelling":
         raise InvalidField("model", f"{card.name} stays in place, expected one that travels")
     controls = np.array(card.examples)
-    who = np.array(card.moved_by or [-1] * len(controls))
+    who = stride.movers(card)
     own = stride.strides(session, controls, stride.labels(session, who))
     rates = np.column_stack([own.speeds, own.turning])
     _refuse_one_speed(card.name, rates[:, 0])

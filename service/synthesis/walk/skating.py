@@ -6,7 +6,7 @@ from service.motion import ground, skeleton
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.crowd import Motions
-from service.synthesis.walk import company, detail, march, plane
+from service.synthesis.walk import company, detail, march, plane, stride
 from service.synthesis.walk.gait import Gait
 
 
@@ -34,7 +34,7 @@ def of_strides(gait: Gait, rate: float) -> Floats:
     card = gait.session.card
     controls = np.array(card.examples)
     length = round(float(np.mean(card.durations)) * rate) + 1
-    who = np.array(card.moved_by or [-1] * len(controls))
+    who = stride.movers(card)
     nowhere = np.zeros(len(controls))
     origin = plane.of(np.zeros((len(controls), 3)))
     held = np.repeat(controls[:, None], length, axis=1)
@@ -46,5 +46,5 @@ def of_strides(gait: Gait, rate: float) -> Floats:
 def usual(gait: Gait, rate: float) -> float:
     """Mean of the model's own strides, m/s, every performer counting alike, as a crowd has them."""
     speeds = of_strides(gait, rate)[:, 0]
-    moved_by = np.array(gait.session.card.moved_by or [-1] * len(speeds))
+    moved_by = stride.movers(gait.session.card)
     return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))

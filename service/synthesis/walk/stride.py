@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Indices, Singles
 from service.synthesis.session import Session
 from service.synthesis.walk import plane
@@ -91,6 +92,11 @@ def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
     """Bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
     begin = np.zeros((len(controls), 1))
     return _ask(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
+
+
+def movers(card: ModelCard) -> Indices:
+    """Whose each captured clip is (N,), by place on the card, or -1 where nobody is told apart."""
+    return np.array(card.moved_by or [-1] * len(card.examples))
 
 
 def labels(session: Session, who: Indices) -> Floats:

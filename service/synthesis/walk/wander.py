@@ -10,7 +10,7 @@ import numpy as np
 
 from service.motion.conventions import Floats, Indices
 from service.motion.crowd import Placement
-from service.synthesis.walk import plane
+from service.synthesis.walk import plane, stride
 from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.paths import STEP, Paths
 from service.synthesis.walk.plane import Plane
@@ -94,7 +94,7 @@ def _wave(along: Floats, phases: Floats) -> Floats:
 
 def _usual(gait: Gait, who: Indices, drawn: Floats) -> Floats:
     """Speeds (N, 1) of captured clips, each of the character's own performer."""
-    moved_by = np.array(gait.session.card.moved_by or [-1] * len(gait.rates))
+    moved_by = stride.movers(gait.session.card)
     order = np.argsort(moved_by, kind="stable")
     first, after = (np.searchsorted(moved_by[order], who, side) for side in ("left", "right"))
     clips = order[first + (drawn * (after - first)).astype(np.int64)]

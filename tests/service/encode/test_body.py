@@ -6,7 +6,7 @@ from service.motion.skeleton import Skeleton
 
 
 def made(skeleton):
-    rest = body.rest_positions(skeleton, skeleton.offsets)
+    rest = skeleton.at_rest(skeleton.offsets)
     found = body.bones(skeleton, rest)
     return found, body.build(found, middle=rest[0, 0])
 
