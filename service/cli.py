@@ -29,7 +29,8 @@ from service.motion.errors import (
     UnknownFormat,
 )
 from service.synthesis import library, pace, session
-from service.synthesis.synthesizer import Policy, Synthesizer
+from service.synthesis.question import ClipQuestion, Policy
+from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -130,8 +131,9 @@ def clip(
     """Write a clip as usda, usdc, usdz, json or bvh."""
     encode = encoder(output)
     synthesizer = open_model(model)
-    asked = numbers(control or [])
-    answer = synthesizer.clip(asked, fps, extrapolate, start, end, performer, level)
+    controls = numbers(control or [])
+    asked = ClipQuestion(controls, fps, extrapolate, start, end, performer, level)
+    answer = synthesizer.clip(asked)
     files.write(encode(answer), output)
     _warn(answer.trust.warnings)
     typer.echo(wrote(output, answer, json))

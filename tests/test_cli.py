@@ -16,6 +16,7 @@ from service import __version__, cli
 from service.encode import ENCODERS
 from service.motion import bvh
 from service.synthesis import library
+from service.synthesis.question import ClipQuestion
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
@@ -387,7 +388,7 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
     path = tmp_path / "new" / f"clip.{ending}"
     code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
     assert (code, err) == (0, "")
-    answer = library.load([model_path]).models["reaching"].clip(POINT, 30.0, "warn")
+    answer = library.load([model_path]).models["reaching"].clip(ClipQuestion(POINT, 30.0, "warn"))
     said = json.loads(out)
     assert said == {
         "file": str(path),

@@ -1,32 +1,49 @@
 """Bytes of an answer in each format that the service writes."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from service.encode import bvh, crowd_arrow, crowd_npz, crowd_poses, keyframes, usd, usdz
+from service.encode.convention import CENTIMETRES, METRES, Convention
 from service.motion.answer import ClipAnswer
 from service.motion.crowd import CrowdPoses
 
 
 @dataclass(frozen=True)
 class Encoder:
-    """How one format is named and made; the same answer always gives the same bytes."""
+    """How one format is named and made; the same answer always gives the same bytes.
+
+    write: files of several answers, as long as they and in their order; those of one model and
+    length are made together. usual: the convention that readers of the format expect.
+    """
 
     extension: str
     media_type: str
-    encode: Callable[[ClipAnswer], bytes]
+    write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+    usual: Convention = METRES
+
+    def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
+        """File of one answer, in the usual convention if none is said."""
+        return self.write([answer], convention or self.usual)[0]
+
+
+def one_by_one(
+    encode: Callable[[ClipAnswer, Convention], bytes],
+) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+    """What writes several answers where they have nothing in common."""
+    return lambda answers, convention: [encode(answer, convention) for answer in answers]
 
 
 ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        Encoder("usda", "model/vnd.usda", usd.usda),
+        Encoder("usda", "model/vnd.usda", one_by_one(usd.usda)),
         # The binary form has no registered media type.
-        Encoder("usdc", "application/octet-stream", usd.usdc),
-        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz),
-        Encoder("json", "application/json", keyframes.json),
-        Encoder("bvh", "application/x-bvh", bvh.bvh),
+        Encoder("usdc", "application/octet-stream", one_by_one(usd.usdc)),
+        Encoder("usdz", "model/vnd.usdz+zip", one_by_one(usdz.usdz)),
+        Encoder("json", "application/json", one_by_one(keyframes.json)),
+        Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
     )
 }
 

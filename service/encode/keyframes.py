@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
+from service.encode.convention import Convention
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 from service.motion.conventions import Floats
@@ -22,7 +23,7 @@ DECIMALS = 6
 """A micrometre; float32 keeps little more for a joint a few metres away."""
 
 
-def json(answer: ClipAnswer) -> bytes:
+def json(answer: ClipAnswer, convention: Convention) -> bytes:
     """One JSON object: the skeleton, every frame's rotations and root position, and the trust."""
     return orjson.dumps(
         {"units": UNITS, **_motion(answer.clip), "trust": answer.trust.facts()},

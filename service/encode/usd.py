@@ -10,18 +10,19 @@ from pxr import Sdf
 
 from service.encode import bounds, character, facts, layers, specs
 from service.encode.character import Rig
+from service.encode.convention import Convention
 from service.motion import quat
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 
 
-def usda(answer: ClipAnswer) -> bytes:
+def usda(answer: ClipAnswer, convention: Convention) -> bytes:
     """USD as text."""
     text: str = layer(answer).ExportToString()
     return text.encode()
 
 
-def usdc(answer: ClipAnswer) -> bytes:
+def usdc(answer: ClipAnswer, convention: Convention) -> bytes:
     """USD in its binary form."""
     return layers.crate(layer(answer))
 

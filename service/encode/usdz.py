@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.encode import usd
+from service.encode.convention import Convention
 from service.motion import files
 from service.motion.answer import ClipAnswer
 
@@ -37,9 +38,9 @@ class Member:
     chunks: Iterable[bytes]
 
 
-def usdz(answer: ClipAnswer) -> bytes:
+def usdz(answer: ClipAnswer, convention: Convention) -> bytes:
     """USDZ of one binary layer."""
-    return package(usd.usdc(answer))
+    return package(usd.usdc(answer, convention))
 
 
 def package(data: bytes) -> bytes:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,9 @@ from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits, pace
+from service.synthesis.question import ClipQuestion, Policy
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
-
-Policy = Literal["warn", "refuse"]
-"""What to do with controls outside what was sampled."""
 
 RATES = (1.0, 1000.0)
 MOST_POSES = 10_000
@@ -95,38 +93,20 @@ class Synthesizer:
             _within(f"times/{index}", value, 0.0, duration, "s")
         return self._answer(question, when)
 
-    def clip(
-        self,
-        controls: Mapping[str, float],
-        rate: float,
-        extrapolate: Policy,
-        start: float = 0.0,
-        end: float | None = None,
-        performer: str | None = None,
-        level: int = 0,
-    ) -> ClipAnswer:
-        """Clip at `rate` frames a second from `start` to `end`, s; by default the whole of it.
+    def clip(self, asked: ClipQuestion) -> ClipAnswer:
+        """Clip of the question; frame i is the pose at start + i / fps.
 
-        Frame i is the pose at start + i / rate. Raises as `pose` does.
+        Raises as `pose` does.
         """
-        question = self._door(controls, extrapolate, performer, level)
-        _within("fps", _number("fps", rate), *RATES, "frames a second")
-        duration = self._duration(question)
-        last = duration if end is None else _number("end", end)
-        _within("end", last, 0.0, duration, "s")
-        _within("start", _number("start", start), 0.0, last, "s")
-        # A millionth of a frame forgives the rounding of duration * rate.
-        frames = math.floor((last - start) * rate + 1e-6) + 1
-        if frames > MOST_POSES:
-            raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")
-        when = np.minimum(start + np.arange(frames) / rate, duration)
+        question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        when = self._frames(asked, self._duration(question))
         answer = self._answer(question, when)
         clip = assemble(
             self.session.card.skeleton,
             answer.rotations,
             answer.root_position,
             answer.bone_offsets,
-            rate,
+            asked.fps,
         )
         return ClipAnswer(clip, answer.trust)
 
@@ -153,6 +133,20 @@ class Synthesizer:
         if not low <= duration <= high:
             raise OutsideSamples("controls", limits.senseless(self.session.card, duration))
         return duration
+
+    def _frames(self, asked: ClipQuestion, duration: float) -> Floats:
+        """Times (F,) of the frames asked for, s, of a clip that takes `duration`."""
+        rate = _number("fps", asked.fps)
+        _within("fps", rate, *RATES, "frames a second")
+        last = duration if asked.end is None else _number("end", asked.end)
+        _within("end", last, 0.0, duration, "s")
+        start = _number("start", asked.start)
+        _within("start", start, 0.0, last, "s")
+        # A millionth of a frame forgives the rounding of duration * rate.
+        frames = math.floor((last - start) * rate + 1e-6) + 1
+        if frames > MOST_POSES:
+            raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")
+        return np.minimum(start + np.arange(frames) / rate, duration)
 
     def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
         answers = self._run(question, when[None], *ANSWERED)

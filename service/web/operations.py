@@ -13,14 +13,15 @@ from starlette.responses import Response
 
 from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
 from service.encode import crowd as crowd_usd
-from service.motion.answer import ClipAnswer, PoseAnswer
+from service.motion.answer import PoseAnswer
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.library import Library
+from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import answers, body, contract, crowd_query, query, walk_query
-from service.web.query import ClipQuestion, PoseQuestion
+from service.web.query import PoseQuestion
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
 
@@ -168,15 +169,7 @@ async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
 
 
 async def _clip(model: Synthesizer, question: ClipQuestion, encoder: Encoder) -> Response:
-    answer: ClipAnswer = model.clip(
-        question.controls,
-        question.fps,
-        question.extrapolate,
-        question.start,
-        question.end,
-        question.performer,
-        question.level,
-    )
+    answer = model.clip(question)
     content = await _made(len(answer.clip), encoder.encode, answer)
     return answers.file(content, encoder, answer.trust)
 

@@ -12,12 +12,10 @@ from typing import cast, get_args
 
 import msgspec
 
-from service.synthesis.synthesizer import Policy
+from service.synthesis.question import FPS, POLICY, ClipQuestion, Policy
 from service.web import decoding
 from service.web.problems import BAD_PARAMETER, RequestFault, pointer
 
-FPS = 30.0
-POLICY: Policy = "warn"
 # What JSON calls a number, so that a query reads like a body: no nan, inf, 1_000 or blanks.
 NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
 
@@ -32,20 +30,6 @@ class PoseQuestion:
 
     controls: dict[str, float]
     times: list[float]
-    extrapolate: Policy
-    performer: str | None = None
-    level: int = 0
-
-
-@dataclass(frozen=True)
-class ClipQuestion:
-    """Which clip: control values, frames a second, the part between start and end, s, who moves,
-    nobody that was seen for none, and the level of detail."""
-
-    controls: dict[str, float]
-    fps: float
-    start: float
-    end: float | None
     extrapolate: Policy
     performer: str | None = None
     level: int = 0
@@ -122,9 +106,9 @@ def clip_of_body(content: bytes) -> ClipQuestion:
     return ClipQuestion(
         _controls(body.controls),
         body.fps,
+        body.extrapolate,
         body.start,
         body.end,
-        body.extrapolate,
         body.performer,
         _level(body.level),
     )

@@ -8,6 +8,7 @@ from model_export import export, ingest, recipe, train
 from model_export.sample import write
 from service.motion.answer import ClipAnswer
 from service.synthesis import session
+from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 ROOT = Path(__file__).parents[2]
@@ -34,4 +35,4 @@ def _answer(path: Path, data: Path) -> tuple[str, ClipAnswer]:
     exported = export.export(own, trained, notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))
     controls = {control.name: control.default for control in exported.card.controls}
-    return own.name, model.clip(controls, 30.0, "refuse")
+    return own.name, model.clip(ClipQuestion(controls, 30.0, "refuse"))

@@ -6,6 +6,7 @@ import pytest
 from service.encode import ENCODERS, poses
 from service.motion.errors import InvalidField
 from service.synthesis import library
+from service.synthesis.question import ClipQuestion
 
 POINT = {"stature": 1.75, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 NAMES = ("middle", "short", "tall")
@@ -57,7 +58,7 @@ def test_nobody_is_asked_for_unless_somebody_is(model):
 
 
 def test_a_clip_is_the_poses_of_its_performer(model):
-    clip = model.clip(POINT, 30.0, "warn", performer="tall")
+    clip = model.clip(ClipQuestion(POINT, 30.0, "warn", performer="tall"))
     pose, other = (model.pose(POINT, [0.5], "warn", name) for name in ("tall", "short"))
     assert clip.trust == pose.trust
     assert clip.trust.duration != other.trust.duration
@@ -69,7 +70,7 @@ def test_a_clip_is_the_poses_of_its_performer(model):
 def test_an_unknown_performer_is_refused_with_those_there_are(model, name):
     for ask in (
         lambda: model.pose(POINT, [0.0], "warn", name),
-        lambda: model.clip(POINT, 30.0, "warn", performer=name),
+        lambda: model.clip(ClipQuestion(POINT, 30.0, "warn", performer=name)),
     ):
         with pytest.raises(InvalidField) as caught:
             ask()
@@ -88,6 +89,6 @@ def test_a_model_that_knows_nobody_refuses_every_name(plain):
 def test_json_says_who_was_asked_for_and_usd_where_it_was_somebody(model):
     for name, said in (("tall", b'"performer":"tall"'), (None, b'"performer":null')):
         assert said in poses.json(model.pose(POINT, [0.0], "warn", name))
-        clip = model.clip(POINT, 30.0, "warn", performer=name)
+        clip = model.clip(ClipQuestion(POINT, 30.0, "warn", performer=name))
         assert said in ENCODERS["json"].encode(clip)
         assert (b'string performer = "tall"' in ENCODERS["usda"].encode(clip)) == bool(name)

@@ -9,6 +9,7 @@ import pytest
 
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import library
+from service.synthesis.question import ClipQuestion
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 # The graph answers in float32, and sums a batch in another order than one row.
@@ -31,7 +32,7 @@ def refused(model):
 
     def of(controls=POINT, rate=30.0, **span):
         with pytest.raises(InvalidField) as caught:
-            model.clip(controls, rate, "warn", **span)
+            model.clip(ClipQuestion(controls, rate, "warn", **span))
         return caught.value.field, caught.value.message
 
     return of
@@ -162,7 +163,7 @@ def test_an_absurd_duration_is_blamed_on_the_controls(model):
     lost = [corner for corner, seconds in lasting(model, 90.0) if seconds is None]
     assert lost
     with pytest.raises(OutsideSamples, match=r"clip would last \S+ s; captured clips last"):
-        model.clip(lost[0], 30.0, "warn")
+        model.clip(ClipQuestion(lost[0], 30.0, "warn"))
 
 
 @pytest.mark.parametrize(
@@ -185,7 +186,7 @@ def test_a_span_outside_the_clip_is_refused(refused, span, field, said):
 
 
 def test_a_span_of_one_moment_is_one_frame(model):
-    assert len(model.clip(POINT, 30.0, "warn", start=0.5, end=0.5).clip) == 1
+    assert len(model.clip(ClipQuestion(POINT, 30.0, "warn", start=0.5, end=0.5)).clip) == 1
 
 
 OUTSIDE = {**POINT, "turn": 120.0, "target_height": 0.1}
@@ -193,7 +194,7 @@ OUTSIDE = {**POINT, "turn": 120.0, "target_height": 0.1}
 
 def test_inside_the_samples_nothing_is_warned_of(model):
     for policy in ("warn", "refuse"):
-        assert model.clip(POINT, 30.0, policy).trust.warnings == ()
+        assert model.clip(ClipQuestion(POINT, 30.0, policy)).trust.warnings == ()
 
 
 def test_outside_the_samples_each_control_has_its_sentence(model):
@@ -208,9 +209,9 @@ def test_outside_the_samples_each_control_has_its_sentence(model):
 
 
 def test_outside_the_samples_a_client_may_ask_for_a_refusal(model):
-    warnings = model.clip(OUTSIDE, 30.0, "warn").trust.warnings
+    warnings = model.clip(ClipQuestion(OUTSIDE, 30.0, "warn")).trust.warnings
     for ask in (
-        lambda: model.clip(OUTSIDE, 30.0, "refuse"),
+        lambda: model.clip(ClipQuestion(OUTSIDE, 30.0, "refuse")),
         lambda: model.pose(OUTSIDE, [0.0], "refuse"),
     ):
         with pytest.raises(OutsideSamples) as caught:
@@ -232,7 +233,7 @@ def test_farther_outside_there_is_less_trust(model):
 
 @pytest.mark.parametrize("rate", [24.0, 30.0, 29.97, 120.0, 1.0])
 def test_frame_i_is_the_pose_at_i_over_the_rate(model, duration, rate):
-    answer = model.clip(POINT, rate, "warn")
+    answer = model.clip(ClipQuestion(POINT, rate, "warn"))
     frames = len(answer.clip)
     assert answer.clip.rate == rate
     assert (frames - 1) / rate <= duration + 1e-6 < frames / rate + 2e-6
@@ -245,15 +246,15 @@ def test_frame_i_is_the_pose_at_i_over_the_rate(model, duration, rate):
 
 def test_one_frame_on_the_pose_is_another(model):
     """Negative control of the frames' times: an error of one frame would be seen."""
-    clip = model.clip(POINT, 30.0, "warn").clip
+    clip = model.clip(ClipQuestion(POINT, 30.0, "warn")).clip
     middle = len(clip) // 2
     pose = model.pose(POINT, [(middle + 1) / 30.0], "warn")
     assert np.abs(clip.rotations[middle] - pose.rotations[0]).max() > 100 * FLOAT32
 
 
 def test_a_span_is_a_slice_of_the_whole(model):
-    whole = model.clip(POINT, 30.0, "warn").clip
-    part = model.clip(POINT, 30.0, "warn", start=0.2, end=0.7).clip
+    whole = model.clip(ClipQuestion(POINT, 30.0, "warn")).clip
+    part = model.clip(ClipQuestion(POINT, 30.0, "warn", start=0.2, end=0.7)).clip
     assert len(part) == 16
     assert np.abs(part.rotations - whole.rotations[6:22]).max() < FLOAT32
     assert np.abs(part.translations - whole.translations[6:22]).max() < FLOAT32
@@ -261,21 +262,21 @@ def test_a_span_is_a_slice_of_the_whole(model):
 
 
 def test_a_clip_that_starts_late_goes_on_to_the_end(model):
-    whole = model.clip(POINT, 50.0, "warn").clip
-    rest = model.clip(POINT, 50.0, "warn", start=0.5).clip
+    whole = model.clip(ClipQuestion(POINT, 50.0, "warn")).clip
+    rest = model.clip(ClipQuestion(POINT, 50.0, "warn", start=0.5)).clip
     assert len(rest) == len(whole) - 25
     assert np.abs(rest.rotations - whole.rotations[25:]).max() < FLOAT32
 
 
 def test_an_answer_says_where_it_comes_from(model):
-    trust = model.clip(POINT, 30.0, "warn").trust
+    trust = model.clip(ClipQuestion(POINT, 30.0, "warn")).trust
     assert trust.model == model.identity == f"reaching@{model.session.digest}"
     assert trust.controls == POINT
     assert trust.duration == model.pose(POINT, [0.0], "warn").trust.duration
 
 
 def test_the_same_question_has_the_same_answer(model):
-    first, second = (model.clip(POINT, 30.0, "warn") for _ in range(2))
+    first, second = (model.clip(ClipQuestion(POINT, 30.0, "warn")) for _ in range(2))
     assert np.array_equal(first.clip.rotations, second.clip.rotations)
     assert np.array_equal(first.clip.translations, second.clip.translations)
     assert first.trust == second.trust

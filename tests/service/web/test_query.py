@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from service.synthesis.question import ClipQuestion
 from service.web import query
 from service.web.problems import RequestFault
-from service.web.query import ClipQuestion, PoseQuestion
+from service.web.query import PoseQuestion
 
 
 def test_a_query_and_a_body_are_one_pose_question():
@@ -25,7 +26,7 @@ def test_a_query_and_a_body_are_one_pose_question():
 
 
 def test_a_query_and_a_body_are_one_clip_question():
-    expected = ClipQuestion({"turn": -2.0}, 60.0, 0.1, 0.9, "warn", "ada")
+    expected = ClipQuestion({"turn": -2.0}, 60.0, "warn", 0.1, 0.9, "ada")
     pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9"), ("performer", "ada")]
     assert query.clip_of_pairs(pairs) == expected
     body = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9, "performer": "ada"}'
@@ -33,7 +34,7 @@ def test_a_query_and_a_body_are_one_clip_question():
 
 
 def test_what_is_left_out_has_one_default():
-    expected = ClipQuestion({}, 30.0, 0.0, None, "warn", None)
+    expected = ClipQuestion({})
     assert query.clip_of_pairs([]) == expected
     assert query.clip_of_body(b'{"controls": {}}') == expected
     assert query.clip_of_body(b'{"controls": {}, "end": null}') == expected

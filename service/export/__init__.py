@@ -1,0 +1,1 @@
+"""Many clips at once: queries in, files and a manifest of them out."""
