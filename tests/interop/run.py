@@ -16,6 +16,7 @@ from pathlib import Path
 import cases
 import crowds
 import environment
+import exports
 import numpy as np
 from compare import Characters, Row, compare
 
@@ -52,7 +53,8 @@ def main() -> int:
     python, node = environment.prepare()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        expected = cases.write(folder) | crowds.write(folder)
+        expected = cases.write(folder) | crowds.write(folder) | exports.write(folder)
+        faults = exports.faults(folder)
         rows = [
             compare(file, reader, read.get(file, {}), expected[file])
             for reader, read in (
@@ -61,7 +63,8 @@ def main() -> int:
             )
             for file in expected
         ]
-    return _report(rows)
+    print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
+    return _report(rows) or bool(faults)
 
 
 def _matrices(each: dict) -> np.ndarray:

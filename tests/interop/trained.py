@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from functools import cache
 from pathlib import Path
 
 from model_export import export, ingest, recipe, train
@@ -18,21 +19,30 @@ DATA = Path(os.environ.get("POSEFIELD_DATA", ROOT.parent / "shared/data"))
 
 def answers() -> list[tuple[str, ClipAnswer]]:
     """A clip in the middle of the controls' ranges of each model, by the model's name."""
-    with tempfile.TemporaryDirectory() as name:
-        family = write.family(Path(name) / "reaching")
-        made = [_answer(family, family.parent)]
+    made = [_middle(family()[0])]
     # .ci/run looks for these words: there the real clips must not be missing.
     if not DATA.exists():
         print(f"no motion capture in {DATA}: set POSEFIELD_DATA")
         return made
-    return made + [_answer(path, DATA) for path in RECIPES]
+    return made + [_middle(_trained(path, DATA)[0]) for path in RECIPES]
 
 
-def _answer(path: Path, data: Path) -> tuple[str, ClipAnswer]:
+@cache
+def family() -> tuple[Synthesizer, bytes]:
+    """Model of the procedural family, and its file's content."""
+    with tempfile.TemporaryDirectory() as name:
+        path = write.family(Path(name) / "reaching")
+        return _trained(path, path.parent)
+
+
+def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, data)
-    trained = train.train(own, examples, lambda _: None)
-    exported = export.export(own, trained, notes)
+    exported = export.export(own, train.train(own, examples, lambda _: None), notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))
-    controls = {control.name: control.default for control in exported.card.controls}
-    return own.name, model.clip(ClipQuestion(controls, 30.0, "refuse"))
+    return model, exported.content
+
+
+def _middle(model: Synthesizer) -> tuple[str, ClipAnswer]:
+    controls = {control.name: control.default for control in model.session.card.controls}
+    return model.name, model.clip(ClipQuestion(controls, 30.0, "refuse"))
