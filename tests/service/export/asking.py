@@ -9,8 +9,8 @@ import pyarrow.parquet as pq
 
 from service.export import queries
 from service.export.columns import OPTIONS
-from service.export.query import Fault, Query
 from service.export.queries import Asked, Defaults
+from service.export.query import Fault, Query
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}

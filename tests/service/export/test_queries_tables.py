@@ -142,7 +142,7 @@ def test_a_heading_of_semicolons_is_told_of_commas(refused):
 def test_a_heading_in_another_coding_is_refused(model, tmp_path, coding):
     path = tmp_path / "q.csv"
     path.write_bytes(f"stature,höhe\n{ROW}\n".encode(coding))
-    with pytest.raises(FileError, match="q.csv:1: .* in the heading, expected text in UTF-8"):
+    with pytest.raises(FileError, match=r"q.csv:1: .* in the heading, expected text in UTF-8"):
         source(model, path)
 
 
