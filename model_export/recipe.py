@@ -18,7 +18,7 @@ from service.motion.errors import RecipeError
 
 # Parameters that a clip query has besides the controls.
 RESERVED = frozenset(
-    {"fps", "start", "end", "time", "times", "extrapolate", "performer", "level", "format"}
+    "fps start end time times extrapolate performer level format names root loop unit up".split()
 )
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Text = Annotated[str, Field(min_length=1)]
