@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from service.motion.roles import Names
+
 Policy = Literal["warn", "refuse"]
 """What to do with controls outside what was sampled."""
 
@@ -12,6 +14,7 @@ Root = Literal["travelling", "in_place"]
 
 FPS = 30.0
 POLICY: Policy = "warn"
+NAMES: Names = "own"
 ROOT: Root = "travelling"
 
 
@@ -21,6 +24,7 @@ class ClipQuestion:
     nobody that was seen for none, and the level of detail.
 
     extrapolate: what to do with controls outside what was sampled. end: none for the clip's own.
+    names: what joints are called, which is all that changes by it: bones keep their axes.
     root: in place, the frame that goes along a cycle's arc is taken out, heading and all, or the
     straight way from the first pose to the last of what is no cycle, evenly, the heading left as it
     is; heights stay, and so does all of a model that is in place already. loop: a whole cycle as
@@ -36,5 +40,6 @@ class ClipQuestion:
     end: float | None = None
     performer: str | None = None
     level: int = 0
+    names: Names = NAMES
     root: Root = ROOT
     loop: bool = False

@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from service.motion import roles
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
 from service.motion.card import Control
 from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
+from service.motion.roles import Names
+from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
 from service.synthesis.question import ClipQuestion, Policy
 from service.synthesis.session import Session
@@ -68,6 +71,17 @@ class Synthesizer:
         rest = joints.at_rest(joints.offsets)
         return float(np.linalg.norm(rest - rest[0], axis=-1).max())
 
+    @cached_property
+    def _skeletons(self) -> dict[Names, Skeleton]:
+        """The skeletons that were asked for, each made once."""
+        return {"own": self.session.card.skeleton}
+
+    def _skeleton(self, names: Names) -> Skeleton:
+        if names not in self._skeletons:
+            card = self.session.card
+            self._skeletons[names] = roles.renamed(card.skeleton, card.roles, names)
+        return self._skeletons[names]
+
     def pose(
         self,
         controls: Mapping[str, float],
@@ -95,8 +109,9 @@ class Synthesizer:
         """Clip of the question; frame i is the pose at start + i / fps.
 
         The N steps of a loop share the duration evenly, but are played at fps. Raises as `pose`
-        does, and InvalidField for a loop of what is no cycle.
+        does, and InvalidField for a loop of what is no cycle and names that no role leads to.
         """
+        joints = self._skeleton(asked.names)
         question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
         if asked.loop and not self.session.card.cyclic:
             raise InvalidField(
@@ -106,14 +121,8 @@ class Synthesizer:
         answer = self._answer(question, timed(asked, self._duration(question)))
         if asked.loop or asked.root == "in_place":
             answer = self._routed(question, answer, asked)
-        clip = assemble(
-            self.session.card.skeleton,
-            answer.rotations,
-            answer.root_position,
-            answer.bone_offsets,
-            asked.fps,
-        )
-        return ClipAnswer(clip, answer.trust)
+        turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
+        return ClipAnswer(assemble(joints, turns, path, offsets, asked.fps), answer.trust)
 
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int

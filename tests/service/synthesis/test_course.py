@@ -169,3 +169,16 @@ def test_a_part_of_a_loop_is_refused(walker, span, said):
 def test_a_loop_at_no_rate_is_refused(walker, fps):
     with pytest.raises(InvalidField, match=r"^fps: "):
         clip(walker, STROLL, loop=True, fps=fps)
+
+
+def test_joints_are_called_as_asked_for_and_stay_where_they_are(reacher):
+    own, theirs = clip(reacher, POINT), clip(reacher, POINT, names="mixamo")
+    assert theirs.skeleton.names[:2] == ("mixamorig:Hips", "mixamorig:LeftUpLeg")
+    assert "LeftThumb1" in theirs.skeleton.names
+    assert np.array_equal(own.positions(), theirs.positions())
+    assert clip(reacher, POINT, names="mixamo").skeleton is theirs.skeleton
+
+
+def test_names_of_a_convention_need_roles(walker):
+    with pytest.raises(InvalidField, match=r"^names: 'ue5', expected 'own'"):
+        clip(walker, STROLL, names="ue5")
