@@ -17,27 +17,34 @@ RATES = (1.0, 1000.0)
 MOST_POSES = 10_000
 
 
-def times(asked: ClipQuestion, duration: float) -> Floats:
-    """Times (F,) of the frames asked for, s, of a clip that takes `duration`."""
-    rate = _rate(asked)
+def window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
+    """Frames a second, start and end, s, of a clip that takes `duration` at most."""
+    rate = limits.number("fps", asked.fps)
+    limits.within("fps", rate, *RATES, "frames a second")
     last = duration if asked.end is None else limits.number("end", asked.end)
     limits.within("end", last, 0.0, duration, "s")
     start = limits.number("start", asked.start)
     limits.within("start", start, 0.0, last, "s")
+    if asked.loop and (start > 0.0 or asked.end is not None):
+        field, value = ("start", start) if start > 0.0 else ("end", last)
+        raise InvalidField(field, f"{value:g} s with loop, expected none: a loop is a whole cycle")
+    return rate, start, last
+
+
+def times(asked: ClipQuestion, duration: float) -> Floats:
+    """Times (F,) of the frames asked for, s, of a clip that takes `duration`.
+
+    Those of a loop lack the last frame, which is the first again.
+    """
+    rate, start, last = window(asked, duration)
+    if asked.loop:
+        steps = max(1, round(duration * rate))
+        _check_count(steps + 1)
+        return np.arange(steps) * duration / steps
     # A millionth of a frame forgives the rounding of duration * rate.
     frames = math.floor((last - start) * rate + 1e-6) + 1
     _check_count(frames)
     return np.minimum(start + np.arange(frames) / rate, duration)
-
-
-def loop_times(asked: ClipQuestion, duration: float) -> Floats:
-    """Times (N,) of the frames of a cycle but the last, s, which is the first again."""
-    if asked.start or asked.end is not None:
-        field, value = ("start", asked.start) if asked.start else ("end", asked.end)
-        raise InvalidField(field, f"{value!r} with loop, expected none: a loop is a whole cycle")
-    steps = max(1, round(duration * _rate(asked)))
-    _check_count(steps + 1)
-    return np.arange(steps) * duration / steps
 
 
 def in_place(answer: PoseAnswer, way: Strides) -> PoseAnswer:
@@ -59,12 +66,6 @@ def closed(answer: PoseAnswer, way: Strides | None) -> PoseAnswer:
         rotations=np.concatenate([answer.rotations, rotations]),
         root_position=np.concatenate([answer.root_position, root]),
     )
-
-
-def _rate(asked: ClipQuestion) -> float:
-    rate = limits.number("fps", asked.fps)
-    limits.within("fps", rate, *RATES, "frames a second")
-    return rate
 
 
 def _check_count(frames: int) -> None:

@@ -76,11 +76,17 @@ class Synthesizer:
         """The skeletons that were asked for, each made once."""
         return {"own": self.session.card.skeleton}
 
-    def _skeleton(self, names: Names) -> Skeleton:
-        if names not in self._skeletons:
-            card = self.session.card
-            self._skeletons[names] = roles.renamed(card.skeleton, card.roles, names)
-        return self._skeletons[names]
+    def _joints(self, asked: ClipQuestion) -> Skeleton:
+        """The skeleton with the names asked for; InvalidField for names that no role leads to, and
+        for a loop of what is no cycle."""
+        card = self.session.card
+        if asked.loop and not card.cyclic:
+            raise InvalidField(
+                "loop", "true, expected false: this model's last pose does not lead into its first"
+            )
+        if asked.names not in self._skeletons:
+            self._skeletons[asked.names] = roles.renamed(card.skeleton, card.roles, asked.names)
+        return self._skeletons[asked.names]
 
     def pose(
         self,
@@ -111,18 +117,20 @@ class Synthesizer:
         The N steps of a loop share the duration evenly, but are played at fps. Raises as `pose`
         does, and InvalidField for a loop of what is no cycle and names that no role leads to.
         """
-        joints = self._skeleton(asked.names)
         question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
-        if asked.loop and not self.session.card.cyclic:
-            raise InvalidField(
-                "loop", "true, expected false: this model's last pose does not lead into its first"
-            )
-        timed = course.loop_times if asked.loop else course.times
-        answer = self._answer(question, timed(asked, self._duration(question)))
+        joints = self._joints(asked)
+        answer = self._answer(question, course.times(asked, self._duration(question)))
         if asked.loop or asked.root == "in_place":
             answer = self._routed(question, answer, asked)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
         return ClipAnswer(assemble(joints, turns, path, offsets, asked.fps), answer.trust)
+
+    def check(self, asked: ClipQuestion) -> None:
+        """Raise what `clip` would, as far as it can be said before anything is synthesised: how
+        long the clip takes is not known yet."""
+        self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        self._joints(asked)
+        course.window(asked, limits.durations(self.session.card)[1])
 
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int

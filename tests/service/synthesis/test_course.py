@@ -148,21 +148,23 @@ def test_every_level_of_detail_closes(walker, level):
 
 
 def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
-    with pytest.raises(InvalidField, match=r"^loop: true, expected false: this model's last pose"):
-        clip(reacher, POINT, loop=True)
+    for ask in (reacher.clip, reacher.check):
+        with pytest.raises(InvalidField, match=r"^loop: true, expected false: this model's last"):
+            ask(ClipQuestion(POINT, loop=True))
 
 
 @pytest.mark.parametrize(
     ("span", "said"),
     [
-        ({"start": 0.2}, "start: 0.2 with loop, expected none: a loop is a whole cycle"),
-        ({"end": 0.5}, "end: 0.5 with loop, expected none: a loop is a whole cycle"),
+        ({"start": 0.2}, "start: 0.2 s with loop, expected none: a loop is a whole cycle"),
+        ({"end": 0.5}, "end: 0.5 s with loop, expected none: a loop is a whole cycle"),
     ],
 )
 def test_a_part_of_a_loop_is_refused(walker, span, said):
-    with pytest.raises(InvalidField) as caught:
-        clip(walker, STROLL, loop=True, **span)
-    assert str(caught.value) == said
+    for ask in (walker.clip, walker.check):
+        with pytest.raises(InvalidField) as caught:
+            ask(ClipQuestion(STROLL, loop=True, **span))
+        assert str(caught.value) == said
 
 
 @pytest.mark.parametrize("fps", [0.5, 1001.0, True, "30"])
@@ -180,5 +182,6 @@ def test_joints_are_called_as_asked_for_and_stay_where_they_are(reacher):
 
 
 def test_names_of_a_convention_need_roles(walker):
-    with pytest.raises(InvalidField, match=r"^names: 'ue5', expected 'own'"):
-        clip(walker, STROLL, names="ue5")
+    for ask in (walker.clip, walker.check):
+        with pytest.raises(InvalidField, match=r"^names: 'ue5', expected 'own'"):
+            ask(ClipQuestion(STROLL, names="ue5"))
