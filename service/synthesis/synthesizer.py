@@ -110,6 +110,12 @@ class Synthesizer:
         )
         return ClipAnswer(clip, answer.trust)
 
+    def check(self, asked: ClipQuestion) -> None:
+        """Raise what `clip` would, as far as it can be said before anything is synthesised: how
+        long the clip takes is not known yet."""
+        self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        _window(asked, limits.durations(self.session.card)[1])
+
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> _Question:
@@ -136,12 +142,7 @@ class Synthesizer:
 
     def _frames(self, asked: ClipQuestion, duration: float) -> Floats:
         """Times (F,) of the frames asked for, s, of a clip that takes `duration`."""
-        rate = _number("fps", asked.fps)
-        _within("fps", rate, *RATES, "frames a second")
-        last = duration if asked.end is None else _number("end", asked.end)
-        _within("end", last, 0.0, duration, "s")
-        start = _number("start", asked.start)
-        _within("start", start, 0.0, last, "s")
+        rate, start, last = _window(asked, duration)
         # A millionth of a frame forgives the rounding of duration * rate.
         frames = math.floor((last - start) * rate + 1e-6) + 1
         if frames > MOST_POSES:
@@ -165,6 +166,17 @@ class Synthesizer:
     def _run(self, question: _Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level
         return self.session.run(question.point, when, *outputs, labels=labels, level=level)
+
+
+def _window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
+    """Frames a second, start and end, s, of a clip that takes `duration` at most."""
+    rate = _number("fps", asked.fps)
+    _within("fps", rate, *RATES, "frames a second")
+    last = duration if asked.end is None else _number("end", asked.end)
+    _within("end", last, 0.0, duration, "s")
+    start = _number("start", asked.start)
+    _within("start", start, 0.0, last, "s")
+    return rate, start, last
 
 
 def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
