@@ -14,7 +14,7 @@ from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits, pace
-from service.synthesis.question import ClipQuestion, Policy
+from service.synthesis.question import ClipQuestion, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
 
@@ -115,6 +115,17 @@ class Synthesizer:
         long the clip takes is not known yet."""
         self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
         _window(asked, limits.durations(self.session.card)[1])
+
+    def prospect(self, asked: ClipQuestion) -> Prospect:
+        """What `clip` would answer with, before it is synthesised.
+
+        Asked of the graph alone, as there: how long a clip takes differs in its last digit where
+        many are asked for at once, and a question whose end is the clip's own would then pass here
+        and be refused later. Raises as `clip` does.
+        """
+        question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        frames = self._frames(asked, self._duration(question))
+        return Prospect(len(frames), question.warnings)
 
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
