@@ -129,7 +129,7 @@ REFUSED = {
     "no name at all": ({"name": ""}, 400, "name", "matching"),
     "a long name": ({"name": "x" * 101}, 400, "name", "matching"),
     "a foreign name": ({"name": "ü"}, 400, "name", "matching"),
-    "a name in other capitals": ({"name": "FIRST"}, 422, "name", "the name of clip 0 too"),
+    "a name in other capitals": ({"name": "FIRST"}, 422, "name", "'FIRST', expected a name of"),
 }
 
 
@@ -153,7 +153,7 @@ def refused(answer, status, place, words):
 def test_a_name_that_another_clip_is_given_is_refused(ask, controls):
     clips = [{"controls": controls, "name": "Clip-000001"}, {"controls": controls}]
     answer = ask("POST", f"{CLIPS}.zip", json=asked("usdc", clips))
-    refused(answer, 422, "1/name", "'clip-000001' is the name of clip 0 too")
+    refused(answer, 422, "1/name", "'clip-000001', expected a name of its own")
 
 
 def test_controls_outside_the_samples_can_be_refused(ask, controls):
