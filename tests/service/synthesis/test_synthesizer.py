@@ -293,3 +293,54 @@ def test_answers_are_float64_whatever_the_graph_speaks(model):
     answer = model.pose(POINT, [0.5], "warn")
     arrays = (answer.times, answer.rotations, answer.root_position, answer.bone_offsets)
     assert {array.dtype for array in arrays} == {np.dtype(np.float64)}
+
+
+@pytest.mark.parametrize(
+    ("asked", "field"),
+    [
+        (ClipQuestion({**POINT, "turn": math.nan}), "controls/turn"),
+        (ClipQuestion(POINT, level=99), "level"),
+        (ClipQuestion(POINT, performer="nobody"), "performer"),
+        (ClipQuestion(POINT, fps=0.5), "fps"),
+        (ClipQuestion(POINT, start=-1.0), "start"),
+        (ClipQuestion(POINT, start=0.5, end=0.4), "start"),
+        (ClipQuestion(POINT, end=1e6), "end"),
+    ],
+)
+def test_what_a_clip_would_be_refused_for_is_said_before_it_is_made(model, asked, field):
+    with pytest.raises(InvalidField) as before:
+        model.check(asked)
+    with pytest.raises(InvalidField) as after:
+        model.clip(asked)
+    assert before.value.field == after.value.field == field
+
+
+def test_a_question_with_an_answer_passes(model):
+    """Negative control of the test above."""
+    asked = ClipQuestion(POINT, start=0.1, end=0.4)
+    model.check(asked)
+    assert len(model.clip(asked).clip) == 10
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ClipQuestion(POINT),
+        ClipQuestion(POINT, fps=7.3, start=0.11, end=0.77, level=2),
+        ClipQuestion({**POINT, "turn": 500.0, "stature": 1.0}, fps=1000),
+    ],
+)
+def test_what_is_known_of_a_clip_before_it_is_made_is_true(model, asked):
+    prospect, answer = model.prospect(asked), model.clip(asked)
+    assert prospect.frames == len(answer.clip)
+    assert prospect.warnings == answer.trust.warnings
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_an_end_that_is_the_clips_own_is_known_to_be_one(model, rng, level):
+    for _ in range(50):
+        moved = {name: value * rng.uniform(0.9, 1.1) for name, value in POINT.items()}
+        own = model.pose(moved, [0.0], "warn", level=level).trust.duration
+        model.prospect(ClipQuestion(moved, end=own, level=level))
+        with pytest.raises(InvalidField, match="end: "):
+            model.prospect(ClipQuestion(moved, end=np.nextafter(own, 9.0), level=level))
