@@ -5,7 +5,7 @@ anywhere, again, or twice at once, and its files are the same. Its last act is t
 the manifest with the others.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,7 +14,7 @@ from service.export import ledger, manifest
 from service.export.job import Job, Work
 from service.export.layouts import LAYOUTS, File, path
 from service.export.ledger import Part
-from service.export.query import Fault, Query
+from service.export.query import KEPT, Fault, Query
 from service.export.target import open_target
 from service.motion.answer import ClipAnswer
 from service.motion.errors import InvalidField, QueryError
@@ -23,8 +23,6 @@ from service.synthesis.synthesizer import Synthesizer
 
 BATCH = 64
 """Clips that are held at once: enough to share what their files have in common."""
-NAMED = 20
-"""Faults that are said one by one."""
 
 Stopped = Callable[[], bool]
 """Whether everything should stop; what was begun is put away."""
@@ -60,10 +58,10 @@ def make(work: Work, task: Task, stopped: Stopped = lambda: False) -> Part:
     return part
 
 
-def refusal(count: int, faults: list[Fault]) -> InvalidField:
+def refusal(count: int, faults: Sequence[Fault]) -> InvalidField:
     """What to say of rows that are no queries; of a count of them, the first are at hand."""
-    said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:NAMED])
-    more = f"\n  and {count - NAMED} more" if count > NAMED else ""
+    said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:KEPT])
+    more = f"\n  and {count - KEPT} more" if count > KEPT else ""
     return InvalidField("queries", f"{count} rows cannot be answered:{said}{more}")
 
 

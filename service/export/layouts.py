@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from service.encode.packs import PACKS, Pack
 from service.export import manifest
 from service.export.target import Target
 
@@ -53,13 +54,13 @@ def loose(target: Target, number: int, batches: Iterable[list[File]]) -> tuple[l
     return entries, sum(entry["bytes"] for entry in entries)
 
 
-def packed(pack: Callable[[Iterable[tuple[str, bytes]]], Iterator[bytes]], ending: str) -> Put:
+def packed(pack: Pack) -> Put:
     """Files in one archive a chunk, whose part of the manifest is its last member."""
 
     def put(target: Target, number: int, batches: Iterable[list[File]]) -> tuple[list[Entry], int]:
         entries: list[Entry] = []
-        archive = f"clips-{number:06d}.{ending}"
-        size = target.stream(archive, pack(_members(number, batches, entries)))
+        archive = f"clips-{number:06d}.{pack.extension}"
+        size = target.stream(archive, pack.write(_members(number, batches, entries)))
         return [{**entry, "archive": archive} for entry in entries], size
 
     return put
@@ -78,4 +79,5 @@ def _members(
 
 LAYOUTS = {
     "folder": Layout(256, loose),
+    **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
 }

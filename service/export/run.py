@@ -11,31 +11,9 @@ from service.export.chunks import Task
 from service.export.crew import Crew
 from service.export.job import Work
 from service.export.ledger import Part
-from service.export.query import Fault, Query
+from service.export.query import Source
 from service.export.target import STATE, Target, open_target
 from service.motion.errors import FileError, InvalidField
-
-
-class Survey(Protocol):
-    """What a source holds: its rows, those at fault among them, and the first of these."""
-
-    total: int
-    faults: list[Fault]
-
-
-class Source(Protocol):
-    """Queries in a fixed order, which can be gone through more than once.
-
-    digest: names what they are.
-    """
-
-    digest: str
-
-    def survey(self) -> Survey:
-        """Go through all rows; count them and find those at fault."""
-
-    def rows(self) -> Iterator[Query | Fault]:
-        """Every row, those at fault too."""
 
 
 class Watch(Protocol):
@@ -157,8 +135,8 @@ def _go_on(run: _Run, watch: Watch, by: Crew) -> Outcome:
 def _survey(source: Source, skip: bool) -> int:
     """Number of rows; InvalidField where some are at fault and not to be skipped, or none is."""
     found = source.survey()
-    if found.faults and not skip:
-        raise chunks.refusal(len(found.faults), found.faults)
-    if len(found.faults) == found.total:
+    if found.faulty and not skip:
+        raise chunks.refusal(found.faulty, found.faults)
+    if found.faulty == found.total:
         raise InvalidField("queries", "no row that can be answered, expected at least one")
     return found.total

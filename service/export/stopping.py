@@ -17,18 +17,18 @@ class Stopping:
     def __call__(self) -> bool:
         return self.signal is not None
 
-    def _told(self, number: int, frame: FrameType | None) -> None:
+    def hear(self, number: int, frame: FrameType | None) -> None:
+        """Stop; at once, whatever is left behind, if told twice."""
         if self():
-            # Twice: without any manners.
             raise KeyboardInterrupt
         self.signal = number
 
 
 @contextmanager
-def watching() -> Iterator[Stopping]:
-    """What is told this process meanwhile; only its main thread can be told."""
+def heard() -> Iterator[Stopping]:
+    """What this process is told meanwhile; its main thread alone can be told."""
     stopping = Stopping()
-    before = {number: signal.signal(number, stopping._told) for number in TOLD}
+    before = {number: signal.signal(number, stopping.hear) for number in TOLD}
     try:
         yield stopping
     finally:

@@ -1,21 +1,15 @@
 """Small exports for tests: queries held in memory, a watch that looks on, a folder's content."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import orjson
 
 from service.export.job import Job, Work
-from service.export.query import Fault, Query
+from service.export.query import KEPT, Fault, Query, Survey
 from service.synthesis.question import ClipQuestion
 
 CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
-
-
-@dataclass(frozen=True)
-class Survey:
-    total: int
-    faults: list[Fault]
 
 
 class Listed:
@@ -23,10 +17,12 @@ class Listed:
 
     def __init__(self, rows):
         self.listed = list(rows)
+        self.count = len(self.listed)
         self.digest = hashlib.sha256(repr(self.listed).encode()).hexdigest()
 
     def survey(self):
-        return Survey(len(self.listed), [row for row in self.listed if isinstance(row, Fault)])
+        faults = tuple(row for row in self.listed if isinstance(row, Fault))
+        return Survey(len(self.listed), len(faults), faults[:KEPT])
 
     def rows(self):
         return iter(self.listed)
