@@ -115,8 +115,8 @@ class _Chunk:
         for extension in dict.fromkeys(one.query.format for one in made):
             own = [index for index, one in enumerate(made) if one.query.format == extension]
             encoder = ENCODERS[extension]
-            convention = self.job.convention or encoder.usual
-            files = encoder.write([made[index].answer for index in own], convention)
+            answers = [made[index].answer for index in own]
+            files = encoder.write(answers, self.job.convention(encoder.usual))
             contents |= zip(own, files, strict=True)
         return [contents[index] for index in range(len(made))]
 

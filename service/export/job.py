@@ -1,8 +1,7 @@
 """What an export is: everything that its bytes hang on, so that two runs of one job agree."""
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -10,7 +9,9 @@ from typing import Any
 import orjson
 
 from service import __version__
-from service.encode.convention import Convention
+from service.encode.convention import Convention, Up
+from service.export import layouts
+from service.motion.errors import InvalidField
 
 MAKERS = ("numpy", "onnxruntime", "usd-core")
 """Whose versions the bytes may hang on."""
@@ -21,8 +22,8 @@ class Job:
     """One export, whoever does it and in however many goes.
 
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
-    chunk: rows that are done together. convention: none for what readers of each format expect.
-    asked: what else was said that the files hang on, as plain values.
+    chunk: rows that are done together. unit: metres per unit of length; unit and up are none for
+    what readers of each format expect.
     """
 
     model: str
@@ -30,8 +31,17 @@ class Job:
     queries: str
     layout: str
     chunk: int
-    convention: Convention | None = None
-    asked: Mapping[str, Any] = field(default_factory=dict)
+    unit: float | None = None
+    up: Up | None = None
+
+    def __post_init__(self) -> None:
+        layouts.find(self.layout)
+        if self.chunk < 1:
+            raise InvalidField("chunk", f"{self.chunk}, expected 1 or more rows")
+
+    def convention(self, usual: Convention) -> Convention:
+        """What files of a format measure in, of which this is usual."""
+        return Convention(self.unit or usual.metres_per_unit, self.up or usual.up)
 
     def facts(self) -> dict[str, Any]:
         """The same as plain values, with the versions of what makes the files."""

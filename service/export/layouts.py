@@ -11,6 +11,7 @@ from typing import Any
 from service.encode.packs import PACKS, Pack
 from service.export import manifest
 from service.export.target import Target
+from service.motion.errors import InvalidField
 
 CROWDED = 1000
 """Files in a folder; many more make file systems and file browsers slow."""
@@ -81,3 +82,10 @@ LAYOUTS = {
     "folder": Layout(256, loose),
     **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
 }
+
+
+def find(name: str) -> Layout:
+    """Layout of a name; InvalidField where there is none."""
+    if name not in LAYOUTS:
+        raise InvalidField("layout", f"{name!r}, expected one of {', '.join(LAYOUTS)}")
+    return LAYOUTS[name]

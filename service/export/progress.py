@@ -1,36 +1,15 @@
 """How an export goes, told on standard error: a bar on a terminal, else a line now and then."""
 
 import time
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from service.export.pace import Pace
+
 EVERY = 5.0
 """Seconds between two lines."""
-
-
-@dataclass
-class Pace:
-    """How fast it goes: of `total` rows, `before` were done when this run began."""
-
-    total: int
-    before: int
-    done: int = 0
-    since: float = field(default_factory=time.monotonic)
-
-    @property
-    def rate(self) -> float:
-        """Rows a second, in this run."""
-        return self.done / max(time.monotonic() - self.since, 1e-9)
-
-    def words(self) -> str:
-        """Rate and time left, once there is something to go by."""
-        if not self.done:
-            return ""
-        left = round((self.total - self.before - self.done) / self.rate)
-        return f"{self.rate:,.0f} a second, {left // 60}:{left % 60:02d} left"
 
 
 class Show(Protocol):
@@ -92,7 +71,7 @@ class Lines:
         """Nothing: what was said stays."""
 
 
-def show(pace: Pace, **options: Any) -> Show:
+def show(pace: Pace) -> Show:
     """What suits standard error."""
-    console = Console(stderr=True, highlight=False, **options)
+    console = Console(stderr=True, highlight=False)
     return Bar(console, pace) if console.is_terminal else Lines(console, pace)

@@ -40,6 +40,15 @@ class Shard:
         if not 0 <= self.index < self.count:
             raise InvalidField("shard", f"{self.index}/{self.count}, expected 0/N to N-1/N")
 
+    @classmethod
+    def of(cls, words: str) -> "Shard":
+        """Shard of I/N."""
+        index, _, count = words.partition("/")
+        try:
+            return cls(int(index), int(count))
+        except ValueError as fault:
+            raise InvalidField("shard", f"{words!r}, expected I/N, such as 0/4") from fault
+
     def has(self, number: int) -> bool:
         """Whether a chunk is of it."""
         return number % self.count == self.index
