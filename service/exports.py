@@ -119,13 +119,13 @@ def _said(place: str, outcome: Outcome, look: Look) -> str:
             "command goes on from there"
         )
     if outcome.facts is None:
-        return f"{place}: the {outcome.rows} clips of this part are done, other parts are not yet"
+        return f"{place}: clips of this part: {outcome.rows}, all done; other parts are not yet"
     facts = outcome.facts
     said = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
         said += f", {facts['warned']} of them outside what was sampled"
     if facts["skipped"]:
-        said += f", {facts['skipped']} rows skipped and listed in skipped.jsonl"
+        said += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
     if outcome.before:
         return f"{said}; it was complete before"
     return f"{said}, in {look.pace.seconds:.1f} s, {look.pace.rate:,.0f} a second"

@@ -62,7 +62,8 @@ def refusal(count: int, faults: Sequence[Fault]) -> InvalidField:
     """What to say of rows that are no queries; of a count of them, the first are at hand."""
     said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:KEPT])
     more = f"\n  and {count - KEPT} more" if count > KEPT else ""
-    return InvalidField("queries", f"{count} rows cannot be answered:{said}{more}")
+    found = f"rows that cannot be answered: {count} (--skip-errors leaves them out)"
+    return InvalidField("queries", f"{found}:{said}{more}")
 
 
 @dataclass(frozen=True)
@@ -100,14 +101,18 @@ class _Chunk:
     def _made(self, at: int, rows: tuple[Query | Fault, ...]) -> Iterator[_Made]:
         for number, row in enumerate(rows, self.task.first + at):
             if isinstance(row, Fault):
-                self.faults.append(row)
+                self._note(row.place, row.message)
                 continue
             try:
                 answer = self.synthesizer.clip(row.question)
             except QueryError as fault:
-                self.faults.append(Fault(row.place, str(fault)))
+                self._note(row.place, str(fault))
             else:
                 yield _Made(path(number, row.name, row.format), row, answer)
+
+    def _note(self, place: str, message: str) -> None:
+        # In which folder a table lies is no part of the job, so that it must not show in its files.
+        self.faults.append(Fault(place.rpartition("/")[2], message))
 
     def _contents(self, made: list[_Made]) -> list[bytes]:
         """Files of the clips, those of a format made together."""
