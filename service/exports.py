@@ -16,8 +16,9 @@ from service.export.queries import Asked
 from service.export.reading import Defaults
 from service.export.run import Outcome, Shard
 from service.motion.errors import InvalidField
+from service.motion.roles import Names
 from service.synthesis import library, session
-from service.synthesis.question import FPS, POLICY, ClipQuestion, Policy
+from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
 
 UNITS = {"m": METRES.metres_per_unit, "cm": CENTIMETRES.metres_per_unit}
 
@@ -44,6 +45,11 @@ def export(
     extrapolate: Annotated[
         Policy, typer.Option(help="what to do with controls outside what was sampled")
     ] = POLICY,
+    names: Annotated[Names, typer.Option(help="what joints are called")] = NAMES,
+    root: Annotated[Root, typer.Option(help="travelling, or in place")] = ROOT,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="cycles that end with the frame they begin with")
+    ] = False,
     unit: Annotated[
         str | None, typer.Option(help="of length, m or cm; what is usual in the format if not said")
     ] = None,
@@ -66,7 +72,16 @@ def export(
     """
     content = session.read(model)
     asked = Asked(table, tuple(grid or ()), sample, method, seed)
-    question = ClipQuestion({}, fps, extrapolate, performer=performer, level=level)
+    question = ClipQuestion(
+        {},
+        fps,
+        extrapolate,
+        performer=performer,
+        level=level,
+        names=names,
+        root=root,
+        loop=loop,
+    )
     opened = library.opened(model, content)
     source = queries.source(asked, Defaults(form, question), opened)
     job = Job(
