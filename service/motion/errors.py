@@ -11,6 +11,7 @@ MotionError
 │   ├── UnknownFormat
 │   ├── InvalidField     missing, unknown, of a wrong type, or outside the allowed range
 │   └── OutsideSamples   controls outside what was sampled, when the client asked to refuse them
+├── WorkerDied           a process that did a part of the work has gone
 └── TrainingError        samples from which no model can be made
     └── ExportRefused    the graph does not answer what the reference answers
 
@@ -34,6 +35,10 @@ class FileError(MotionError):
         self.path = str(path)
         self.line = line
         self.message = message
+
+    def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None]]:
+        # What is raised in one process is told in another.
+        return type(self), (self.path, self.message, self.line)
 
 
 class BvhError(FileError):
@@ -63,6 +68,9 @@ class QueryError(MotionError):
         self.message = message
         self.index = index
 
+    def __reduce__(self) -> tuple[type["QueryError"], tuple[str, str, int | None]]:
+        return type(self), (self.field, self.message, self.index)
+
 
 class UnknownModel(QueryError):
     """No model of that name is loaded."""
@@ -78,6 +86,10 @@ class InvalidField(QueryError):
 
 class OutsideSamples(QueryError):
     """Controls outside what was sampled, when the client asked for them to be refused."""
+
+
+class WorkerDied(MotionError):
+    """A process that did a part of the work has gone: killed, or out of memory."""
 
 
 class TrainingError(MotionError):
