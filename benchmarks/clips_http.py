@@ -62,7 +62,7 @@ def _rows(model: Synthesizer, path: Path, extension: str) -> list[Row]:
     more = f"after {FEW} clips: {low / 1e6:.0f} MB; the archive has {size / 1e6:.0f} MB"
     return [
         Row(
-            said, CLIPS / took["http"], "clips/s over HTTP", here, took["here"] / took["http"], 0.8
+            said, CLIPS / took["http"], "clips/s over HTTP", here, took["here"] / took["http"], None
         ),
         Row(f"first byte of {MANY} clips", took["first"], "s", "all are checked", None, None),
         Row(f"most memory of the server, {MANY} clips", high / 1e6, "MB", more, None, None),
