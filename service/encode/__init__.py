@@ -4,7 +4,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from service.encode import bvh, crowd_arrow, crowd_npz, crowd_poses, keyframes, usd, usdz
+from service.encode import (
+    bvh,
+    crowd_arrow,
+    crowd_npz,
+    crowd_poses,
+    glb,
+    keyframes,
+    npz,
+    usd,
+    usdz,
+)
 from service.encode.convention import CENTIMETRES, METRES, Convention
 from service.motion.answer import ClipAnswer
 from service.motion.crowd import CrowdPoses
@@ -44,6 +54,9 @@ ENCODERS = {
         Encoder("usdz", "model/vnd.usdz+zip", one_by_one(usdz.usdz)),
         Encoder("json", "application/json", one_by_one(keyframes.json)),
         Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
+        Encoder("glb", "model/gltf-binary", one_by_one(glb.glb)),
+        # An archive of arrays has no registered media type; as a zip some browsers would unpack it.
+        Encoder("npz", "application/octet-stream", one_by_one(npz.npz)),
     )
 }
 
@@ -62,7 +75,6 @@ CROWD_ENCODERS = {
     encoder.extension: encoder
     for encoder in (
         CrowdEncoder("arrow", "application/vnd.apache.arrow.stream", crowd_arrow.arrow),
-        # An archive of arrays has no registered media type; as a zip some browsers would unpack it.
         CrowdEncoder("npz", "application/octet-stream", crowd_npz.npz),
         CrowdEncoder("json", "application/json", crowd_poses.json, crowd_poses.JSON_LIMIT),
     )
