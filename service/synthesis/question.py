@@ -43,3 +43,12 @@ class ClipQuestion:
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """What is known of a clip before it is synthesised: its frames, and a warning for each control
+    outside what was sampled."""
+
+    frames: int
+    warnings: tuple[str, ...]

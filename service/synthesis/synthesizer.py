@@ -16,7 +16,7 @@ from service.motion.errors import InvalidField, OutsideSamples
 from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
-from service.synthesis.question import ClipQuestion, Policy
+from service.synthesis.question import ClipQuestion, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
 from service.synthesis.walk import stride
@@ -131,6 +131,19 @@ class Synthesizer:
         self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
         self._joints(asked)
         course.window(asked, limits.durations(self.session.card)[1])
+
+    def prospect(self, asked: ClipQuestion) -> Prospect:
+        """What `clip` would answer with, before it is synthesised.
+
+        Asked for one by one, as there: how long clips take differs in the last digit where many are
+        asked for at once, and a question whose end is the clip's own would pass here and be refused
+        later. Raises as `clip` does.
+        """
+        question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        self._joints(asked)
+        times = course.times(asked, self._duration(question))
+        # A loop ends with its first frame again.
+        return Prospect(len(times) + asked.loop, question.warnings)
 
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int

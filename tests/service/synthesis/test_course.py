@@ -58,6 +58,12 @@ def test_a_loop_is_the_whole_cycle_in_even_steps(walker, fps):
     assert np.abs(found.clip.root_path[middle] - there.root_position[0]).max() < FLOAT32
 
 
+@pytest.mark.parametrize("fps", [7.0, 30.0, 1.0])
+def test_the_frames_of_a_loop_are_known_before_it_is_made(walker, fps):
+    asked = ClipQuestion(STROLL, fps, loop=True)
+    assert walker.prospect(asked).frames == len(walker.clip(asked).clip)
+
+
 def test_a_loop_in_place_ends_in_every_number_as_it_begins(walker):
     found = clip(walker, STROLL, root="in_place", loop=True)
     assert np.array_equal(found.rotations[-1], found.rotations[0])
