@@ -59,10 +59,10 @@ def one_by_one(
 ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        Encoder("usda", "model/vnd.usda", one_by_one(usd.usda)),
+        Encoder("usda", "model/vnd.usda", usd.usda),
         # The binary form has no registered media type.
-        Encoder("usdc", "application/octet-stream", one_by_one(usd.usdc)),
-        Encoder("usdz", "model/vnd.usdz+zip", one_by_one(usdz.usdz)),
+        Encoder("usdc", "application/octet-stream", usd.usdc),
+        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz),
         Encoder("json", "application/json", one_by_one(keyframes.json)),
         Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
         Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), law=True),
