@@ -1,10 +1,11 @@
 """A clip as a BVH file, usually in centimetres: the unit that readers take its numbers to be in."""
 
-from service.encode.convention import Convention
+from service.encode.convention import Convention, applied
 from service.motion import bvh as motion_file
 from service.motion.answer import ClipAnswer
 
 
 def bvh(answer: ClipAnswer, convention: Convention) -> bytes:
     """BVH; the format has no place for the trust facts, nor for unit and axis."""
-    return motion_file.dumps(answer.clip, metres_per_unit=convention.metres_per_unit)
+    clip = applied(answer.clip, Convention(1.0, convention.up))
+    return motion_file.dumps(clip, metres_per_unit=convention.metres_per_unit)
