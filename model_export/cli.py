@@ -2,8 +2,9 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
     from model_export.export import Exported
     from model_export.recipe import Recipe
     from model_export.train import Trained
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        help="run on the workers of a Dask scheduler, which must have posefield installed too",
+        metavar="tcp://HOST:PORT",
+    ),
+]
 
 
 def commands(app: typer.Typer) -> None:
@@ -119,19 +128,23 @@ def evaluate(
         Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
     ] = None,
     table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
+    scheduler: Scheduler = None,
 ) -> None:
     """Measure how far a recipe's models lie from motions they have not seen, beside other methods.
 
     Everything is fitted anew without what is held out.
     """
     _expect_html(report)
+    if table1 and scheduler:
+        raise InvalidField("scheduler", "Table 1 is timed on one machine, expected none")
     if table1:
         _table1(json_file)
     elif recipe_file is None:
         raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
     else:
         asked = [one.value for one in protocol or []]
-        _evaluate(recipe_file, data or recipe_file.parent, asked, report, json_file)
+        wanted = _Wanted(asked, report, json_file, scheduler)
+        _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
 def _table1(json_file: Path | None) -> None:
@@ -143,31 +156,49 @@ def _table1(json_file: Path | None) -> None:
     typer.echo(table1.text(found))
 
 
-def _evaluate(
-    recipe_file: Path, data: Path, asked: list[str], report: Path | None, json_file: Path | None
-) -> None:
+@dataclass(frozen=True)
+class _Wanted:
+    """Protocols, all that can for none, what to write, and where to work."""
+
+    protocols: list[str]
+    report: Path | None
+    json_file: Path | None
+    scheduler: str | None
+
+
+def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
     from model_export.evaluate import protocol, summary
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
     can = protocol.protocols(own, examples)
-    for name in asked:
+    for name in wanted.protocols:
         if name not in can:
             raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
     results = []
-    for name in asked or can:
-        with _bar(name) as progress:
-            results.append(protocol.run(own, examples, name, progress))
-        typer.echo(f"{summary.table(results[-1])}\n")
+    with _jobs(wanted.scheduler, [examples]):
+        for name in wanted.protocols or can:
+            with _bar(name) as progress:
+                results.append(protocol.run(own, examples, name, progress))
+            typer.echo(f"{summary.table(results[-1])}\n")
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
     first, *others = map(summary.facts, results)
-    if json_file:
-        files.write(as_json({**first, "others": others}).encode(), json_file)
-    if report:
+    if wanted.json_file:
+        files.write(as_json({**first, "others": others}).encode(), wanted.json_file)
+    if wanted.report:
         from model_export.evaluate import render
 
-        files.write(render.html(own.description, results), report)
+        files.write(render.html(own.description, results), wanted.report)
+
+
+def _jobs(scheduler: str | None, shared: Sequence[Any]) -> AbstractContextManager[None]:
+    """Inside, jobs run on a cluster, or here where none is named."""
+    if scheduler is None:
+        return nullcontext()
+    from model_export import cluster
+
+    return cluster.jobs(scheduler, shared)
 
 
 @contextmanager

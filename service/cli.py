@@ -49,8 +49,8 @@ Performer = Annotated[
 LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the finest")]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
-# What only the evaluation needs; everything else that can be missing is training's.
-EVALUATE = ("joblib", "numba", "sklearn")
+# Whose module is missing, by the extra that brings it; everything else is training's.
+EXTRAS = {"distributed": "dask", **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate")}
 
 
 def main() -> None:
@@ -62,7 +62,7 @@ def main() -> None:
     try:
         app()
     except ModuleNotFoundError as fault:
-        extra = "evaluate" if fault.name in EVALUATE else "train"
+        extra = EXTRAS.get(fault.name or "", "train")
         typer.echo(f"posefield: needs {fault.name}: install posefield[{extra}]", err=True)
         sys.exit(2)
     except MotionError as fault:
