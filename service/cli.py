@@ -1,7 +1,8 @@
 """The `posefield` command: what ships with the service; the training job adds its own commands.
 
 Exit codes: 0 done; 1 `check` found defects; 2 a question or an argument that cannot be answered;
-3 a file that cannot be used; 4 samples from which no model can be made.
+3 a file that cannot be used; 4 samples from which no model can be made; 5 a process of an export
+that died; 128 and a signal's number where that ended an export.
 """
 
 import sys
@@ -15,7 +16,7 @@ import numpy as np
 import orjson
 import typer
 
-from service import __version__
+from service import __version__, exports
 from service.encode import ENCODERS, poses
 from service.motion import card as cards
 from service.motion import files
@@ -27,6 +28,7 @@ from service.motion.errors import (
     MotionError,
     TrainingError,
     UnknownFormat,
+    WorkerDied,
 )
 from service.synthesis import library, pace, session
 from service.synthesis.question import ClipQuestion, Policy
@@ -49,8 +51,12 @@ Performer = Annotated[
 LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the finest")]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
-# Whose module is missing, by the extra that brings it; everything else is training's.
-EXTRAS = {"distributed": "dask", **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate")}
+# Whose extra a missing module is; everything else that can be missing is training's.
+EXTRAS = {
+    **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate"),
+    "distributed": "dask",
+    "obstore": "store",
+}
 
 
 def main() -> None:
@@ -73,7 +79,9 @@ def main() -> None:
 def _code(fault: MotionError) -> int:
     if isinstance(fault, FileError):
         return 3
-    return 4 if isinstance(fault, TrainingError) else 2
+    if isinstance(fault, TrainingError):
+        return 4
+    return 5 if isinstance(fault, WorkerDied) else 2
 
 
 @app.callback(invoke_without_command=True)
@@ -205,6 +213,9 @@ def lens(position: str, fov: float, height: float) -> Camera:
         return Camera(np.array([float(word) for word in position.split(",")]), fov, height)
     except ValueError as fault:
         raise InvalidField("camera", f"{position!r}, expected X,Y,Z in metres") from fault
+
+
+app.command()(exports.export)
 
 
 @app.command()

@@ -1,6 +1,7 @@
 """USDZ: a zip archive that stores its layers unpacked and aligned, so that they can be mapped.
 
-Readers take the first member for the root layer.
+Readers take the first member for the root layer. `archive` writes other zips as well, and where a
+USDZ would have to end it goes on in the records of Zip64.
 """
 
 import struct
@@ -26,6 +27,8 @@ TIME, DATE = 0, 0x21
 LOCAL = struct.Struct("<4s5H3L2H")
 CENTRAL = struct.Struct("<4s6H3L5H2L")
 END = struct.Struct("<4s4H2LH")
+END_64, LOCATOR = struct.Struct("<4sQ2H2L4Q"), struct.Struct("<4sLQL")
+VERSION, VERSION_64 = 10, 45
 
 
 @dataclass(frozen=True)
@@ -62,24 +65,47 @@ def lying(name: str, path: Path) -> Member:
 
 
 def archive(members: Iterable[Member]) -> Iterator[bytes]:
-    """Archive of stored members whose data start at multiples of 64 bytes, as they come."""
+    """Archive of stored members whose data start at multiples of 64 bytes, as they come.
+
+    Raises ValueError for a name that is not ASCII: readers differ on what it says.
+    """
     index, at = [], 0
     for member in members:
-        # Version 1.0, no flags, method 0 (stored).
-        name = member.name.encode()
-        common = (10, 0, 0, TIME, DATE, member.crc, member.size, member.size, len(name))
+        # No flags, method 0 (stored).
+        name = member.name.encode("ascii")
+        common = (0, 0, TIME, DATE, member.crc, member.size, member.size, len(name))
         padding = _padding(at + LOCAL.size + len(name))
-        local = LOCAL.pack(b"PK\3\4", *common, len(padding)) + name + padding
-        index.append(CENTRAL.pack(b"PK\1\2", 10, *common, 0, 0, 0, 0, 0, at) + name)
+        local = LOCAL.pack(b"PK\3\4", VERSION, *common, len(padding)) + name + padding
+        index.append(_central(common, at, name))
         yield local
         yield from member.chunks
         at += len(local) + member.size
     central = b"".join(index)
     yield central
-    yield END.pack(b"PK\5\6", 0, 0, len(index), len(index), len(central), at, 0)
+    yield _end(len(index), len(central), at)
 
 
 def _padding(before: int) -> bytes:
     """Extra field, of four bytes or more, that ends at a multiple of the alignment."""
     length = -(before + 4) % ALIGNMENT
     return struct.pack("<2H", PADDING, length) + bytes(length)
+
+
+def _central(common: tuple[int, ...], at: int, name: bytes) -> bytes:
+    """Entry of the index for a member at a place."""
+    version, extra = VERSION, b""
+    if at >= BYTES:
+        version, extra = VERSION_64, struct.pack("<2HQ", 1, 8, at)
+    fields = (version, version, *common, len(extra), 0, 0, 0, 0, min(at, BYTES))
+    return CENTRAL.pack(b"PK\1\2", *fields) + name + extra
+
+
+def _end(count: int, size: int, at: int) -> bytes:
+    """End of an archive whose index has so many entries and bytes, and its place."""
+    shown = min(count, MEMBERS), min(size, BYTES), min(at, BYTES)
+    end = END.pack(b"PK\5\6", 0, 0, shown[0], *shown, 0)
+    if shown == (count, size, at) and MEMBERS not in shown and BYTES not in shown:
+        return end
+    versions = VERSION_64, VERSION_64
+    whole = END_64.pack(b"PK\6\6", END_64.size - 12, *versions, 0, 0, count, count, size, at)
+    return whole + LOCATOR.pack(b"PK\6\7", 0, at + size, 1) + end

@@ -1,8 +1,13 @@
 """One clip of many: what it is called, what is asked for, and where that was said."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 from service.synthesis.question import ClipQuestion
+
+KEPT = 20
+"""Faults that a survey keeps of all that it counts."""
 
 
 @dataclass(frozen=True)
@@ -22,3 +27,34 @@ class Fault:
 
     place: str
     message: str
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a first look at all rows found: how many there are, how many are no queries, and the
+    first of those."""
+
+    total: int
+    faulty: int
+    faults: tuple[Fault, ...]
+
+
+class Source(Protocol):
+    """Where queries come from: the same rows in the same order whenever they are read.
+
+    Whoever reads holds a few thousand rows, and 8 bytes of each name that was given.
+    """
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that the queries hang on, but for the model."""
+
+    @property
+    def count(self) -> int | None:
+        """How many rows there are; none where that is known only after they were read."""
+
+    def rows(self) -> Iterator[Query | Fault]:
+        """Every row. Raises FileError where the rest cannot be read, or has changed since."""
+
+    def survey(self) -> Survey:
+        """Every row looked at and none kept. Raises as `rows` does."""

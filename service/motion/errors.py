@@ -12,6 +12,7 @@ MotionError
 │   ├── InvalidField     missing, unknown, of a wrong type, or outside the allowed range
 │   └── OutsideSamples   controls outside what was sampled, when the client asked to refuse them
 ├── ClusterError         a Dask cluster that cannot be reached or worked on
+├── WorkerDied           a process that did a part of the work has gone
 └── TrainingError        samples from which no model can be made
     └── ExportRefused    the graph does not answer what the reference answers
 
@@ -35,6 +36,10 @@ class FileError(MotionError):
         self.path = str(path)
         self.line = line
         self.message = message
+
+    def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None]]:
+        # What is raised in one process is told in another.
+        return type(self), (self.path, self.message, self.line)
 
 
 class BvhError(FileError):
@@ -64,6 +69,9 @@ class QueryError(MotionError):
         self.message = message
         self.index = index
 
+    def __reduce__(self) -> tuple[type["QueryError"], tuple[str, str, int | None]]:
+        return type(self), (self.field, self.message, self.index)
+
 
 class UnknownModel(QueryError):
     """No model of that name is loaded."""
@@ -88,6 +96,10 @@ class ClusterError(MotionError):
         super().__init__(f"{address}: {message}")
         self.address = address
         self.message = message
+
+
+class WorkerDied(MotionError):
+    """A process that did a part of the work has gone: killed, or out of memory."""
 
 
 class TrainingError(MotionError):

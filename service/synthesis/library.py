@@ -35,12 +35,17 @@ def load(paths: Iterable[Path]) -> Library:
     """
     models: dict[str, Synthesizer] = {}
     for path in (file for given in paths for file in _files(given)):
-        if not NAME.fullmatch(path.stem):
-            raise ModelError(path, f"name {path.stem!r}, expected {NAME.pattern}")
         if path.stem in models:
             raise ModelError(path, f"a second model named {path.stem!r}")
-        models[path.stem] = Synthesizer(path.stem, session.load(path))
+        models[path.stem] = opened(path, session.read(path))
     return Library(models)
+
+
+def opened(path: Path, content: bytes) -> Synthesizer:
+    """Model of a file that has been read, named by its stem; raises ModelError as `load` does."""
+    if not NAME.fullmatch(path.stem):
+        raise ModelError(path, f"name {path.stem!r}, expected {NAME.pattern}")
+    return Synthesizer(path.stem, session.open_bytes(content, str(path)))
 
 
 def _files(given: Path) -> list[Path]:

@@ -26,3 +26,12 @@ class ClipQuestion:
     end: float | None = None
     performer: str | None = None
     level: int = 0
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """What is known of a clip before it is synthesised: its frames, and a warning for each control
+    outside what was sampled."""
+
+    frames: int
+    warnings: tuple[str, ...]

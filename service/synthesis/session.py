@@ -62,11 +62,15 @@ class Session:
 
 def load(path: Path) -> Session:
     """Session on one thread; ModelError says why a file cannot be served."""
+    return open_bytes(read(path), str(path))
+
+
+def read(path: Path) -> bytes:
+    """Content of a model file; ModelError where it cannot be read."""
     try:
-        content = path.read_bytes()
+        return path.read_bytes()
     except OSError as fault:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
-    return open_bytes(content, str(path))
 
 
 def open_bytes(content: bytes, source: str) -> Session:

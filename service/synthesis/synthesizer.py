@@ -14,7 +14,7 @@ from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits, pace
-from service.synthesis.question import ClipQuestion, Policy
+from service.synthesis.question import ClipQuestion, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
 
@@ -110,6 +110,23 @@ class Synthesizer:
         )
         return ClipAnswer(clip, answer.trust)
 
+    def check(self, asked: ClipQuestion) -> None:
+        """Raise what `clip` would, as far as it can be said before anything is synthesised: how
+        long the clip takes is not known yet."""
+        self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        _window(asked, limits.durations(self.session.card)[1])
+
+    def prospect(self, asked: ClipQuestion) -> Prospect:
+        """What `clip` would answer with, before it is synthesised.
+
+        Asked of the graph alone, as there: how long a clip takes differs in its last digit where
+        many are asked for at once, and a question whose end is the clip's own would then pass here
+        and be refused later. Raises as `clip` does.
+        """
+        question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        frames = self._frames(asked, self._duration(question))
+        return Prospect(len(frames), question.warnings)
+
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> _Question:
@@ -136,12 +153,7 @@ class Synthesizer:
 
     def _frames(self, asked: ClipQuestion, duration: float) -> Floats:
         """Times (F,) of the frames asked for, s, of a clip that takes `duration`."""
-        rate = _number("fps", asked.fps)
-        _within("fps", rate, *RATES, "frames a second")
-        last = duration if asked.end is None else _number("end", asked.end)
-        _within("end", last, 0.0, duration, "s")
-        start = _number("start", asked.start)
-        _within("start", start, 0.0, last, "s")
+        rate, start, last = _window(asked, duration)
         # A millionth of a frame forgives the rounding of duration * rate.
         frames = math.floor((last - start) * rate + 1e-6) + 1
         if frames > MOST_POSES:
@@ -165,6 +177,17 @@ class Synthesizer:
     def _run(self, question: _Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level
         return self.session.run(question.point, when, *outputs, labels=labels, level=level)
+
+
+def _window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
+    """Frames a second, start and end, s, of a clip that takes `duration` at most."""
+    rate = _number("fps", asked.fps)
+    _within("fps", rate, *RATES, "frames a second")
+    last = duration if asked.end is None else _number("end", asked.end)
+    _within("end", last, 0.0, duration, "s")
+    start = _number("start", asked.start)
+    _within("start", start, 0.0, last, "s")
+    return rate, start, last
 
 
 def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:

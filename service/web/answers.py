@@ -1,7 +1,7 @@
 """Answers as they travel: JSON documents, and the headers that say how far a clip is trusted."""
 
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from typing import Any
 
 import orjson
@@ -41,17 +41,14 @@ def attachment(content: bytes, media_type: str, name: str) -> Response:
 
 
 def streamed(
-    pieces: AsyncIterator[bytes], media_type: str, name: str, model: str, outside: float
+    pieces: AsyncIterator[bytes], media_type: str, name: str, model: str, warnings: Sequence[str]
 ) -> Response:
-    """A file to save, sent while it is made; outside: share of poses beyond what was sampled."""
+    """A file to save, sent while it is made."""
     headers = {
         "Content-Disposition": f'attachment; filename="{name}"',
         "Posefield-Model": model,
     }
-    if outside:
-        said = f"{100 * outside:.1f} % of the poses have some control outside what was sampled"
-        headers["Posefield-Warning"] = json.dumps(said)
-    return StreamingResponse(pieces, headers=headers, media_type=media_type)
+    return _warning(StreamingResponse(pieces, headers=headers, media_type=media_type), warnings)
 
 
 def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
@@ -63,8 +60,12 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
         "Posefield-Sigma": repr(trust.sigma),
         "Posefield-Duration": repr(trust.duration),
     }
-    response = Response(content, headers=headers, media_type=encoder.media_type)
-    for warning in trust.warnings:
+    made = Response(content, headers=headers, media_type=encoder.media_type)
+    return _warning(made, trust.warnings)
+
+
+def _warning(response: Response, warnings: Sequence[str]) -> Response:
+    for warning in warnings:
         # A JSON string is plain ASCII and can hold the commas that join header lines.
         response.headers.append("Posefield-Warning", json.dumps(warning))
     return response

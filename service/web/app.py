@@ -15,6 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.encode import CROWD_ENCODERS, ENCODERS, crowd
+from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.web import contract, problems
@@ -26,8 +27,12 @@ from service.web.settings import Settings
 log = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(clip|crowd)\.([^/]+)")
-FORMATS = {"clip": ENCODERS.keys(), "crowd": [*CROWD_ENCODERS, *crowd.STREAMS]}
+FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(clip|clips|crowd)\.([^/]+)")
+FORMATS = {
+    "clip": [*ENCODERS],
+    "clips": [*PACKS],
+    "crowd": [*CROWD_ENCODERS, *crowd.STREAMS],
+}
 
 
 def create_app(library: Library, settings: Settings) -> Starlette:

@@ -1,7 +1,7 @@
 """What each operation of the contract does: decode, ask, encode."""
 
 import os
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import ParamSpec, TypeVar
@@ -13,6 +13,8 @@ from starlette.responses import Response
 
 from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
 from service.encode import crowd as crowd_usd
+from service.encode.packs import PACKS, Pack
+from service.export import pack as packing
 from service.motion.answer import PoseAnswer
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
@@ -20,7 +22,16 @@ from service.synthesis.library import Library
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
-from service.web import answers, body, contract, crowd_query, query, walk_query
+from service.web import (
+    answers,
+    body,
+    clips_query,
+    contract,
+    crowd_query,
+    query,
+    sending,
+    walk_query,
+)
 from service.web.query import PoseQuestion
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
@@ -40,6 +51,7 @@ class Service:
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
 CROWDS = CapacityLimiter(os.cpu_count() or 1)
+CLIPS = CapacityLimiter(os.cpu_count() or 1)
 
 Handler = Callable[[Service, Request], Awaitable[Response]]
 Given = ParamSpec("Given")
@@ -103,8 +115,8 @@ async def get_crowd(ending: str, service: Service, request: Request) -> Response
     question = walk_query.of_pairs(pairs, service.settings)
     made, pieces = await to_thread.run_sync(_walking, model, question, ending, limiter=CROWDS)
     name, media_type = f"{model.name}.{ending}", ENCODERS[ending].media_type
-    outside = float(made.facts["outside_share"])
-    return answers.streamed(_sent(pieces), media_type, name, model.identity, outside)
+    sent, warnings = sending.sent(pieces, CROWDS), _outside(float(made.facts["outside_share"]))
+    return answers.streamed(sent, media_type, name, model.identity, warnings)
 
 
 def _walking(
@@ -114,10 +126,25 @@ def _walking(
     return made, crowd_usd.stream(made, ending, question.instancing)
 
 
-async def _sent(pieces: Iterator[bytes]) -> AsyncIterator[bytes]:
-    """The pieces, each made where crowds are."""
-    while piece := await to_thread.run_sync(next, pieces, b"", limiter=CROWDS):
-        yield piece
+def _outside(share: float) -> list[str]:
+    said = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
+    return [said] if share else []
+
+
+async def query_clips(
+    encoders: Mapping[str, Encoder], pack: Pack, service: Service, request: Request
+) -> Response:
+    """Many clips in an archive that is sent while they are made, asked for by a body."""
+    model, settings = _model(service, request), service.settings
+    content = await body.read(request, settings.clips_body_limit)
+    order = await to_thread.run_sync(
+        clips_query.order, model, encoders, content, settings, limiter=CLIPS
+    )
+    pieces = sending.gathered(pack.write(packing.members(order)))
+    name = f"{model.name}.{pack.extension}"
+    return answers.streamed(
+        sending.sent(pieces, CLIPS), pack.media_type, name, model.identity, order.warnings
+    )
 
 
 async def live(service: Service, request: Request) -> Response:
@@ -145,6 +172,7 @@ OPERATIONS: dict[str, Handler] = {
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
     **{f"getCrowd{n.capitalize()}": partial(get_crowd, n) for n in crowd_usd.STREAMS},
+    **{f"queryClips{n.capitalize()}": partial(query_clips, ENCODERS, p) for n, p in PACKS.items()},
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,

@@ -86,6 +86,13 @@ async def of_query_error(request: Request, error: Exception) -> Response:
     return _answer(request, TABLE[type(error)], str(error), errors)
 
 
+def within(error: QueryError, where: str) -> RequestFault:
+    """The same fault in one question of many; where: JSON pointer to that question."""
+    place = where + _place(error, in_body=True)["pointer"]
+    detail = f"{place.removeprefix('/')}: {error.message}"
+    return RequestFault(TABLE[type(error)], detail, {"pointer": place})
+
+
 def internal(request: Request) -> Response:
     """Answer to a failure of the service: nothing of the failure but the request's id."""
     return _answer(request, INTERNAL, "see the service's log under the id in `instance`", [])

@@ -102,15 +102,19 @@ def pose_of_body(content: bytes) -> PoseQuestion:
 
 def clip_of_body(content: bytes) -> ClipQuestion:
     """Question of a JSON body."""
-    body = decoding.decoded(_CLIP, content)
+    return clip_of(decoding.decoded(_CLIP, content))
+
+
+def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
+    """Question of a part of a JSON body; within: keys and indices that lead to it."""
     return ClipQuestion(
-        _controls(body.controls),
+        _controls(body.controls, *within),
         body.fps,
         body.extrapolate,
         body.start,
         body.end,
         body.performer,
-        _level(body.level),
+        _level(body.level, *within),
     )
 
 
@@ -142,10 +146,10 @@ def number(name: str, text: str) -> float:
     return value
 
 
-def _level(given: float) -> int:
+def _level(given: float, *within: str) -> int:
     # JSON has one kind of number: 1.0 is a whole one.
     if not given.is_integer():
-        raise decoding.bad_body(f"{given:g}, expected a whole number", "/level")
+        raise decoding.bad_body(f"{given:g}, expected a whole number", pointer(*within, "level"))
     return int(given)
 
 
@@ -162,14 +166,14 @@ def bad_parameter(name: str, detail: str) -> RequestFault:
     return RequestFault(BAD_PARAMETER, f"{name}: {detail}", {"parameter": name})
 
 
-def _controls(raw: dict[str, msgspec.Raw]) -> dict[str, float]:
+def _controls(raw: dict[str, msgspec.Raw], *within: str) -> dict[str, float]:
     """Values of the controls; decoded one by one because msgspec does not name a key at fault."""
     values = {}
     for name, text in raw.items():
         try:
             values[name] = _FLOAT.decode(text)
         except msgspec.ValidationError as fault:
-            where = pointer("controls", name)
+            where = pointer(*within, "controls", name)
             raise decoding.bad_body(
                 f"{fault} - at `{where}`, expected a finite number", where
             ) from None

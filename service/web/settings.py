@@ -15,8 +15,9 @@ class Settings:
 
     host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
-    crowd_poses: poses of all motions of one that walks. grace: seconds that open requests get to
-    finish after SIGTERM.
+    crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
+    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
+    seconds that open requests get to finish after SIGTERM.
     """
 
     host: str = "127.0.0.1"
@@ -27,6 +28,10 @@ class Settings:
     crowd_limit: int = 100_000
     # USD takes 900 bytes for a pose of 31 joints.
     crowd_poses: int = 500_000
+    # A clip with six controls, none rounded, a name and a performer takes 400 bytes.
+    clips_body_limit: int = 8 * 1024 * 1024
+    clips_limit: int = 10_000
+    clips_poses: int = 1_000_000
     grace: int = 10
 
     def __post_init__(self) -> None:
@@ -35,6 +40,9 @@ class Settings:
         _within("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
         _within("crowd_limit", self.crowd_limit, 1, 10_000_000)
         _within("crowd_poses", self.crowd_poses, 1, 50_000_000)
+        _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
+        _within("clips_limit", self.clips_limit, 1, 1_000_000)
+        _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
         _within("grace", self.grace, 0, 600)
 
 

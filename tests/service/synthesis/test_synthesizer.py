@@ -293,3 +293,30 @@ def test_answers_are_float64_whatever_the_graph_speaks(model):
     answer = model.pose(POINT, [0.5], "warn")
     arrays = (answer.times, answer.rotations, answer.root_position, answer.bone_offsets)
     assert {array.dtype for array in arrays} == {np.dtype(np.float64)}
+
+
+@pytest.mark.parametrize(
+    ("asked", "field"),
+    [
+        (ClipQuestion({**POINT, "turn": math.nan}), "controls/turn"),
+        (ClipQuestion(POINT, level=99), "level"),
+        (ClipQuestion(POINT, performer="nobody"), "performer"),
+        (ClipQuestion(POINT, fps=0.5), "fps"),
+        (ClipQuestion(POINT, start=-1.0), "start"),
+        (ClipQuestion(POINT, start=0.5, end=0.4), "start"),
+        (ClipQuestion(POINT, end=1e6), "end"),
+    ],
+)
+def test_what_a_clip_would_be_refused_for_is_said_before_it_is_made(model, asked, field):
+    with pytest.raises(InvalidField) as before:
+        model.check(asked)
+    with pytest.raises(InvalidField) as after:
+        model.clip(asked)
+    assert before.value.field == after.value.field == field
+
+
+def test_a_question_with_an_answer_passes(model):
+    """Negative control of the test above."""
+    asked = ClipQuestion(POINT, start=0.1, end=0.4)
+    model.check(asked)
+    assert len(model.clip(asked).clip) == 10

@@ -1,0 +1,60 @@
+"""Whether many rows at once certainly pass the model's door, which looks at one at a time.
+
+Whatever passes here passes `Synthesizer.check`; of what does not, that says what is wrong.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from service.export.columns import CONTROL
+from service.motion.card import ModelCard
+from service.motion.conventions import Floats
+from service.synthesis import limits
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import RATES
+
+Values = Mapping[str, Sequence[Any]]
+
+
+def pass_all(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    """Whether rows of values by field, usual where nothing is said, are all sound."""
+    return (
+        _controls_pass(card, values, usual)
+        and _within(_column(values, "level", usual.level), 0, len(card.levels) - 1)
+        and _within(_column(values, "fps", usual.fps), *RATES)
+        and _window_passes(card, values, usual)
+    )
+
+
+def _controls_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    strict = "refuse" in values.get("extrapolate", ()) or usual.extrapolate == "refuse"
+    allowed = limits.sampled if strict else limits.reach
+    return all(
+        _within(np.asarray(values[CONTROL + control.name]), *allowed(control))
+        for control in card.controls
+    )
+
+
+def _window_passes(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    longest = limits.durations(card)[1]
+    start = _column(values, "start", usual.start)
+    last = _column(values, "end", longest if usual.end is None else usual.end)
+    return (
+        _within(start, 0.0, math.inf)
+        and _within(last, 0.0, longest)
+        and bool(np.all(start <= last))
+    )
+
+
+def _column(values: Values, field: str, usual: float) -> Floats:
+    """Numbers of a field (n,), or (1,) where no row says any."""
+    said = values.get(field, (None,))
+    return np.array([usual if value is None else value for value in said], dtype=float)
+
+
+def _within(numbers: Floats, low: float, high: float) -> bool:
+    """Whether all lie from low to high; what is no number does not."""
+    return bool(np.all((numbers >= low) & (numbers <= high)))

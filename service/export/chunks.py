@@ -1,0 +1,127 @@
+"""A chunk of an export: some rows of the queries, made into files by whoever it is given to.
+
+`make(work, task)` is all of it: a pure function of the job and the rows, so a chunk may be done
+anywhere, again, or twice at once, and its files are the same. Its last act is to leave its part of
+the manifest with the others.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from service.encode import ENCODERS
+from service.export import ledger, manifest
+from service.export.job import Job, Work
+from service.export.layouts import LAYOUTS, File, path
+from service.export.ledger import Part
+from service.export.query import KEPT, Fault, Query
+from service.export.target import open_target
+from service.motion.answer import ClipAnswer
+from service.motion.errors import InvalidField, QueryError
+from service.synthesis import session
+from service.synthesis.synthesizer import Synthesizer
+
+BATCH = 64
+"""Clips that are held at once: enough to share what their files have in common."""
+
+Stopped = Callable[[], bool]
+"""Whether everything should stop; what was begun is put away."""
+
+
+class Stop(Exception):
+    """A chunk that was given up because everything should stop."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """The chunk of a number, from row `first` on; its rows in their order."""
+
+    number: int
+    first: int
+    rows: tuple[Query | Fault, ...]
+
+
+def make(work: Work, task: Task, stopped: Stopped = lambda: False) -> Part:
+    """Do a chunk; what it came to.
+
+    Raises InvalidField that names rows at fault where they are not skipped, FileError where the
+    target cannot be written, Stop where it should stop; none of these leaves a part.
+    """
+    target = open_target(work.target)
+    chunk = _Chunk(work.job, _synthesizer(work.job.model, work.model), task, [])
+    entries, size = LAYOUTS[work.job.layout].put(target, task.number, chunk.batches(stopped))
+    if chunk.faults and not work.skip:
+        raise refusal(len(chunk.faults), chunk.faults)
+    warned = sum(bool(entry["warnings"]) for entry in entries)
+    part = Part(len(entries), size, warned, chunk.faults)
+    ledger.record(target, task.number, part, entries)
+    return part
+
+
+def refusal(count: int, faults: Sequence[Fault]) -> InvalidField:
+    """What to say of rows that are no queries; of a count of them, the first are at hand."""
+    said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:KEPT])
+    more = f"\n  and {count - KEPT} more" if count > KEPT else ""
+    return InvalidField("queries", f"{count} rows cannot be answered:{said}{more}")
+
+
+@dataclass(frozen=True)
+class _Made:
+    path: str
+    query: Query
+    answer: ClipAnswer
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """A chunk while it is made. faults: those found so far."""
+
+    job: Job
+    synthesizer: Synthesizer
+    task: Task
+    faults: list[Fault]
+
+    def batches(self, stopped: Stopped) -> Iterator[list[File]]:
+        """Files of the rows that can be answered, in order."""
+        rows = self.task.rows
+        for at in range(0, len(rows), BATCH):
+            if stopped():
+                raise Stop
+            yield self._files(at, rows[at : at + BATCH])
+
+    def _files(self, at: int, rows: tuple[Query | Fault, ...]) -> list[File]:
+        made = list(self._made(at, rows))
+        contents = self._contents(made)
+        return [
+            File(one.path, content, manifest.entry(one.query.name, one.path, content, one.answer))
+            for one, content in zip(made, contents, strict=True)
+        ]
+
+    def _made(self, at: int, rows: tuple[Query | Fault, ...]) -> Iterator[_Made]:
+        for number, row in enumerate(rows, self.task.first + at):
+            if isinstance(row, Fault):
+                self.faults.append(row)
+                continue
+            try:
+                answer = self.synthesizer.clip(row.question)
+            except QueryError as fault:
+                self.faults.append(Fault(row.place, str(fault)))
+            else:
+                yield _Made(path(number, row.name, row.format), row, answer)
+
+    def _contents(self, made: list[_Made]) -> list[bytes]:
+        """Files of the clips, those of a format made together."""
+        contents: dict[int, bytes] = {}
+        for extension in dict.fromkeys(one.query.format for one in made):
+            own = [index for index, one in enumerate(made) if one.query.format == extension]
+            encoder = ENCODERS[extension]
+            answers = [made[index].answer for index in own]
+            files = encoder.write(answers, self.job.convention(encoder.usual))
+            contents |= zip(own, files, strict=True)
+        return [contents[index] for index in range(len(made))]
+
+
+# A process does many chunks of one job.
+@lru_cache(maxsize=1)
+def _synthesizer(identity: str, content: bytes) -> Synthesizer:
+    return Synthesizer(identity.partition("@")[0], session.open_bytes(content, identity))

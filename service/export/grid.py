@@ -1,0 +1,118 @@
+"""Queries at all points of a grid: `--grid speed=0.8:1.6:9 --grid stature=1.6,1.75`."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from service.export.blocks import SIZE, Block
+from service.export.cells import Number, Whole
+from service.export.columns import Column, Columns
+from service.motion.card import ModelCard
+from service.motion.errors import InvalidField
+
+MOST = 10**9
+"""Points of a grid: more is a slip of the keyboard."""
+MOST_STEPS = 10**6
+"""Of one axis, which is held."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A column, and what it takes along the grid."""
+
+    column: Column
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All combinations of the values of axes: that of the last axis changes fastest.
+
+    Controls without an axis have one value, the card's default.
+    """
+
+    axes: tuple[Axis, ...]
+
+    @property
+    def count(self) -> int:
+        """How many points there are."""
+        return prod(len(axis.values) for axis in self.axes)
+
+    def place(self, point: int) -> str:
+        """How a point is named in messages."""
+        return f"grid point {point}"
+
+    def spec(self) -> dict[str, Any]:
+        """All that the points hang on, as plain values."""
+        return {"grid": [[axis.column.field, list(axis.values)] for axis in self.axes]}
+
+    def blocks(self) -> Iterator[Block]:
+        """Points from the first on."""
+        columns = [axis.column for axis in self.axes]
+        readers = [column.kind.values for column in columns]
+        shape = [len(axis.values) for axis in self.axes]
+        for first in range(0, self.count, SIZE):
+            points = range(first, min(first + SIZE, self.count))
+            places = np.unravel_index(np.array(points), shape)
+            cells = [_taken(a.values, p) for a, p in zip(self.axes, places, strict=True)]
+            yield Block(first, [point + 1 for point in points], columns, readers, cells)
+
+
+def parse(texts: Sequence[str], columns: Columns, card: ModelCard) -> Grid:
+    """Grid of NAME=VALUES texts; InvalidField for one that is not, or is given twice.
+
+    VALUES: one, several separated by commas, or `start:stop:count`, both ends among them.
+    """
+    given = [_axis(text, columns) for text in texts]
+    named = [axis.column.field for axis in given]
+    for name in named:
+        if named.count(name) > 1:
+            raise InvalidField("grid", f"{name.rpartition('/')[2]!r} twice, expected once")
+    defaults = zip(columns.controls, card.controls, strict=True)
+    rest = [Axis(column, (own.default,)) for column, own in defaults if column.field not in named]
+    grid = Grid((*rest, *given))
+    if grid.count > MOST:
+        raise InvalidField("grid", f"{grid.count} points, expected at most {MOST}")
+    return grid
+
+
+def _axis(text: str, columns: Columns) -> Axis:
+    name, equals, values = text.partition("=")
+    if not equals or not values:
+        raise InvalidField("grid", f"{text!r}, expected NAME=VALUE,VALUE or NAME=START:STOP:COUNT")
+    try:
+        column = columns.find(name.strip())
+        if column.field == "name":
+            raise ValueError(f"column {name!r}, expected one that clips may share")
+        return Axis(column, tuple(_values(column, values)))
+    except ValueError as fault:
+        raise InvalidField("grid", f"{text!r}: {fault}") from fault
+
+
+def _values(column: Column, text: str) -> list[Any]:
+    if ":" in text and isinstance(column.kind, Number | Whole):
+        return column.read(column.kind.values, _steps(text))
+    # One by one, so that the fault names the value.
+    values = [column.read(column.kind.text, [cell])[0] for cell in text.split(",")]
+    if None in values:
+        raise ValueError(f"an empty value, expected {column.kind.expected}")
+    return values
+
+
+def _steps(text: str) -> list[float]:
+    """Numbers of start:stop:count, evenly apart; ValueError."""
+    words = text.split(":")
+    if len(words) != 3:
+        raise ValueError(f"{text!r}, expected START:STOP:COUNT")
+    start, stop = Number().text(words[:2])
+    count = Whole().text(words[2:])[0]
+    if start is None or stop is None or count is None or not 2 <= count <= MOST_STEPS:
+        raise ValueError(f"{text!r}, expected START:STOP:COUNT with a COUNT of 2 to {MOST_STEPS}")
+    return [float(value) for value in np.linspace(start, stop, count)]
+
+
+def _taken(values: Sequence[Any], places: Any) -> list[Any]:
+    return [values[place] for place in places.tolist()]

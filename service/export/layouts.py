@@ -1,0 +1,91 @@
+"""How the files of many clips are laid out: as they are in folders, or packed into archives.
+
+An archive holds the files under the paths that they have in folders: unpacked, all archives of an
+export give what the folders would have been.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from service.encode.packs import PACKS, Pack
+from service.export import manifest
+from service.export.target import Target
+from service.motion.errors import InvalidField
+
+CROWDED = 1000
+"""Files in a folder; many more make file systems and file browsers slow."""
+
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class File:
+    """A clip's file: its path, its content and its entry in the manifest."""
+
+    path: str
+    content: bytes
+    entry: Entry
+
+
+Put = Callable[[Target, int, Iterable[list[File]]], tuple[list[Entry], int]]
+"""Puts the files of the chunk of a number, which come in batches: their entries, and the bytes
+written."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where files lie. chunk: rows that are usually done together."""
+
+    chunk: int
+    put: Put
+
+
+def path(row: int, name: str, extension: str) -> str:
+    """Where the file of a row lies, or would if it were not packed."""
+    return f"clips/{row // CROWDED:03d}/{name}.{extension}"
+
+
+def loose(target: Target, number: int, batches: Iterable[list[File]]) -> tuple[list[Entry], int]:
+    """Files as they are."""
+    entries = []
+    for files in batches:
+        target.write([(file.path, file.content) for file in files])
+        entries += [file.entry for file in files]
+    return entries, sum(entry["bytes"] for entry in entries)
+
+
+def packed(pack: Pack) -> Put:
+    """Files in one archive a chunk, whose part of the manifest is its last member."""
+
+    def put(target: Target, number: int, batches: Iterable[list[File]]) -> tuple[list[Entry], int]:
+        entries: list[Entry] = []
+        archive = f"clips-{number:06d}.{pack.extension}"
+        size = target.stream(archive, pack.write(_members(number, batches, entries)))
+        return [{**entry, "archive": archive} for entry in entries], size
+
+    return put
+
+
+def _members(
+    number: int, batches: Iterable[list[File]], entries: list[Entry]
+) -> Iterator[tuple[str, bytes]]:
+    """Files by path, then their entries, which are added to `entries` on the way."""
+    for files in batches:
+        for file in files:
+            entries.append(file.entry)
+            yield file.path, file.content
+    yield f"manifest-{number:06d}.jsonl", b"".join(map(manifest.line, entries))
+
+
+LAYOUTS = {
+    "folder": Layout(256, loose),
+    **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
+}
+
+
+def find(name: str) -> Layout:
+    """Layout of a name; InvalidField where there is none."""
+    if name not in LAYOUTS:
+        raise InvalidField("layout", f"{name!r}, expected one of {', '.join(LAYOUTS)}")
+    return LAYOUTS[name]

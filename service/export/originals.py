@@ -1,0 +1,64 @@
+"""Files that are read more than once and must stay what they were."""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import AnyStr
+
+from service.motion.errors import FileError
+
+LONGEST_LINE = 1 << 20
+"""Of a line, characters: a file without line ends is no table, and would not fit into memory."""
+
+
+@dataclass(frozen=True)
+class Original:
+    """A file as it was first read: SHA-256 of its bytes, its size and when it was written, ns."""
+
+    path: Path
+    digest: str
+    stamp: tuple[int, int]
+
+    @contextmanager
+    def unchanged(self) -> Iterator[None]:
+        """Raises FileError where the file is another before or after."""
+        self._compare()
+        yield
+        self._compare()
+
+    def _compare(self) -> None:
+        if _stamp(self.path) != self.stamp:
+            raise FileError(self.path, "changed while it was used, expected what was first read")
+
+
+def meet(path: Path) -> Original:
+    """A file as it is; FileError where it cannot be read."""
+    if path.exists() and not path.is_file():
+        raise FileError(path, "not a file, expected one: it is read more than once")
+    stamp = _stamp(path)
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as fault:
+        raise FileError(path, f"cannot be read: {fault.strerror}") from fault
+    return Original(path, digest, stamp)
+
+
+def lines(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
+    """Lines of a file that is open; FileError for one that never ends."""
+    for number, line in enumerate(iter(partial(readline, LONGEST_LINE), readline(0)), start=1):
+        if len(line) == LONGEST_LINE:
+            found = f"a line of {LONGEST_LINE} characters or more"
+            raise FileError(path, f"{found}, expected one row a line", number)
+        yield line
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    try:
+        found = path.stat()
+    except OSError as fault:
+        raise FileError(path, f"cannot be read: {fault.strerror}") from fault
+    return found.st_size, found.st_mtime_ns

@@ -1,0 +1,124 @@
+"""Where the queries of an export come from: a file, a grid or a sampling.
+
+A file is a table (CSV, Parquet) or objects (JSON Lines) by its ending. It has a column for each
+control of the model, and any of those of `columns.OPTIONS`; what a row does not say is as the
+command line says. `rows` gives a Query or a Fault for each row, in the source's order.
+
+    source = queries.source(Asked(path), Defaults("usdc"), model)
+    found = source.survey()
+    for row in source.rows(): ...
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import orjson
+
+from service.encode import ENCODERS
+from service.export import columns, grid, jsonl, originals, parquet, sampling, tables
+from service.export.blocks import Block, Broken
+from service.export.columns import Columns
+from service.export.originals import Original
+from service.export.query import Source
+from service.export.reading import Defaults, Reading
+from service.motion.errors import InvalidField, UnknownFormat
+from service.synthesis.synthesizer import Synthesizer
+
+METHOD, SEED = "latin", 0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line says of where queries come from: one of path, grid and sample.
+
+    grid: NAME=VALUES texts. sample: how many points; method and seed, of a sampling only.
+    """
+
+    path: Path | None = None
+    grid: tuple[str, ...] = ()
+    sample: int | None = None
+    method: str | None = None
+    seed: int | None = None
+
+
+class _Blocks(Protocol):
+    """A source before its rows are read."""
+
+    @property
+    def count(self) -> int | None: ...
+    def place(self, number: int, /) -> str: ...
+    def blocks(self) -> Iterator[Block | Broken]: ...
+
+
+READERS: Mapping[str, Callable[[Original, Columns], _Blocks]] = {
+    ".csv": tables.read,
+    ".jsonl": jsonl.JsonLines,
+    ".ndjson": jsonl.JsonLines,
+    ".parquet": parquet.read,
+}
+
+
+def source(asked: Asked, usual: Defaults, model: Synthesizer) -> Source:
+    """Source of the queries that were asked for, where rows say nothing as usual.
+
+    Raises InvalidField, UnknownFormat and OutsideSamples for what the command line says, FileError
+    for a file that cannot be read or has a heading that does not fit the model.
+    """
+    _check_one(asked)
+    _check_usual(usual, model)
+    found, spec = _blocks(asked, model)
+    digest = _digest({**spec, "usual": asdict(usual)})
+    return Reading(found.blocks, found.place, model, usual, found.count, digest)
+
+
+def _check_one(asked: Asked) -> None:
+    given = {
+        "a file": asked.path is not None,
+        "--grid": bool(asked.grid),
+        "--sample": asked.sample is not None,
+    }
+    if sum(given.values()) != 1:
+        found = " and ".join(name for name, there in given.items() if there) or "none"
+        raise InvalidField("queries", f"{found}, expected one of {', '.join(given)}")
+    for option in ("method", "seed"):
+        if getattr(asked, option) is not None and asked.sample is None:
+            raise InvalidField(option, "without --sample, expected with it")
+
+
+def _check_usual(usual: Defaults, model: Synthesizer) -> None:
+    """What rows do not say must be sound by itself: they are looked at for what they do say."""
+    if usual.format not in ENCODERS:
+        raise UnknownFormat("format", f"{usual.format!r}, expected one of {', '.join(ENCODERS)}")
+    middle = {control.name: control.default for control in model.session.card.controls}
+    model.check(replace(usual.question, controls=middle))
+
+
+def _blocks(asked: Asked, model: Synthesizer) -> tuple[_Blocks, dict[str, Any]]:
+    """Rows that were asked for, and all that they hang on as plain values."""
+    card = model.session.card
+    known = columns.of(card)
+    if asked.path:
+        return _file(asked.path, known)
+    if asked.grid:
+        points = grid.parse(asked.grid, known, card)
+        return points, points.spec()
+    method, seed = asked.method or METHOD, SEED if asked.seed is None else asked.seed
+    count = asked.sample or 0
+    sampling.check(method, count, seed)
+    drawn = sampling.Drawn(known.controls, card, method, count, seed)
+    return drawn, drawn.spec()
+
+
+def _file(path: Path, known: Columns) -> tuple[_Blocks, dict[str, Any]]:
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise UnknownFormat("queries", f"{path.name!r} ends in none of {', '.join(READERS)}")
+    original = originals.meet(path)
+    return reader(original, known), {"file": path.suffix.lower(), "sha256": original.digest}
+
+
+def _digest(spec: Mapping[str, Any]) -> str:
+    return hashlib.sha256(orjson.dumps(spec, option=orjson.OPT_SORT_KEYS)).hexdigest()

@@ -1,0 +1,85 @@
+"""Queries of a CSV file: UTF-8, a heading, cells separated by commas and quoted where need be.
+
+Blank lines are no rows. An empty cell says nothing. A row is named by the line that it begins in.
+"""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from service.export.blocks import Block, Broken, Gathering
+from service.export.columns import Column, Columns
+from service.export.originals import Original, lines
+from service.motion.errors import FileError
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """A CSV file whose heading was understood; how many rows it has only its end tells."""
+
+    original: Original
+    heading: tuple[Column, ...]
+    count: None = None
+
+    def place(self, line: int) -> str:
+        """How a row is named in messages."""
+        return f"{self.original.path}:{line}"
+
+    def blocks(self) -> Iterator[Block | Broken]:
+        """Rows below the heading."""
+        gathering = Gathering(self.heading, [column.kind.text for column in self.heading])
+        with self.original.unchanged(), _open(self.original.path) as file:
+            rows = _rows(self.original.path, file)
+            next(rows)
+            for row in rows:
+                if isinstance(row, Broken):
+                    yield from gathering.broken(row)
+                elif len(row[1]) != len(self.heading):
+                    message = f"{len(row[1])} cells, expected {len(self.heading)} as in the heading"
+                    yield from gathering.broken(Broken(row[0], message))
+                elif gathering.add(*row):
+                    yield from gathering.flush()
+            yield from gathering.flush()
+
+
+def read(original: Original, columns: Columns) -> CsvFile:
+    """A CSV file; FileError where its heading does not name what is needed."""
+    with _open(original.path) as file:
+        first = next(_rows(original.path, file), Broken(1, "empty, expected a heading"))
+    if isinstance(first, Broken):
+        raise FileError(original.path, first.message, first.number)
+    line, titles = first
+    try:
+        return CsvFile(original, columns.heading([_title(title) for title in titles]))
+    except ValueError as fault:
+        separator = ", and commas between columns" if ";" in titles[0] else ""
+        raise FileError(original.path, f"{fault}{separator}", line) from fault
+
+
+def _open(path: Path) -> TextIO:
+    # What is no UTF-8 shall be found by its line.
+    return path.open(encoding="utf-8-sig", errors="surrogateescape", newline="")
+
+
+def _rows(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]] | Broken]:
+    """Line and cells of each row, blank ones left out."""
+    reader = csv.reader(lines(path, file.readline), strict=True, skipinitialspace=True)
+    while True:
+        line = reader.line_num + 1
+        try:
+            row = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as fault:
+            yield Broken(line, f"not CSV: {fault}")
+        else:
+            if row:
+                yield line, row
+
+
+def _title(title: str) -> str:
+    if not title.isprintable():
+        raise ValueError(f"{title!r} in the heading, expected text in UTF-8")
+    return title.strip()

@@ -1,0 +1,131 @@
+"""`posefield export`: many clips at once, to a folder or an object store."""
+
+import hashlib
+from pathlib import Path
+from typing import Annotated
+
+import orjson
+import typer
+
+from service.encode.convention import CENTIMETRES, METRES, Up
+from service.export import crew, layouts, queries, run
+from service.export.job import Job, Work
+from service.export.layouts import LAYOUTS
+from service.export.look import Look
+from service.export.queries import Asked
+from service.export.reading import Defaults
+from service.export.run import Outcome, Shard
+from service.motion.errors import InvalidField
+from service.synthesis import library, session
+from service.synthesis.question import FPS, POLICY, ClipQuestion, Policy
+
+UNITS = {"m": METRES.metres_per_unit, "cm": CENTIMETRES.metres_per_unit}
+
+
+def export(
+    model: Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")],
+    output: Annotated[str, typer.Option("--output", "-o", help="folder, or an object store's URL")],
+    table: Annotated[
+        Path | None,
+        typer.Argument(help="CSV, Parquet or JSON Lines, a row a clip", metavar="[QUERIES]"),
+    ] = None,
+    grid: Annotated[
+        list[str] | None,
+        typer.Option(help="instead: values of a control; every combination", metavar="NAME=VALUES"),
+    ] = None,
+    sample: Annotated[int | None, typer.Option(help="instead: so many points")] = None,
+    method: Annotated[str | None, typer.Option(help="of sampling, latin or hull")] = None,
+    seed: Annotated[int | None, typer.Option(help="of sampling")] = None,
+    form: Annotated[str, typer.Option("--format", help="where a row says none")] = "usdc",
+    layout: Annotated[str, typer.Option(help=f"one of {', '.join(LAYOUTS)}")] = "folder",
+    fps: Annotated[float, typer.Option(help="frames a second, where a row says none")] = FPS,
+    level: Annotated[int, typer.Option(help="of detail, where a row says none")] = 0,
+    performer: Annotated[str | None, typer.Option(help="who moves, where a row says none")] = None,
+    extrapolate: Annotated[
+        Policy, typer.Option(help="what to do with controls outside what was sampled")
+    ] = POLICY,
+    unit: Annotated[
+        str | None, typer.Option(help="of length, m or cm; what is usual in the format if not said")
+    ] = None,
+    up: Annotated[Up | None, typer.Option(help="axis; what is usual if not said")] = None,
+    chunk: Annotated[
+        int | None, typer.Option(help="rows done together, and clips of an archive")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="processes; one a core if not said")] = None,
+    shard: Annotated[
+        str, typer.Option(help="part I of N alone, from 0/N to N-1/N", metavar="I/N")
+    ] = "0/1",
+    skip_errors: Annotated[
+        bool, typer.Option("--skip-errors", help="leave rows at fault out, and list them")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="facts as JSON on standard output")] = False,
+) -> None:
+    """Write a clip for each row of a table, or for each point of a grid or a sampling.
+
+    What was broken off is gone on with by the same command, and ends with the same files.
+    """
+    content = session.read(model)
+    asked = Asked(table, tuple(grid or ()), sample, method, seed)
+    question = ClipQuestion({}, fps, extrapolate, performer=performer, level=level)
+    opened = library.opened(model, content)
+    source = queries.source(asked, Defaults(form, question), opened)
+    job = Job(
+        opened.identity,
+        hashlib.sha256(content).hexdigest(),
+        source.digest,
+        layout,
+        layouts.find(layout).chunk if chunk is None else chunk,
+        _metres(unit),
+        up,
+    )
+    with Look() as look:
+        work = Work(job, content, output, skip_errors)
+        outcome = run.run(work, source, look, _crew(workers), Shard.of(shard))
+    _end(output, outcome, look, json)
+
+
+def _metres(unit: str | None) -> float | None:
+    if unit is not None and unit not in UNITS:
+        raise InvalidField("unit", f"{unit!r}, expected one of {', '.join(UNITS)}")
+    return None if unit is None else UNITS[unit]
+
+
+def _crew(workers: int | None) -> crew.Crew:
+    if workers is not None and workers < 1:
+        raise InvalidField("workers", f"{workers}, expected 1 or more")
+    return crew.of(workers or crew.usable_cores())
+
+
+def _end(place: str, outcome: Outcome, look: Look, json: bool) -> None:
+    """Say what came of it; an export that was told to stop ends as whoever told it expects."""
+    if json:
+        facts = {
+            "target": place,
+            "rows": outcome.rows,
+            "done": outcome.done,
+            "seconds": look.pace.seconds,
+            "export": outcome.facts,
+        }
+        typer.echo(orjson.dumps(facts, option=orjson.OPT_INDENT_2))
+    typer.echo(_said(place, outcome, look), err=json)
+    if look.told and outcome.done < outcome.rows:
+        raise typer.Exit(128 + look.told)
+
+
+def _said(place: str, outcome: Outcome, look: Look) -> str:
+    if outcome.done < outcome.rows:
+        return (
+            f"{place}: stopped when {outcome.done} of {outcome.rows} clips were done; the same "
+            "command goes on from there"
+        )
+    if outcome.facts is None:
+        return f"{place}: the {outcome.rows} clips of this part are done, other parts are not yet"
+    facts = outcome.facts
+    said = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
+    if facts["warned"]:
+        said += f", {facts['warned']} of them outside what was sampled"
+    if facts["skipped"]:
+        said += f", {facts['skipped']} rows skipped and listed in skipped.jsonl"
+    if outcome.before:
+        return f"{said}; it was complete before"
+    return f"{said}, in {look.pace.seconds:.1f} s, {look.pace.rate:,.0f} a second"

@@ -1,0 +1,82 @@
+"""Questions for many clips as they travel: a JSON body to clips that have passed the door."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated
+
+import msgspec
+
+from service.encode import Encoder
+from service.export import naming
+from service.export.pack import Order
+from service.export.query import Query
+from service.motion.errors import InvalidField, QueryError
+from service.synthesis.question import Prospect
+from service.synthesis.synthesizer import Synthesizer
+from service.web import decoding, problems, query
+from service.web.problems import pointer
+from service.web.query import ClipBody
+from service.web.settings import Settings
+
+Name = Annotated[str, msgspec.Meta(pattern=naming.PATTERN)]
+
+
+class NamedClipBody(ClipBody, frozen=True):
+    """Schema NamedClipQuestion of the contract."""
+
+    name: Name | None = None
+
+
+class ClipsBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Schema ClipsQuestion of the contract."""
+
+    format: str
+    clips: list[NamedClipBody]
+
+
+_CLIPS = msgspec.json.Decoder(ClipsBody)
+
+
+def order(
+    model: Synthesizer, encoders: Mapping[str, Encoder], content: bytes, settings: Settings
+) -> Order:
+    """What a JSON body asks of a model, checked so far that nothing of it can be refused later.
+
+    RequestFault where it breaks the contract's form or one clip has no answer, InvalidField where
+    it asks for too much.
+    """
+    body = decoding.decoded(_CLIPS, content)
+    if body.format not in encoders:
+        detail = f"{body.format!r}, expected one of {', '.join(encoders)}"
+        raise decoding.bad_body(detail, pointer("format"))
+    if not 1 <= len(body.clips) <= settings.clips_limit:
+        expected = f"expected 1 to {settings.clips_limit}"
+        raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
+    queries = [_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
+    _check_names(queries)
+    prospects = _prospects(model, queries, settings.clips_poses)
+    encoder = encoders[body.format]
+    return Order(model, encoder, encoder.usual, queries, prospects)
+
+
+def _query(index: int, body: NamedClipBody, extension: str) -> Query:
+    within = "clips", str(index)
+    name = naming.numbered(index) if body.name is None else body.name
+    return Query(name, extension, query.clip_of(body, *within), pointer(*within))
+
+
+def _check_names(queries: Sequence[Query]) -> None:
+    for fault in naming.twice(each.name for each in queries):
+        raise problems.within(InvalidField("name", fault.message), pointer("clips", fault.place))
+
+
+def _prospects(model: Synthesizer, queries: Sequence[Query], most: int) -> list[Prospect]:
+    found, poses = [], 0
+    for each in queries:
+        try:
+            found.append(model.prospect(each.question))
+        except QueryError as error:
+            raise problems.within(error, each.place) from None
+        poses += found[-1].frames
+    if poses > most:
+        raise InvalidField("clips", f"{poses} frames in all, expected at most {most}")
+    return found

@@ -1,0 +1,137 @@
+"""Archives are what others read: the standard library, GNU tar and Info-ZIP."""
+
+import io
+import shutil
+import subprocess
+import tarfile
+import zipfile
+
+import pytest
+
+from service.encode import usdz
+from service.encode.packs import PACKS
+
+CONTENTS = {
+    "clip-000000.usdc": b"first" * 1000,
+    "empty.bvh": b"",
+    "block.json": b"{" * 512,
+    "00/clip.name_1.usdz": b"z" * 513,
+    "manifest.jsonl": b"{}\n",
+}
+LONG = {f"{'folder/' * 5}{'n' * 100}.usdc": b"one", f"{'d' * 90}/{'n' * 100}.usdc": b"two"}
+
+
+def packed(kind, contents):
+    return b"".join(PACKS[kind].write(contents.items()))
+
+
+def unpacked(kind, data):
+    """Names and contents in their order, by the standard library."""
+    if kind == "tar":
+        with tarfile.open(fileobj=io.BytesIO(data), mode="r:") as found:
+            return {m.name: found.extractfile(m).read() for m in found.getmembers()}
+    with zipfile.ZipFile(io.BytesIO(data)) as found:
+        return {name: found.read(name) for name in found.namelist()}
+
+
+@pytest.mark.parametrize("contents", [CONTENTS, LONG, {}], ids=["plain", "long", "none"])
+@pytest.mark.parametrize("kind", PACKS)
+def test_the_standard_library_reads_back_what_was_packed(kind, contents):
+    found = unpacked(kind, packed(kind, contents))
+    assert list(found.items()) == list(contents.items())
+
+
+def test_a_broken_byte_of_a_zip_is_found_out():
+    data = bytearray(packed("zip", CONTENTS))
+    data[data.index(b"firstfirst")] ^= 1
+    with pytest.raises(zipfile.BadZipFile):
+        unpacked("zip", bytes(data))
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_a_name_that_readers_differ_on_is_refused(kind):
+    with pytest.raises(ValueError, match="ascii"):
+        packed(kind, {"größe.usdc": b"three"})
+
+
+COMMANDS = {"tar": ("tar", "-xf"), "zip": ("unzip", "-q")}
+
+
+@pytest.mark.parametrize("contents", [CONTENTS, LONG], ids=["plain", "long"])
+@pytest.mark.parametrize("kind", PACKS)
+def test_command_lines_unpack_it_without_a_word(kind, contents, tmp_path):
+    program, option = COMMANDS[kind]
+    if shutil.which(program) is None:
+        pytest.skip(f"no {program} here")
+    path = tmp_path / f"clips.{kind}"
+    path.write_bytes(packed(kind, contents))
+    command = [program, option, str(path)]
+    environ = {"PATH": "/usr/bin:/bin", "LC_ALL": "C.UTF-8"}
+    done = subprocess.run(command, cwd=tmp_path, env=environ, capture_output=True, check=True)
+    assert done.stdout == done.stderr == b""
+    for name, content in contents.items():
+        assert (tmp_path / name).read_bytes() == content
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_the_same_files_are_the_same_bytes(kind):
+    assert packed(kind, CONTENTS) == packed(kind, dict(CONTENTS))
+    assert packed(kind, CONTENTS) != packed(kind, dict(reversed(CONTENTS.items())))
+
+
+def test_nobody_owns_what_a_tar_holds_and_no_clock_is_read():
+    with tarfile.open(fileobj=io.BytesIO(packed("tar", CONTENTS)), mode="r:") as found:
+        for member in found:
+            assert (member.uid, member.gid, member.uname, member.gname) == (0, 0, "", "")
+            assert (member.mtime, member.mode) == (315532800, 0o644)
+    with zipfile.ZipFile(io.BytesIO(packed("zip", CONTENTS))) as found:
+        assert {entry.date_time for entry in found.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_pieces_come_before_the_next_file_is_made(kind):
+    made = []
+
+    def members():
+        for number in range(3):
+            made.append(number)
+            yield f"{number}", b"content"
+
+    pieces = PACKS[kind].write(members())
+    sent = b""
+    while b"content" not in sent:
+        sent += next(pieces)
+    assert made == [0]
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_an_archive_that_breaks_off_has_no_end(kind):
+    cut = packed(kind, CONTENTS)
+    cut = cut[: cut.index(b"z" * 513) + 100]
+    with pytest.raises((zipfile.BadZipFile, tarfile.ReadError)):
+        unpacked(kind, cut)
+
+
+@pytest.mark.parametrize("count", [65_534, 65_535, 70_000])
+def test_a_zip_may_have_more_files_than_sixteen_bits_count(count):
+    data = packed("zip", {f"{number}": b"" for number in range(count)})
+    assert (b"PK\6\6" in data) == (count >= 65_535)
+    with zipfile.ZipFile(io.BytesIO(data)) as found:
+        assert len(found.namelist()) == count
+        assert found.read(f"{count - 1}") == b""
+
+
+def test_a_zip_may_be_larger_than_thirty_two_bits_count(tmp_path):
+    path, gap = tmp_path / "large.zip", 2200 * 1024 * 1024
+    # Gaps in the file stand for two members of 2.2 GiB, whose checksums nobody looks at here.
+    holes = [usdz.Member(f"hole{i}", gap, 0, (None,)) for i in range(2)]
+    members = [usdz.whole("first", b"start"), *holes, usdz.whole("last", b"beyond")]
+    with path.open("wb") as out:
+        for piece in usdz.archive(members):
+            out.seek(gap, 1) if piece is None else out.write(piece)
+    with zipfile.ZipFile(path) as found:
+        assert [e.header_offset > 2**32 for e in found.infolist()] == [False, False, False, True]
+        assert (found.read("first"), found.read("last")) == (b"start", b"beyond")
+    if shutil.which("unzip"):
+        shown = subprocess.run(["unzip", "-p", path, "last"], capture_output=True, check=True)
+        assert shown.stdout == b"beyond" and shown.stderr == b""

@@ -1,0 +1,84 @@
+"""Small exports for tests: queries held in memory, a watch that looks on, a folder's content."""
+
+import hashlib
+from dataclasses import replace
+
+import orjson
+
+from service.export.job import Job, Work
+from service.export.query import KEPT, Fault, Query, Survey
+from service.synthesis.question import ClipQuestion
+
+CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+
+
+class Listed:
+    """Source of rows at hand."""
+
+    def __init__(self, rows):
+        self.listed = list(rows)
+        self.count = len(self.listed)
+        self.digest = hashlib.sha256(repr(self.listed).encode()).hexdigest()
+
+    def survey(self):
+        faults = tuple(row for row in self.listed if isinstance(row, Fault))
+        return Survey(len(self.listed), len(faults), faults[:KEPT])
+
+    def rows(self):
+        return iter(self.listed)
+
+
+class Watching:
+    """Watch that remembers what it was told, and stops after some chunks if it should."""
+
+    def __init__(self, most=10**9):
+        self.most, self.begun, self.parts = most, None, []
+
+    def begin(self, total, done):
+        self.begun = (total, done)
+
+    def advance(self, part):
+        self.parts.append(part)
+
+    def stopped(self):
+        return len(self.parts) >= self.most
+
+
+def question(**more):
+    """What is asked of the small model, with more said of it."""
+    return ClipQuestion(CONTROLS, **more)
+
+
+def queries(count, form="json", fps=30.0):
+    """Source of so many clips, each turned a little further than the last."""
+    return Listed(
+        Query(
+            f"clip-{n:04d}",
+            form,
+            ClipQuestion({**CONTROLS, "turn": 30.0 * n / count}, fps=fps),
+            f"line {n + 2}",
+        )
+        for n in range(count)
+    )
+
+
+def work(model, source, target, chunk=8, layout="folder", **more):
+    """Work of a small job."""
+    content = model.read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    job = Job(f"{model.stem}@{digest[:16]}", digest, source.digest, layout, chunk)
+    return replace(Work(job, content, str(target)), **more)
+
+
+def content(folder):
+    """Bytes of every file under a folder, by path."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def lines(path):
+    """Values of a file of JSON Lines."""
+    return [orjson.loads(line) for line in path.read_bytes().splitlines()]

@@ -1,0 +1,174 @@
+"""Exports that are killed, interrupted or out of room: whole files only, and the same bytes after.
+
+Each runs as a process of its own, by the command that a user types.
+"""
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import exporting
+import pytest
+from typer.testing import CliRunner
+
+from service import cli
+
+CLIPS, CHUNK = 480, 4
+POSEFIELD = Path(sys.executable).parent / "posefield"
+PARTS = ".posefield/parts"
+
+
+@pytest.fixture(scope="module")
+def command(model_path):
+    """Words of a command that exports to a target; about a second's work."""
+
+    def words(target, *more):
+        sample = ("--sample", str(CLIPS), "--seed", "3", "--format", "json", "--fps", "60")
+        chunk = ("--chunk", str(CHUNK), "-o", str(target))
+        return [str(POSEFIELD), "export", str(model_path), *sample, *chunk, *map(str, more)]
+
+    return words
+
+
+@pytest.fixture(scope="module")
+def undisturbed(command, tmp_path_factory):
+    """Content of the export, by path, done by one process."""
+    target = tmp_path_factory.mktemp("undisturbed")
+    subprocess.run(command(target, "--workers", 1), check=True, capture_output=True)
+    return exporting.content(target)
+
+
+def begun(words, **more):
+    """The command as a process, and the leader of a group of its own."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(words, start_new_session=True, **pipes, **more)
+
+
+def parts(target):
+    folder = target / PARTS
+    return len(list(folder.iterdir())) if folder.exists() else 0
+
+
+def wait_for_parts(target, number, process):
+    """Wait until so many chunks are done; the process must still be at work then."""
+    while parts(target) < number and process.poll() is None:
+        time.sleep(0.001)
+    assert process.poll() is None, process.communicate()
+
+
+def workers_of(process):
+    """Process ids of the workers of an export."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    return [int(c) for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+
+
+def whole(target, undisturbed):
+    """Number of clips in a target, each of which is as it should be."""
+    found = exporting.content(target / "clips")
+    assert all(undisturbed[f"clips/{path}"] == content for path, content in found.items())
+    return len(found)
+
+
+def go_on(words):
+    """The rest of an export by the same command, in this process."""
+    done = CliRunner().invoke(cli.app, [*words[1:], "--workers", "1"])
+    assert done.exit_code == 0, done.output
+
+
+def test_killed_ten_times_it_ends_with_the_same_bytes(command, undisturbed, tmp_path):
+    chance, left_behind = random.Random(5), 0
+    for attempt in range(10):
+        process = begun(command(tmp_path, "--workers", 1 + attempt % 2))
+        wait_for_parts(tmp_path, parts(tmp_path) + chance.randrange(1, 5), process)
+        time.sleep(chance.uniform(0.0, 0.01))
+        # The parent alone, whose workers must end by themselves, or all at once.
+        kill = os.kill if attempt % 4 == 1 else os.killpg
+        kill(process.pid, signal.SIGKILL)
+        process.communicate()
+        assert process.returncode == -signal.SIGKILL
+        whole(tmp_path, undisturbed)
+        left_behind = len(list(tmp_path.glob(".posefield/writing/*")))
+    assert 0 < parts(tmp_path) < CLIPS // CHUNK
+    assert not (tmp_path / "manifest.jsonl").exists()
+    # Some were killed while they wrote: a file that is not whole could have been seen.
+    assert left_behind
+    go_on(command(tmp_path))
+    assert exporting.content(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_told_to_stop_it_says_how_to_go_on(told, workers, command, undisturbed, tmp_path):
+    process = begun(command(tmp_path, "--workers", workers))
+    wait_for_parts(tmp_path, 5, process)
+    # As a terminal does: the whole group is told.
+    os.killpg(process.pid, told)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 128 + told, err
+    done = CHUNK * parts(tmp_path)
+    assert f"stopped when {done} of {CLIPS} clips were done; the same command goes on" in out
+    assert "Traceback" not in err
+    assert CLIPS > whole(tmp_path, undisturbed) >= done > 0
+    assert not (tmp_path / "export.json").exists()
+    go_on(command(tmp_path))
+    assert exporting.content(tmp_path) == undisturbed
+
+
+def test_a_worker_that_dies_ends_it_clearly(command, undisturbed, tmp_path):
+    process = begun(command(tmp_path, "--workers", 2))
+    wait_for_parts(tmp_path, 5, process)
+    os.kill(workers_of(process)[0], signal.SIGKILL)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (5, "")
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("posefield: a process of the export has died; what is done stays")
+    assert "Traceback" not in err
+    assert whole(tmp_path, undisturbed) < CLIPS
+    go_on(command(tmp_path))
+    assert exporting.content(tmp_path) == undisturbed
+
+
+def test_workers_end_with_a_parent_that_was_killed(command, tmp_path):
+    process = begun(command(tmp_path, "--workers", 2))
+    wait_for_parts(tmp_path, 5, process)
+    workers = workers_of(process)
+    assert len(workers) == 2
+    process.kill()
+    process.communicate()
+    until = time.monotonic() + 10.0
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < until, "a worker lives on"
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_where_no_more_can_be_written_it_names_the_file(workers, command, undisturbed, tmp_path):
+    """As on a full disk: the system writes a part of a file and refuses the rest."""
+    sizes = [len(c) for path, c in sorted(undisturbed.items()) if path.startswith("clips")]
+    room = max(sizes[:20])
+    assert room < max(sizes)
+    process = begun(
+        command(tmp_path, "--workers", workers),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+    )
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (3, "")
+    last = err.strip().splitlines()[-1]
+    assert last.startswith(f"posefield: {tmp_path}/clips/000/")
+    assert last.endswith(".json: cannot be written or read: File too large")
+    assert 0 < whole(tmp_path, undisturbed) < CLIPS
+    go_on(command(tmp_path))
+    assert exporting.content(tmp_path) == undisturbed
+
+
+def test_two_at_once_do_each_other_no_harm(command, undisturbed, tmp_path):
+    both = [begun(command(tmp_path, "--workers", 1)) for _ in range(2)]
+    for process in both:
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 0, err
+    assert exporting.content(tmp_path) == undisturbed

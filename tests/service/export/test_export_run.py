@@ -1,0 +1,223 @@
+"""An export comes to the same bytes however it is done, and says what it did."""
+
+import hashlib
+import json
+import shutil
+
+import exporting
+import pytest
+
+from service.encode import ENCODERS
+from service.export import crew, run
+from service.export.layouts import path
+from service.export.query import Fault, Query
+from service.export.run import Shard
+from service.motion.errors import FileError, InvalidField
+from service.synthesis import library
+
+ROWS = 30
+
+
+@pytest.fixture(scope="module")
+def source():
+    return exporting.queries(ROWS)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(source, model_path, tmp_path_factory):
+    """Folder of a whole export, done in one go."""
+    target = tmp_path_factory.mktemp("undisturbed") / "made" / "here"
+    watch = exporting.Watching()
+    outcome = run.run(exporting.work(model_path, source, target), source, watch)
+    assert (outcome.rows, outcome.done, outcome.before) == (ROWS, ROWS, False)
+    assert watch.begun == (ROWS, 0)
+    assert [part.clips for part in watch.parts] == [8, 8, 8, 6]
+    return target
+
+
+def test_every_query_has_a_file_that_the_encoder_would_make(undisturbed, source, model_path):
+    synthesizer = library.load([model_path]).models["reaching"]
+    for query in source.rows():
+        expected = ENCODERS["json"].encode(synthesizer.clip(query.question))
+        assert (undisturbed / f"clips/000/{query.name}.json").read_bytes() == expected
+    assert len(list((undisturbed / "clips/000").iterdir())) == ROWS
+
+
+def test_the_manifest_is_true(undisturbed, source):
+    lines = exporting.lines(undisturbed / "manifest.jsonl")
+    assert [line["name"] for line in lines] == [query.name for query in source.rows()]
+    for line, query in zip(lines, source.rows(), strict=True):
+        content = (undisturbed / line["file"]).read_bytes()
+        assert line["bytes"] == len(content)
+        assert line["sha256"] == hashlib.sha256(content).hexdigest()
+        assert line["controls"] == query.question.controls
+        assert line["sigma"] > 0.0
+
+
+def test_the_export_says_what_it_is(undisturbed, source, model_path):
+    facts = json.loads((undisturbed / "export.json").read_text())
+    assert facts["content"] == hashlib.sha256(model_path.read_bytes()).hexdigest()
+    assert facts["queries"] == source.digest
+    assert (facts["clips"], facts["skipped"], facts["warned"]) == (ROWS, 0, 0)
+    assert facts["bytes"] == sum(f.stat().st_size for f in undisturbed.glob("clips/*/*"))
+    assert set(facts["versions"]) == {"posefield", "numpy", "onnxruntime", "usd-core"}
+
+
+def test_nothing_else_is_left(undisturbed):
+    assert {path.name for path in undisturbed.iterdir()} == {
+        "clips",
+        "manifest.jsonl",
+        "export.json",
+    }
+
+
+def test_folders_hold_a_thousand_files_at_most():
+    assert path(999, "a", "usdc") == "clips/000/a.usdc"
+    assert path(1000, "b", "usdc") == "clips/001/b.usdc"
+    assert path(1_234_567, "c", "glb") == "clips/1234/c.glb"
+
+
+@pytest.mark.parametrize("workers", [2, 3])
+def test_processes_make_the_same_bytes(workers, undisturbed, source, model_path, tmp_path):
+    work = exporting.work(model_path, source, tmp_path)
+    outcome = run.run(work, source, exporting.Watching(), crew.of(workers))
+    assert outcome.done == ROWS
+    assert exporting.content(tmp_path) == exporting.content(undisturbed)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
+def test_shards_in_any_order_make_the_whole(order, undisturbed, source, model_path, tmp_path):
+    work = exporting.work(model_path, source, tmp_path)
+    outcomes = [
+        run.run(work, source, exporting.Watching(), shard=Shard(index, 3)) for index in order
+    ]
+    assert [outcome.facts is None for outcome in outcomes] == [True, True, False]
+    assert exporting.content(tmp_path) == exporting.content(undisturbed)
+
+
+def test_what_is_complete_is_left_as_it_is(undisturbed, source, model_path):
+    before = {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")}
+    watch = exporting.Watching()
+    outcome = run.run(exporting.work(model_path, source, undisturbed), source, watch)
+    assert (outcome.before, outcome.done, watch.begun) == (True, ROWS, None)
+    assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")} == before
+
+
+@pytest.mark.parametrize("stop", [1, 2, 3])
+def test_what_was_stopped_goes_on(stop, undisturbed, source, model_path, tmp_path):
+    work = exporting.work(model_path, source, tmp_path)
+    outcome = run.run(work, source, exporting.Watching(stop))
+    assert (outcome.done, outcome.facts) == (8 * stop, None)
+    watch = exporting.Watching()
+    assert run.run(work, source, watch).facts is not None
+    assert watch.begun == (ROWS, 8 * stop)
+    assert exporting.content(tmp_path) == exporting.content(undisturbed)
+
+
+@pytest.mark.parametrize("harm", [lambda path: path.unlink(), lambda path: path.write_bytes(b"")])
+def test_a_chunk_whose_files_have_gone_is_done_again(
+    harm, undisturbed, source, model_path, tmp_path
+):
+    work = exporting.work(model_path, source, tmp_path)
+    run.run(work, source, exporting.Watching(2))
+    harm(tmp_path / "clips/000/clip-0003.json")
+    watch = exporting.Watching()
+    run.run(work, source, watch)
+    assert watch.begun == (ROWS, 8)
+    assert exporting.content(tmp_path) == exporting.content(undisturbed)
+
+
+def test_another_export_is_refused_and_left(source, model_path, tmp_path):
+    run.run(exporting.work(model_path, source, tmp_path), source, exporting.Watching(1))
+    before, others = exporting.content(tmp_path), exporting.queries(ROWS - 1)
+    with pytest.raises(FileError, match="holds another export, whose queries differ"):
+        run.run(exporting.work(model_path, others, tmp_path), others, exporting.Watching())
+    with pytest.raises(FileError, match="holds another export, whose chunk differ"):
+        run.run(exporting.work(model_path, source, tmp_path, 9), source, exporting.Watching())
+    assert exporting.content(tmp_path) == before
+
+
+def test_a_complete_export_of_another_job_is_refused(undisturbed, model_path):
+    others = exporting.queries(ROWS - 1)
+    with pytest.raises(FileError, match="holds another export, whose queries differ"):
+        run.run(exporting.work(model_path, others, undisturbed), others, exporting.Watching())
+
+
+@pytest.mark.parametrize("name", ["mine.txt", "export.json"])
+def test_a_folder_of_something_else_is_refused_and_left(name, source, model_path, tmp_path):
+    (tmp_path / name).write_text("{}")
+    with pytest.raises(FileError, match=r"no export's|facts cannot be read"):
+        run.run(exporting.work(model_path, source, tmp_path), source, exporting.Watching())
+    assert exporting.content(tmp_path) == {name: b"{}"}
+
+
+def test_a_file_is_no_target(source, model_path, tmp_path):
+    place = tmp_path / "file"
+    place.write_text("mine")
+    with pytest.raises(FileError, match="Not a directory"):
+        run.run(exporting.work(model_path, source, place), source, exporting.Watching())
+    assert place.read_text() == "mine"
+
+
+def spoilt(source):
+    """The same rows, of which one is no query and another makes no sense only when asked."""
+    rows = list(source.rows())
+    rows[4] = Fault("line 6", "fps: 'often', expected a number")
+    late = Query("late", "json", exporting.question(end=50.0), "line 13")
+    rows[11] = late
+    return exporting.Listed(rows)
+
+
+def test_rows_at_fault_end_it_before_anything_is_written(source, model_path, tmp_path):
+    bad = spoilt(source)
+    with pytest.raises(InvalidField, match=r"1 rows cannot be .*\n  line 6: fps: 'often'"):
+        run.run(exporting.work(model_path, bad, tmp_path / "t"), bad, exporting.Watching())
+    assert not (tmp_path / "t").exists()
+
+
+def test_rows_at_fault_are_skipped_and_listed(source, model_path, tmp_path):
+    bad = spoilt(source)
+    work = exporting.work(model_path, bad, tmp_path, skip=True)
+    outcome = run.run(work, bad, exporting.Watching(), crew.of(2))
+    assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 2)
+    skipped = exporting.lines(tmp_path / "skipped.jsonl")
+    assert [fault["place"] for fault in skipped] == ["line 6", "line 13"]
+    assert skipped[1]["message"].startswith("end: 50 s, expected")
+    names = [line["name"] for line in exporting.lines(tmp_path / "manifest.jsonl")]
+    assert len(names) == ROWS - 2 and "late" not in names
+
+
+def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp_path):
+    rows = [row for row in spoilt(source).rows() if not isinstance(row, Fault)]
+    bad = exporting.Listed(rows)
+    work = exporting.work(model_path, bad, tmp_path)
+    for by in (crew.alone, crew.of(2)):
+        with pytest.raises(InvalidField, match=r"1 rows cannot be answered.*\n  line 13: end: 50"):
+            run.run(work, bad, exporting.Watching(), by)
+        assert not (tmp_path / "manifest.jsonl").exists()
+    watch = exporting.Watching()
+    outcome = run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, watch)
+    assert watch.begun[1] >= 8
+    assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 1)
+
+
+def test_queries_of_which_none_can_be_answered_are_refused(model_path, tmp_path):
+    bad = exporting.Listed([Fault("line 2", "no")])
+    with pytest.raises(InvalidField, match="no row that can be answered"):
+        run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, exporting.Watching())
+
+
+def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_path, tmp_path):
+    model = shutil.copy(model_path, tmp_path / "reaching.onnx")
+    work = exporting.work(model, source, tmp_path / "target")
+    watch = exporting.Watching()
+    watch.advance = lambda part: model.write_bytes(b"another")
+    assert run.run(work, source, watch, crew.of(2)).facts is not None
+    assert model.read_bytes() == b"another"
+    assert exporting.content(tmp_path / "target") == exporting.content(undisturbed)
+
+
+@pytest.mark.parametrize(("index", "count"), [(-1, 2), (2, 2), (0, 0)])
+def test_a_shard_that_there_is_not_is_refused(index, count):
+    with pytest.raises(InvalidField, match="shard"):
+        Shard(index, count)

@@ -1,0 +1,46 @@
+"""Errors cross from one process to another with all that they say."""
+
+import pickle
+
+import pytest
+
+from service.motion import errors
+from service.motion.errors import FileError, InvalidField, MotionError, WorkerDied
+
+
+def every(kind):
+    return [kind, *(child for own in kind.__subclasses__() for child in every(own))]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        *(kind("/a/file", "found x, expected y", 7) for kind in every(FileError)),
+        *(kind("fps", "0, expected more", 3) for kind in every(errors.QueryError)),
+        *(kind("no model") for kind in every(errors.TrainingError)),
+        WorkerDied("gone"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_are_the_same_in_another_process(error):
+    told = pickle.loads(pickle.dumps(error))
+    assert type(told) is type(error)
+    assert (str(told), vars(told)) == (str(error), vars(error))
+
+
+def test_what_says_nothing_of_it_would_not_arrive():
+    """Negative control: without a word on how it is made anew, an error of two arguments fails."""
+
+    class Plain(MotionError):
+        def __init__(self, path, message):
+            super().__init__(f"{path}: {message}")
+
+    globals()["Plain"] = Plain
+    Plain.__qualname__ = "Plain"
+    content = pickle.dumps(Plain("a", "b"))
+    with pytest.raises(TypeError):
+        pickle.loads(content)
+
+
+def test_a_field_keeps_its_index():
+    assert pickle.loads(pickle.dumps(InvalidField("fps", "no", 4))).index == 4
