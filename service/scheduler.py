@@ -65,10 +65,10 @@ def differences(found: Mapping[str, str], expected: Mapping[str, str]) -> str:
 
 
 def killed(fault: KilledWorker) -> str:
-    """In words that every worker which took up a job died of it."""
+    """In words that the workers which took up a job died, so that no more are given it."""
     return (
-        f"{fault.allowed_failures + 1} workers died one after the other at the same job, the last "
-        f"was {fault.last_worker.address}: out of memory?"
+        f"workers died at the same job {fault.allowed_failures + 1} times, the last was "
+        f"{fault.last_worker.address}: out of memory?"
     )
 
 
@@ -98,7 +98,7 @@ def _client(address: str, timeout: float) -> Client:
         message = "no address of a Dask scheduler, expected one such as tcp://host:8786"
         raise ClusterError(address, message) from fault
     try:
-        return Client(address, timeout=timeout, set_as_default=False)  # type: ignore[no-untyped-call]
+        return Client(address, timeout=timeout, set_as_default=False)
     except OSError as fault:
         raise ClusterError(address, f"no Dask scheduler answers within {timeout:g} s") from fault
 

@@ -97,6 +97,9 @@ class ClusterError(MotionError):
         self.address = address
         self.message = message
 
+    def __reduce__(self) -> tuple[type["ClusterError"], tuple[str, str]]:
+        return type(self), (self.address, self.message)
+
 
 class WorkerDied(MotionError):
     """A process that did a part of the work has gone: killed, or out of memory."""
