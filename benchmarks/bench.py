@@ -13,6 +13,7 @@ from pathlib import Path
 
 import crowd
 import crowd_usd
+import export
 import newcomer
 import paper
 import precompute
@@ -30,11 +31,14 @@ def main() -> None:
     made = table1_family.make(ROOT / "build/bench/reaching")
     table1 = table1_measure.of(made, table1_measure.POINTS, rounds=7)
     print(table1_text.text(table1), end="\n\n")
+    model = ROOT / "build/bench/reaching.onnx"
+    model.write_bytes(made.exported.content)
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),
+        *export.rows(model),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))

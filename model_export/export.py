@@ -151,6 +151,7 @@ def _card(
         feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
+        roles={str(role): joint for role, joint in recipe.roles.items()},
     )
 
 

@@ -131,7 +131,8 @@ def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
 def _needed(recipe: Recipe) -> set[str]:
     """Joints that a recipe speaks of."""
     event = {recipe.event.joint} if recipe.event else set()
-    return {*recipe.motion.joint_weights, *recipe.motion.feet} | event
+    motion = recipe.motion
+    return {*motion.joint_weights, *motion.feet, *recipe.roles.values()} | event
 
 
 def _landmarks(row: Row, last: int) -> tuple[float, ...]:

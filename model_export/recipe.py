@@ -15,10 +15,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from service.motion.errors import RecipeError
+from service.motion.roles import Role
 
 # Parameters that a clip query has besides the controls.
 RESERVED = frozenset(
-    {"fps", "start", "end", "time", "times", "extrapolate", "performer", "level", "format"}
+    "fps start end time times extrapolate performer level format names root loop unit up".split()
 )
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Text = Annotated[str, Field(min_length=1)]
@@ -272,6 +273,11 @@ class Recipe(_Part):
     alignment: Alignment = Alignment()
     kriging: Kriging = Kriging()
     event: Event | None = None
+    roles: dict[Role, Text] = Field(
+        default={},
+        description="joints by the part that each plays, for whoever wants the names of Mixamo, "
+        "Unreal, VRM or HumanIK",
+    )
     size: Size
 
     @model_validator(mode="after")
@@ -288,6 +294,15 @@ class Recipe(_Part):
         if twice:
             raise ValueError(f"controls named twice: {sorted(twice)}")
         return controls
+
+    @field_validator("roles")
+    @classmethod
+    def _one_role_a_joint(cls, roles: dict[Role, str]) -> dict[Role, str]:
+        joints = list(roles.values())
+        twice = sorted({joint for joint in joints if joints.count(joint) > 1})
+        if twice:
+            raise ValueError(f"joints with two roles: {twice}, expected one each")
+        return roles
 
     @model_validator(mode="after")
     def _event_is_known(self) -> "Recipe":

@@ -17,8 +17,9 @@ from service.export.queries import Asked
 from service.export.reading import Defaults
 from service.export.run import Outcome, Shard
 from service.motion.errors import InvalidField
+from service.motion.roles import Names
 from service.synthesis import library, session
-from service.synthesis.question import FPS, POLICY, ClipQuestion, Policy
+from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
 
 UNITS = {"m": METRES.metres_per_unit, "cm": CENTIMETRES.metres_per_unit}
 
@@ -45,6 +46,11 @@ def export(
     extrapolate: Annotated[
         Policy, typer.Option(help="what to do with controls outside what was sampled")
     ] = POLICY,
+    names: Annotated[Names, typer.Option(help="what joints are called")] = NAMES,
+    root: Annotated[Root, typer.Option(help="travelling, or in place")] = ROOT,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="cycles that end with the frame they begin with")
+    ] = False,
     unit: Annotated[
         str | None, typer.Option(help="of length, m or cm; what is usual in the format if not said")
     ] = None,
@@ -74,7 +80,16 @@ def export(
     """
     content = session.read(model)
     asked = Asked(table, tuple(grid or ()), sample, method, seed)
-    question = ClipQuestion({}, fps, extrapolate, performer=performer, level=level)
+    question = ClipQuestion(
+        {},
+        fps,
+        extrapolate,
+        performer=performer,
+        level=level,
+        names=names,
+        root=root,
+        loop=loop,
+    )
     opened = library.opened(model, content)
     source = queries.source(asked, Defaults(form, question), opened)
     job = Job(
@@ -140,13 +155,13 @@ def _said(place: str, outcome: Outcome, look: Look) -> str:
             "command goes on from there"
         )
     if outcome.facts is None:
-        return f"{place}: the {outcome.rows} clips of this part are done, other parts are not yet"
+        return f"{place}: clips of this part: {outcome.rows}, all done; other parts are not yet"
     facts = outcome.facts
     said = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
         said += f", {facts['warned']} of them outside what was sampled"
     if facts["skipped"]:
-        said += f", {facts['skipped']} rows skipped and listed in skipped.jsonl"
+        said += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
     if outcome.before:
         return f"{said}; it was complete before"
     return f"{said}, in {look.pace.seconds:.1f} s, {look.pace.rate:,.0f} a second"

@@ -13,8 +13,8 @@ from service.export.columns import CONTROL
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.synthesis import limits
+from service.synthesis.course import RATES
 from service.synthesis.question import ClipQuestion
-from service.synthesis.synthesizer import RATES
 
 Values = Mapping[str, Sequence[Any]]
 

@@ -21,8 +21,9 @@ from service.motion.errors import InvalidField, QueryError
 from service.synthesis import session
 from service.synthesis.synthesizer import Synthesizer
 
-BATCH = 64
-"""Clips that are held at once: enough to share what their files have in common."""
+CLIPS, POSES = 64, 8192
+"""Clips and poses that are held at once, but for a clip that alone has more: enough to share what
+their files have in common."""
 
 Stopped = Callable[[], bool]
 """Whether everything should stop; what was begun is put away."""
@@ -62,7 +63,8 @@ def refusal(count: int, faults: Sequence[Fault]) -> InvalidField:
     """What to say of rows that are no queries; of a count of them, the first are at hand."""
     said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:KEPT])
     more = f"\n  and {count - KEPT} more" if count > KEPT else ""
-    return InvalidField("queries", f"{count} rows cannot be answered:{said}{more}")
+    found = f"rows that cannot be answered: {count} (--skip-errors leaves them out)"
+    return InvalidField("queries", f"{found}:{said}{more}")
 
 
 @dataclass(frozen=True)
@@ -83,31 +85,40 @@ class _Chunk:
 
     def batches(self, stopped: Stopped) -> Iterator[list[File]]:
         """Files of the rows that can be answered, in order."""
-        rows = self.task.rows
-        for at in range(0, len(rows), BATCH):
-            if stopped():
-                raise Stop
-            yield self._files(at, rows[at : at + BATCH])
+        made: list[_Made] = []
+        poses = 0
+        for one in self._made(stopped):
+            made.append(one)
+            poses += len(one.answer.clip)
+            if len(made) == CLIPS or poses >= POSES:
+                yield self._files(made)
+                made, poses = [], 0
+        yield self._files(made)
 
-    def _files(self, at: int, rows: tuple[Query | Fault, ...]) -> list[File]:
-        made = list(self._made(at, rows))
+    def _files(self, made: list[_Made]) -> list[File]:
         contents = self._contents(made)
         return [
             File(one.path, content, manifest.entry(one.query.name, one.path, content, one.answer))
             for one, content in zip(made, contents, strict=True)
         ]
 
-    def _made(self, at: int, rows: tuple[Query | Fault, ...]) -> Iterator[_Made]:
-        for number, row in enumerate(rows, self.task.first + at):
+    def _made(self, stopped: Stopped) -> Iterator[_Made]:
+        for number, row in enumerate(self.task.rows, self.task.first):
+            if stopped():
+                raise Stop
             if isinstance(row, Fault):
-                self.faults.append(row)
+                self._note(row.place, row.message)
                 continue
             try:
                 answer = self.synthesizer.clip(row.question)
             except QueryError as fault:
-                self.faults.append(Fault(row.place, str(fault)))
+                self._note(row.place, str(fault))
             else:
                 yield _Made(path(number, row.name, row.format), row, answer)
+
+    def _note(self, place: str, message: str) -> None:
+        # In which folder a table lies is no part of the job, so that it must not show in its files.
+        self.faults.append(Fault(place.rpartition("/")[2], message))
 
     def _contents(self, made: list[_Made]) -> list[bytes]:
         """Files of the clips, those of a format made together."""

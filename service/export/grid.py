@@ -93,9 +93,9 @@ def _axis(text: str, columns: Columns) -> Axis:
 
 
 def _values(column: Column, text: str) -> list[Any]:
+    # One by one, so that a fault names its value.
     if ":" in text and isinstance(column.kind, Number | Whole):
-        return column.read(column.kind.values, _steps(text))
-    # One by one, so that the fault names the value.
+        return [column.read(column.kind.values, [value])[0] for value in _steps(text)]
     values = [column.read(column.kind.text, [cell])[0] for cell in text.split(",")]
     if None in values:
         raise ValueError(f"an empty value, expected {column.kind.expected}")
@@ -104,11 +104,11 @@ def _values(column: Column, text: str) -> list[Any]:
 
 def _steps(text: str) -> list[float]:
     """Numbers of start:stop:count, evenly apart; ValueError."""
-    words = text.split(":")
-    if len(words) != 3:
-        raise ValueError(f"{text!r}, expected START:STOP:COUNT")
-    start, stop = Number().text(words[:2])
-    count = Whole().text(words[2:])[0]
+    try:
+        start, stop, steps = Number().text(text.split(":"))
+        (count,) = Whole().values([steps])
+    except ValueError as fault:
+        raise ValueError(f"{text!r}, expected START:STOP:COUNT") from fault
     if start is None or stop is None or count is None or not 2 <= count <= MOST_STEPS:
         raise ValueError(f"{text!r}, expected START:STOP:COUNT with a COUNT of 2 to {MOST_STEPS}")
     return [float(value) for value in np.linspace(start, stop, count)]

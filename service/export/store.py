@@ -6,7 +6,7 @@ store's own tools take: AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID and the like in the 
 
 import asyncio
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -53,15 +53,18 @@ class Store:
         """Put one file that comes in pieces; its size in bytes."""
         sizes: list[int] = []
         with _said(self._url(path)):
-            obstore.put(
-                self._store,
-                path,
-                _counted(pieces, sizes),
-                use_multipart=True,
-                chunk_size=PIECE,
-                max_concurrency=AT_ONCE,
-            )
+            asyncio.run(self._stream(path, _counted(pieces, sizes)))
         return sum(sizes)
+
+    async def _stream(self, path: str, pieces: AsyncIterator[bytes]) -> None:
+        await obstore.put_async(
+            self._store,
+            path,
+            pieces,
+            use_multipart=True,
+            chunk_size=PIECE,
+            max_concurrency=AT_ONCE,
+        )
 
     def create(self, path: str, content: bytes) -> bool:
         """Put a file where there is none; False, and nothing done, where there is one."""
@@ -106,7 +109,8 @@ class Store:
         return f"{self.url}/{path}"
 
 
-def _counted(pieces: Iterable[bytes], sizes: list[int]) -> Iterator[bytes]:
+async def _counted(pieces: Iterable[bytes], sizes: list[int]) -> AsyncIterator[bytes]:
+    # Taken in the loop of this thread, which may ask the store for other things meanwhile.
     for piece in pieces:
         sizes.append(len(piece))
         yield piece

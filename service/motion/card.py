@@ -6,11 +6,12 @@ under a key that begins with "posefield."; `FORMAT` changes whenever an older re
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
+from service.motion import roles
 from service.motion.detail import Level
 from service.motion.skeleton import Skeleton
 
@@ -46,7 +47,8 @@ class ModelCard:
     performers are not told apart. examples (N, d): controls of the captured clips; moved_by (N,):
     whose each is, by place among the performers, empty where they are not told apart. feet: indices
     of the joints that stand on the ground, empty where nobody said. diagnostics: what training
-    measured. provenance: recipe, hashes of the data, versions, licence.
+    measured. provenance: recipe, hashes of the data, versions, licence. roles: joints by the part
+    that each plays (service/motion/roles.py), empty where nobody said.
     """
 
     name: str
@@ -66,6 +68,7 @@ class ModelCard:
     feet: tuple[int, ...]
     diagnostics: Mapping[str, Any]
     provenance: Mapping[str, Any]
+    roles: Mapping[str, str] = field(default_factory=dict)
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""
@@ -92,6 +95,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "feet": list(card.feet),
         "diagnostics": dict(card.diagnostics),
         "provenance": dict(card.provenance),
+        "roles": dict(card.roles),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -154,4 +158,12 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         feet=tuple(plain["feet"]),
         diagnostics=plain["diagnostics"],
         provenance=plain["provenance"],
+        roles=_roles(plain),
     )
+
+
+def _roles(plain: Mapping[str, Any]) -> dict[str, str]:
+    """Roles of a card; those who wrote none needed no other format for it."""
+    given = dict(plain.get("roles", {}))
+    roles.check(given, plain["skeleton"]["names"])
+    return given

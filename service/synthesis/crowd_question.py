@@ -11,11 +11,10 @@ from service.motion.conventions import Floats, Indices, Singles
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
 from service.synthesis import limits
+from service.synthesis.question import Root
 from service.synthesis.view import FARTHEST, View
 
 Truths = npt.NDArray[np.bool_]
-Root = Literal["travelling", "in_place"]
-"""Whether characters walk away from where they were placed."""
 
 
 @dataclass(frozen=True)

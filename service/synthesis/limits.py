@@ -1,5 +1,6 @@
 """What a model can be asked at all: the same for one character and for a crowd of them."""
 
+import math
 from collections.abc import Iterable
 
 from service.motion.card import Control, ModelCard
@@ -48,3 +49,22 @@ def senseless(card: ModelCard, duration: float) -> str:
 def known(performers: tuple[str, ...]) -> str:
     """Who may be asked for."""
     return f"one of {', '.join(performers)}" if performers else "none: this model knows none"
+
+
+def number(field: str, value: object) -> float:
+    """Finite number; InvalidField where the value is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidField(field, f"{value!r}, expected a number")
+    try:
+        found = float(value)
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
+        raise InvalidField(field, f"{found}, expected a finite number")
+    return found
+
+
+def within(field: str, value: float, low: float, high: float, unit: str) -> None:
+    """InvalidField for a value that is not from low to high."""
+    if not low <= value <= high:
+        raise InvalidField(field, f"{value:g} {unit}, expected {low:g} to {high:g} {unit}")

@@ -4,11 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from service.motion.roles import Names
+
 Policy = Literal["warn", "refuse"]
 """What to do with controls outside what was sampled."""
 
+Root = Literal["travelling", "in_place"]
+"""Whether a clip goes where it leads, or stays where it begins."""
+
 FPS = 30.0
 POLICY: Policy = "warn"
+NAMES: Names = "own"
+ROOT: Root = "travelling"
 
 
 @dataclass(frozen=True)
@@ -17,6 +24,13 @@ class ClipQuestion:
     nobody that was seen for none, and the level of detail.
 
     extrapolate: what to do with controls outside what was sampled. end: none for the clip's own.
+    names: what joints are called, which is all that changes by it: bones keep their axes.
+    root: in place, the frame that goes along a cycle's arc is taken out, heading and all, or the
+    straight way from the first pose to the last of what is no cycle, evenly, the heading left as it
+    is; heights stay, and so does all of a model that is in place already. loop: a whole cycle as
+    N = max(1, round(duration * fps)) steps, without start and end. Its frame N is its first again:
+    equal in every number where it stays in place, else carried by the cycle's way and turn. It
+    plays N / fps seconds, which is the duration but for the rounding.
     """
 
     controls: Mapping[str, float]
@@ -26,6 +40,9 @@ class ClipQuestion:
     end: float | None = None
     performer: str | None = None
     level: int = 0
+    names: Names = NAMES
+    root: Root = ROOT
+    loop: bool = False
 
 
 @dataclass(frozen=True)

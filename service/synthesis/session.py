@@ -30,12 +30,14 @@ OUTPUTS = {
 class Session:
     """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
 
-    runtimes: onnxruntime's sessions, one for each level of detail.
+    runtimes: onnxruntime's sessions, one for each level of detail; clocks: the same of the graphs
+    that tell the duration alone.
     """
 
     card: ModelCard
     digest: str
     runtimes: tuple[Any, ...]
+    clocks: tuple[Any, ...]
 
     def run(
         self,
@@ -50,14 +52,25 @@ class Session:
         labels (B or 1, p): who moves, of the card's performers; nobody that was seen, if not said.
         level: of the card's levels of detail.
         """
-        feed = {
-            "controls": controls.astype(np.float32, copy=False),
-            "time": time.astype(np.float32, copy=False),
-        }
-        if labels is not None and self.card.performers:
-            feed[PERFORMER] = labels.astype(np.float32, copy=False)
+        feed = self._feed(controls, labels)
+        feed["time"] = time.astype(np.float32, copy=False)
         answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
         return answers
+
+    def durations(
+        self, controls: Floats | Singles, labels: Floats | Singles | None = None, level: int = 0
+    ) -> Singles:
+        """Durations (B,), s, as `run` gives them, in a quarter of its time."""
+        answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
+        return answers[0]
+
+    def _feed(
+        self, controls: Floats | Singles, labels: Floats | Singles | None
+    ) -> dict[str, Singles]:
+        feed = {"controls": controls.astype(np.float32, copy=False)}
+        if labels is not None and self.card.performers:
+            feed[PERFORMER] = labels.astype(np.float32, copy=False)
+        return feed
 
 
 def load(path: Path) -> Session:
@@ -87,7 +100,8 @@ def open_bytes(content: bytes, source: str) -> Session:
     except (ValueError, LookupError) as fault:
         raise ModelError(source, f"no protocol buffer: {fault}") from fault
     runtimes = tuple(_start(own, source) for own in frozen)
-    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes)
+    clocks = tuple(_start(freeze.for_output(own, "duration"), source) for own in frozen)
+    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes, clocks)
     for level in levels:
         _check_answer(session, source, level)
     return session

@@ -1,6 +1,5 @@
 """Questions to a model, checked at the door, and its answers in the project's own types."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,18 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from service.motion import roles
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
 from service.motion.card import Control
 from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
-from service.synthesis import limits, pace
+from service.motion.roles import Names
+from service.motion.skeleton import Skeleton
+from service.synthesis import course, limits, pace
 from service.synthesis.question import ClipQuestion, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
+from service.synthesis.walk import stride
 
-RATES = (1.0, 1000.0)
-MOST_POSES = 10_000
 ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 
@@ -70,6 +71,23 @@ class Synthesizer:
         rest = joints.at_rest(joints.offsets)
         return float(np.linalg.norm(rest - rest[0], axis=-1).max())
 
+    @cached_property
+    def _skeletons(self) -> dict[Names, Skeleton]:
+        """The skeletons that were asked for, each made once."""
+        return {"own": self.session.card.skeleton}
+
+    def _joints(self, asked: ClipQuestion) -> Skeleton:
+        """The skeleton with the names asked for; InvalidField for names that no role leads to, and
+        for a loop of what is no cycle."""
+        card = self.session.card
+        if asked.loop and not card.cyclic:
+            raise InvalidField(
+                "loop", "true, expected false: this model's last pose does not lead into its first"
+            )
+        if asked.names not in self._skeletons:
+            self._skeletons[asked.names] = roles.renamed(card.skeleton, card.roles, asked.names)
+        return self._skeletons[asked.names]
+
     def pose(
         self,
         controls: Mapping[str, float],
@@ -85,47 +103,47 @@ class Synthesizer:
         OutsideSamples where `extrapolate` is "refuse" and a control lies outside its sampled range.
         """
         question = self._door(controls, extrapolate, performer, level)
-        if not 1 <= len(times) <= MOST_POSES:
-            raise InvalidField("times", f"{len(times)} times, expected 1 to {MOST_POSES}")
-        when = np.array([_number(f"times/{i}", value) for i, value in enumerate(times)])
+        if not 1 <= len(times) <= course.MOST_POSES:
+            raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
+        when = np.array([limits.number(f"times/{i}", value) for i, value in enumerate(times)])
         duration = self._duration(question)
         for index, value in enumerate(when):
-            _within(f"times/{index}", value, 0.0, duration, "s")
+            limits.within(f"times/{index}", value, 0.0, duration, "s")
         return self._answer(question, when)
 
     def clip(self, asked: ClipQuestion) -> ClipAnswer:
         """Clip of the question; frame i is the pose at start + i / fps.
 
-        Raises as `pose` does.
+        The N steps of a loop share the duration evenly, but are played at fps. Raises as `pose`
+        does, and InvalidField for a loop of what is no cycle and names that no role leads to.
         """
         question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
-        when = self._frames(asked, self._duration(question))
-        answer = self._answer(question, when)
-        clip = assemble(
-            self.session.card.skeleton,
-            answer.rotations,
-            answer.root_position,
-            answer.bone_offsets,
-            asked.fps,
-        )
-        return ClipAnswer(clip, answer.trust)
+        joints = self._joints(asked)
+        answer = self._answer(question, course.times(asked, self._duration(question)))
+        if asked.loop or asked.root == "in_place":
+            answer = self._routed(question, answer, asked)
+        turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
+        return ClipAnswer(assemble(joints, turns, path, offsets, asked.fps), answer.trust)
 
     def check(self, asked: ClipQuestion) -> None:
         """Raise what `clip` would, as far as it can be said before anything is synthesised: how
         long the clip takes is not known yet."""
         self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
-        _window(asked, limits.durations(self.session.card)[1])
+        self._joints(asked)
+        course.window(asked, limits.durations(self.session.card)[1])
 
     def prospect(self, asked: ClipQuestion) -> Prospect:
         """What `clip` would answer with, before it is synthesised.
 
-        Asked of the graph alone, as there: how long a clip takes differs in its last digit where
-        many are asked for at once, and a question whose end is the clip's own would then pass here
-        and be refused later. Raises as `clip` does.
+        Asked for one by one, as there: how long clips take differs in the last digit where many are
+        asked for at once, and a question whose end is the clip's own would pass here and be refused
+        later. Raises as `clip` does.
         """
         question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
-        frames = self._frames(asked, self._duration(question))
-        return Prospect(len(frames), question.warnings)
+        self._joints(asked)
+        times = course.times(asked, self._duration(question))
+        # A loop ends with its first frame again.
+        return Prospect(len(times) + asked.loop, question.warnings)
 
     def _door(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
@@ -145,20 +163,21 @@ class Synthesizer:
 
     def _duration(self, question: _Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
-        duration = float(self._run(question, np.zeros((1, 1)), "duration")[0][0])
+        durations = self.session.durations(question.point, question.labels, question.level)
+        duration = float(durations[0])
         low, high = limits.durations(self.session.card)
         if not low <= duration <= high:
             raise OutsideSamples("controls", limits.senseless(self.session.card, duration))
         return duration
 
-    def _frames(self, asked: ClipQuestion, duration: float) -> Floats:
-        """Times (F,) of the frames asked for, s, of a clip that takes `duration`."""
-        rate, start, last = _window(asked, duration)
-        # A millionth of a frame forgives the rounding of duration * rate.
-        frames = math.floor((last - start) * rate + 1e-6) + 1
-        if frames > MOST_POSES:
-            raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")
-        return np.minimum(start + np.arange(frames) / rate, duration)
+    def _routed(self, question: _Question, answer: PoseAnswer, asked: ClipQuestion) -> PoseAnswer:
+        """The answer in place, or closed, as asked for."""
+        card = self.session.card
+        measure = stride.strides if card.cyclic else stride.straight
+        way = measure(self.session, question.point, question.labels, question.level)
+        stays = asked.root == "in_place" and card.root == "travelling"
+        answer = course.in_place(answer, way) if stays else answer
+        return course.closed(answer, None if stays else way) if asked.loop else answer
 
     def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
         answers = self._run(question, when[None], *ANSWERED)
@@ -179,17 +198,6 @@ class Synthesizer:
         return self.session.run(question.point, when, *outputs, labels=labels, level=level)
 
 
-def _window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
-    """Frames a second, start and end, s, of a clip that takes `duration` at most."""
-    rate = _number("fps", asked.fps)
-    _within("fps", rate, *RATES, "frames a second")
-    last = duration if asked.end is None else _number("end", asked.end)
-    _within("end", last, 0.0, duration, "s")
-    start = _number("start", asked.start)
-    _within("start", start, 0.0, last, "s")
-    return rate, start, last
-
-
 def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
     if asked is not None and asked not in performers:
@@ -205,26 +213,9 @@ def _required(control: Control, controls: Mapping[str, float]) -> float:
             f"missing; give a number in {control.unit}, "
             f"sampled from {control.minimum:g} to {control.maximum:g}",
         )
-    value = _number(field, controls[control.name])
-    _within(field, value, *limits.reach(control), control.unit)
+    value = limits.number(field, controls[control.name])
+    limits.within(field, value, *limits.reach(control), control.unit)
     return value
-
-
-def _number(field: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidField(field, f"{value!r}, expected a number")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise InvalidField(field, f"{number}, expected a finite number")
-    return number
-
-
-def _within(field: str, value: float, low: float, high: float, unit: str) -> None:
-    if not low <= value <= high:
-        raise InvalidField(field, f"{value:g} {unit}, expected {low:g} to {high:g} {unit}")
 
 
 def _outside(control: Control, value: float) -> str | None:

@@ -138,6 +138,7 @@ class Envelope:
             log.info("request %s: the client went away", identity)
         except Exception:
             if started:
+                log.error("request %s failed, and its answer breaks off", identity)
                 raise
             log.exception("request %s failed", identity)
             await problems.internal(Request(scope))(scope, receive, sealed)

@@ -6,7 +6,8 @@ from typing import Annotated
 import msgspec
 
 from service.encode import Encoder
-from service.export import naming
+from service.export import names
+from service.export.cells import LEGAL_NAME
 from service.export.pack import Order
 from service.export.query import Query
 from service.motion.errors import InvalidField, QueryError
@@ -17,7 +18,8 @@ from service.web.problems import pointer
 from service.web.query import ClipBody
 from service.web.settings import Settings
 
-Name = Annotated[str, msgspec.Meta(pattern=naming.PATTERN)]
+Name = Annotated[str, msgspec.Meta(pattern=rf"^{LEGAL_NAME.pattern}\Z")]
+OWN_NAME = "expected a name of its own: an earlier clip has it, capitals count for nothing"
 
 
 class NamedClipBody(ClipBody, frozen=True):
@@ -60,13 +62,15 @@ def order(
 
 def _query(index: int, body: NamedClipBody, extension: str) -> Query:
     within = "clips", str(index)
-    name = naming.numbered(index) if body.name is None else body.name
+    name = names.generated(index) if body.name is None else body.name
     return Query(name, extension, query.clip_of(body, *within), pointer(*within))
 
 
 def _check_names(queries: Sequence[Query]) -> None:
-    for fault in naming.twice(each.name for each in queries):
-        raise problems.within(InvalidField("name", fault.message), pointer("clips", fault.place))
+    called = [each.name for each in queries]
+    for index in names.Seen().repeated(called):
+        error = InvalidField("name", f"{called[index]!r}, {OWN_NAME}")
+        raise problems.within(error, queries[index].place)
 
 
 def _prospects(model: Synthesizer, queries: Sequence[Query], most: int) -> list[Prospect]:

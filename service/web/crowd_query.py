@@ -14,8 +14,8 @@ import numpy as np
 from service.motion.conventions import Floats, Indices
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
-from service.synthesis.crowd_question import Blending, CrowdQuestion, Root
-from service.synthesis.question import Policy
+from service.synthesis.crowd_question import Blending, CrowdQuestion
+from service.synthesis.question import Policy, Root
 from service.synthesis.view import Camera, View
 from service.web import decoding
 from service.web.problems import pointer

@@ -88,7 +88,11 @@ def narrowed(spec, card):
     for name, (low, high) in bounds.items():
         between = {"type": "number", "minimum": low, "maximum": high}
         parts["parameters"][name]["schema"] = between
-        parts["schemas"]["ClipQuestion"]["properties"][name] = between
+        for question in ("ClipQuestion", "NamedClipQuestion"):
+            parts["schemas"][question]["properties"][name] = between
+    # That names differ cannot be said in a schema.
+    del parts["schemas"]["NamedClipQuestion"]["properties"]["name"]
+    parts["schemas"]["ClipsQuestion"]["properties"]["clips"]["maxItems"] = 3
     times = {"type": "number", "minimum": 0, "maximum": 0.8}
     parts["parameters"]["time"]["schema"]["items"] = times
     parts["schemas"]["PoseQuestion"]["properties"]["times"]["items"] = times

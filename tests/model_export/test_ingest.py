@@ -191,6 +191,19 @@ def test_joints_that_cannot_be_followed_are_refused_by_row(read, motion, message
     assert caught.value.line == 2
 
 
+@pytest.mark.parametrize(
+    ("joint", "dropped", "message"),
+    [
+        ("Tail", [], r"0\.bvh has no joints \['Tail'\] that the recipe names"),
+        ("LeftHand", ["LeftArm"], r"joints \['LeftHand'\] are dropped, and named by the recipe"),
+    ],
+)
+def test_joints_of_roles_must_be_there(read, joint, dropped, message):
+    with pytest.raises(RecipeError, match=message) as caught:
+        read(small_clip(), motion={"drop_joints": dropped}, roles={"leftHand": joint})
+    assert caught.value.line == 2
+
+
 def test_in_place_takes_the_straight_travel_out_and_nothing_else(read):
     source = small_clip()
     travelling = first(read(source))

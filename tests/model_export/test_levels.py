@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import onnx
 import pytest
 
 from model_export import exams, kriging, levels, thin
@@ -209,6 +210,14 @@ def test_a_frozen_file_has_no_level_to_feed(model_path):
 def test_half_a_file_cannot_be_frozen(model_path, cut):
     with pytest.raises((ValueError, IndexError)):
         freeze.at_level(model_path.read_bytes()[:-cut], 0)
+
+
+def test_what_leads_to_one_output_is_less_than_half_of_the_graph(model_path):
+    whole = onnx.load(model_path)
+    part = onnx.load_from_string(freeze.for_output(model_path.read_bytes(), "duration"))
+    assert 0 < len(part.graph.node) < len(whole.graph.node) / 2
+    assert [port.name for port in part.graph.output] == ["duration"]
+    onnx.checker.check_model(part)
 
 
 def test_the_worst_pose_is_off_by_no_more_than_some_times_the_rest(exported, small_recipe):

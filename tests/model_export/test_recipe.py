@@ -210,6 +210,26 @@ def test_feet_are_named_or_there_are_none(read):
     assert read(footed).motion.feet == ["l", "r"]
 
 
+def test_roles_are_named_or_there_are_none(read):
+    assert read(MINIMAL).roles == {}
+    cast = MINIMAL.replace("[size]", '[roles]\nhips = "Hips"\nleftToes = "ltoe"\n[size]')
+    assert read(cast).roles == {"hips": "Hips", "leftToes": "ltoe"}
+
+
+@pytest.mark.parametrize(
+    ("roles", "said"),
+    [
+        ('tail = "Tail"', r"roles\.tail.*'hips', 'spine'.*found 'tail'"),
+        ('hips = ""', r"roles\.hips: .*at least 1 character"),
+        ("hips = 7", r"roles\.hips: .*valid string, found 7"),
+        ('neck = "Neck"\nhead = "Neck"', r"joints with two roles: \['Neck'\], expected one each"),
+    ],
+)
+def test_a_role_that_is_none_and_a_joint_with_two_are_refused(read, roles, said):
+    with pytest.raises(RecipeError, match=said):
+        read(MINIMAL.replace("[size]", f"[roles]\n{roles}\n[size]"))
+
+
 @pytest.mark.parametrize(
     ("size", "budgets"),
     [

@@ -73,6 +73,15 @@ def strides(session: Session, controls: Floats, labels: Floats, level: int = 0) 
     return Strides(durations, plane.straightened(gap, turns), turns, starts)
 
 
+def straight(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
+    """The same of clips that are no cycles: the straight way from the first pose to the last."""
+    times = np.tile([0.0, AFTER], (len(controls), 1))
+    asked = ("duration", "root_position")
+    durations, roots = _ask(session, controls, times, labels, level, *asked)
+    begin, end = plane.of(roots).T
+    return Strides(durations, end - begin, np.zeros(len(begin)), begin)
+
+
 def poses(
     session: Session, controls: Floats, labels: Floats, phases: Floats, level: int = 0
 ) -> Poses:
@@ -81,11 +90,14 @@ def poses(
     times = (phases * own.durations)[:, None]
     asked = ("rotations", "root_position")
     rotations, roots = _ask(session, controls, times, labels, level, *asked)
+    return beside(own, phases, rotations[:, 0], roots[:, 0])
+
+
+def beside(own: Strides, phases: Floats, rotations: Floats, roots: Floats) -> Poses:
+    """Poses of rotations (K, J, 4) and roots (K, 3) at phases (K,) of K strides, or of one."""
     turned = phases * own.turns
-    gone = plane.of(roots[:, 0]) - own.starts - plane.arc(phases * own.ways, turned)
-    return Poses(
-        plane.turned(rotations[:, 0], -turned), roots[:, 0, 1], gone * plane.facing(-turned)
-    )
+    gone = plane.of(roots) - own.starts - plane.arc(phases * own.ways, turned)
+    return Poses(plane.turned(rotations, -turned), roots[:, 1], gone * plane.facing(-turned))
 
 
 def bones(session: Session, controls: Floats, labels: Floats) -> Singles:

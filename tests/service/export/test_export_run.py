@@ -170,7 +170,9 @@ def spoilt(source):
 
 def test_rows_at_fault_end_it_before_anything_is_written(source, model_path, tmp_path):
     bad = spoilt(source)
-    with pytest.raises(InvalidField, match=r"1 rows cannot be .*\n  line 6: fps: 'often'"):
+    with pytest.raises(
+        InvalidField, match=r"rows that cannot be answered: 1 .*:\n  line 6: fps: 'often'"
+    ):
         run.run(exporting.work(model_path, bad, tmp_path / "t"), bad, exporting.Watching())
     assert not (tmp_path / "t").exists()
 
@@ -192,7 +194,9 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
     bad = exporting.Listed(rows)
     work = exporting.work(model_path, bad, tmp_path)
     for by in (crew.alone, crew.of(2)):
-        with pytest.raises(InvalidField, match=r"1 rows cannot be answered.*\n  line 13: end: 50"):
+        with pytest.raises(
+            InvalidField, match=r"rows that cannot be answered: 1 .*\n  line 13: end: 50"
+        ):
             run.run(work, bad, exporting.Watching(), by)
         assert not (tmp_path / "manifest.jsonl").exists()
     watch = exporting.Watching()

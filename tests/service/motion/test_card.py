@@ -41,6 +41,7 @@ CARD = ModelCard(
     feet=(1,),
     diagnostics={"truncation_rms_m": 0.005, "notes": ["one"], "explained": {"pose": 0.9}},
     provenance={"licence": "CC0", "clips": 92},
+    roles={"hips": "hips", "upperChest": "chest"},
 )
 
 
@@ -59,13 +60,34 @@ def test_card_read_is_the_card_written():
     assert replace(read, skeleton=CARD.skeleton) == CARD
 
 
-@pytest.mark.parametrize("field", [f.name for f in fields(ModelCard) if f.name != "performers"])
+@pytest.mark.parametrize(
+    "field", [f.name for f in fields(ModelCard) if f.name not in ("performers", "roles")]
+)
 def test_card_without_one_of_its_fields_is_refused_by_name(field):
     metadata = card.dump(CARD)
     del metadata[f"posefield.{field}"]
     with pytest.raises(ValueError) as refusal:
         card.load(metadata)
     assert str(refusal.value) == f"incomplete posefield metadata: '{field}'"
+
+
+def test_a_card_that_says_nothing_of_roles_has_none():
+    metadata = card.dump(CARD)
+    del metadata["posefield.roles"]
+    assert card.load(metadata).roles == {}
+
+
+@pytest.mark.parametrize(
+    ("roles", "said"),
+    [
+        ('{"tail": "hips"}', r"\['tail'\] are neither roles nor joints"),
+        ('{"hips": "Tail"}', r"\['Tail'\] are neither roles nor joints"),
+        ('{"hips": "hips", "head": "hips"}', "a joint has two of them"),
+    ],
+)
+def test_roles_that_cannot_be_are_refused(roles, said):
+    with pytest.raises(ValueError, match=said):
+        card.load({**card.dump(CARD), "posefield.roles": roles})
 
 
 @pytest.mark.parametrize("missing", ["names", "parents", "offsets", "tip_joints", "tip_offsets"])

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from itertools import product
 
 import numpy as np
 import onnx
@@ -69,6 +70,25 @@ def test_outputs_come_in_the_order_asked_for(model_path):
     sigma, rotations = opened.run(point, times, "sigma", "rotations")
     assert sigma.shape == (1,) and rotations.shape == (1, 3, 33, 4)
     assert {array.dtype for array in (sigma, rotations)} == {np.dtype(np.float32)}
+
+
+def test_durations_alone_are_those_of_the_whole_graph(labelled_path, rng):
+    """To the last bit: a clip's end that an answer named is not beyond the end."""
+    opened = session.load(labelled_path)
+    low, high = ([getattr(c, e) for c in opened.card.controls] for e in ("minimum", "maximum"))
+    points, times = rng.uniform(low, high, (200, len(low))), np.zeros((1, 1))
+    for level, labels in product(range(4), (np.zeros((1, 3)), np.eye(3)[:1])):
+        asked = [(point[None], labels, level) for point in points]
+        alone = np.array([opened.durations(*question)[0] for question in asked])
+        whole = [opened.run(p, times, "duration", labels=w, level=n)[0][0] for p, w, n in asked]
+        assert np.array_equal(alone, whole)
+        assert np.ptp(alone) > 0.01
+
+
+def test_durations_alone_are_a_part_of_the_graph(model_path):
+    clock = session.load(model_path).clocks[0]
+    assert [port.name for port in clock.get_inputs()] == ["controls"]
+    assert [port.name for port in clock.get_outputs()] == ["duration"]
 
 
 def test_an_empty_file_is_refused(refused):

@@ -320,3 +320,27 @@ def test_a_question_with_an_answer_passes(model):
     asked = ClipQuestion(POINT, start=0.1, end=0.4)
     model.check(asked)
     assert len(model.clip(asked).clip) == 10
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ClipQuestion(POINT),
+        ClipQuestion(POINT, fps=7.3, start=0.11, end=0.77, level=2),
+        ClipQuestion({**POINT, "turn": 500.0, "stature": 1.0}, fps=1000),
+    ],
+)
+def test_what_is_known_of_a_clip_before_it_is_made_is_true(model, asked):
+    prospect, answer = model.prospect(asked), model.clip(asked)
+    assert prospect.frames == len(answer.clip)
+    assert prospect.warnings == answer.trust.warnings
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_an_end_that_is_the_clips_own_is_known_to_be_one(model, rng, level):
+    for _ in range(50):
+        moved = {name: value * rng.uniform(0.9, 1.1) for name, value in POINT.items()}
+        own = model.pose(moved, [0.0], "warn", level=level).trust.duration
+        model.prospect(ClipQuestion(moved, end=own, level=level))
+        with pytest.raises(InvalidField, match="end: "):
+            model.prospect(ClipQuestion(moved, end=np.nextafter(own, 9.0), level=level))

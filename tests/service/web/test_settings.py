@@ -1,5 +1,8 @@
 """Settings come from the environment, whole or not at all."""
 
+from dataclasses import fields
+from pathlib import Path
+
 import pytest
 
 from service.motion.errors import InvalidField
@@ -18,10 +21,22 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_BODY_LIMIT": "10",
         "POSEFIELD_CROWD_BODY_LIMIT": "30",
         "POSEFIELD_CROWD_LIMIT": "2",
+        "POSEFIELD_CLIPS_BODY_LIMIT": "40",
+        "POSEFIELD_CLIPS_LIMIT": "3",
+        "POSEFIELD_CLIPS_POSES": "50",
         "POSEFIELD_GRACE": "0",
     }
-    expected = Settings("::1", 9000, body_limit=10, crowd_body_limit=30, crowd_limit=2, grace=0)
+    crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
+    clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
+    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, grace=0)
     assert settings.read(environ=given) == expected
+
+
+def test_the_readme_lists_every_setting_and_its_default():
+    readme = (Path(__file__).parents[3] / "README.md").read_text()
+    for setting in fields(Settings):
+        name = f"POSEFIELD_{setting.name.upper()}"
+        assert f"| `{name}` | `{setting.default}` |" in readme
 
 
 @pytest.mark.parametrize(
@@ -29,6 +44,9 @@ def test_each_setting_has_a_variable():
     [
         ("CROWD_LIMIT", "0"),
         ("CROWD_BODY_LIMIT", "-1"),
+        ("CLIPS_LIMIT", "0"),
+        ("CLIPS_POSES", "1e6"),
+        ("CLIPS_BODY_LIMIT", "0"),
         ("PORT", "http"),
         ("PORT", "-1"),
         ("PORT", "65536"),

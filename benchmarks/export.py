@@ -1,0 +1,229 @@
+"""How fast many clips become files, where the time goes, and what memory it takes.
+
+    python benchmarks/export.py MODEL [--clips 2000] [--format usdc] [--long 100000]
+
+Everything runs through the engine of `posefield export`, each thing several times and in turn with
+the others. Files go to the folder that TMPDIR names. --long also exports so many clips by one
+process, which takes minutes and room for them, and says how its memory grows.
+"""
+
+import argparse
+import hashlib
+import resource
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+from rows import Row, table
+
+from service.encode import ENCODERS
+from service.export import crew, layouts, manifest, queries, run
+from service.export.crew import Crew
+from service.export.job import Job, Work
+from service.export.ledger import Part
+from service.export.queries import Asked
+from service.export.query import Source
+from service.export.reading import Defaults
+from service.export.target import open_target
+from service.synthesis import library
+
+ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
+LONGER = 4
+"""Times as many clips where processes are begun, which takes them a second."""
+FAST, TWICE, MEMORY = 2000.0, 1.7, 600.0
+"""Goals: clips a second and core, two processes against one, MB of a process."""
+STAGED = 256
+"""Clips that the stages are measured with, each over all of them."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Work for a target that is not said yet, and its queries."""
+
+    work: Work
+    source: Source
+
+    @classmethod
+    def of(cls, model: Path, clips: int, form: str) -> "Bench":
+        """Clips at points sampled from a model's controls."""
+        content = model.read_bytes()
+        opened = library.opened(model, content)
+        source = queries.source(Asked(sample=clips), Defaults(form), opened)
+        digest = hashlib.sha256(content).hexdigest()
+        job = Job(opened.identity, digest, source.digest, "folder", 1)
+        return cls(Work(job, content, ""), source)
+
+    def seconds(self, layout: str, by: Crew) -> float:
+        """Of a whole export."""
+        with tempfile.TemporaryDirectory() as target:
+            start = time.perf_counter()
+            self.export(layout, by, target)
+            return time.perf_counter() - start
+
+    def export(self, layout: str, by: Crew, target: str) -> list[float]:
+        """Export; the peak memory of this process after each chunk, MB."""
+        job = replace(self.work.job, layout=layout, chunk=layouts.find(layout).chunk)
+        watch = Watch([])
+        run.run(replace(self.work, job=job, target=target), self.source, watch, by)
+        return watch.peaks
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Notes the peak memory of this process after each chunk, MB."""
+
+    peaks: list[float]
+
+    def begin(self, total: int, done: int) -> None:
+        """Nothing is shown."""
+
+    def advance(self, part: Part) -> None:
+        """Note it."""
+        self.peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+
+    def stopped(self) -> bool:
+        """Never."""
+        return False
+
+
+def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
+    """Rates, ratios and shares, with what one process takes of memory."""
+    bench = Bench.of(model, clips, form)
+    taken = _in_turn({name: partial(bench.seconds, name, crew.alone) for name in layouts.LAYOUTS})
+    return [
+        *_rates(clips, form, taken),
+        *_shares(bench, form, taken["folder"] / clips),
+        _processes(Bench.of(model, LONGER * clips, form), LONGER * clips, form),
+        _memory(model, clips, form),
+    ]
+
+
+def _in_turn(runs: dict[str, Callable[[], float]]) -> dict[str, float]:
+    """Median seconds of each."""
+    taken: dict[str, list[float]] = {name: [] for name in runs}
+    for _ in range(ROUNDS):
+        for name, one in runs.items():
+            taken[name].append(one())
+    return {name: statistics.median(seconds) for name, seconds in taken.items()}
+
+
+def _rates(clips: int, form: str, taken: dict[str, float]) -> list[Row]:
+    loose = taken["folder"]
+    what = f"export of {clips} clips as {form} by one process"
+    goal = FAST * loose / clips
+    first = Row(f"{what} to folders", clips / loose, "clips/s", "2,000 a second", 1 / goal, 1.0)
+    others = [
+        Row(f"{what}: {name}", clips / seconds, "clips/s", "folders", loose / seconds, None)
+        for name, seconds in taken.items()
+        if name != "folder"
+    ]
+    return [first, *others]
+
+
+def _processes(bench: Bench, clips: int, form: str) -> Row:
+    taken = _in_turn(
+        {
+            "one": partial(bench.seconds, "folder", crew.alone),
+            "two": partial(bench.seconds, "folder", crew.of(2)),
+        }
+    )
+    name = f"export of {clips} clips as {form} by two processes, their beginning included"
+    ratio = taken["one"] / taken["two"]
+    return Row(name, clips / taken["two"], "clips/s", "one process", ratio, TWICE)
+
+
+def _shares(bench: Bench, form: str, whole: float) -> list[Row]:
+    """What each stage takes of a clip, and what is left of the whole for all else."""
+    seconds = _stages(bench, form)
+    seconds["all else: chunks, parts, folders"] = whole - sum(seconds.values())
+    return [
+        Row(
+            f"export of a clip as {form}: {name}",
+            1e6 * taken,
+            "µs",
+            "the whole",
+            taken / whole,
+            None,
+        )
+        for name, taken in seconds.items()
+    ]
+
+
+def _stages(bench: Bench, form: str) -> dict[str, float]:
+    """Seconds a clip of each stage, each done over many clips by itself."""
+    rows = bench.source.rows()
+    asked = [next(rows) for _ in range(STAGED)]
+    opened = library.opened(Path(bench.work.job.model.partition("@")[0]), bench.work.model)
+    encoder = ENCODERS[form]
+    answers = [opened.clip(query.question) for query in asked]
+    files = encoder.write(answers, encoder.usual)
+    entries = partial(_entries, asked, answers, files)
+    with tempfile.TemporaryDirectory() as folder:
+        target = open_target(folder)
+        target.prepare()
+        named = [(f"{index}.{form}", content) for index, content in enumerate(files)]
+        stages: dict[str, Callable[[], object]] = {
+            "synthesis": lambda: [opened.clip(query.question) for query in asked],
+            "encoding": lambda: encoder.write(answers, encoder.usual),
+            "checksum and line of the manifest": entries,
+            "file system": lambda: target.write(named),
+        }
+        taken = {name: _median(stage) / STAGED for name, stage in stages.items()}
+    reading = _median(lambda: (bench.source.survey(), sum(1 for _ in bench.source.rows())))
+    return {"queries, looked at and read": reading / (bench.source.count or 1), **taken}
+
+
+def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:
+    return [
+        manifest.line(manifest.entry(query.name, "clips/000/name", content, answer))
+        for query, content, answer in zip(asked, files, answers, strict=True)
+    ]
+
+
+def _median(stage: Callable[[], object]) -> float:
+    taken = []
+    for _ in range(5):
+        start = time.perf_counter()
+        stage()
+        taken.append(time.perf_counter() - start)
+    return statistics.median(taken)
+
+
+def _memory(model: Path, clips: int, form: str) -> Row:
+    """Peak of one process that has done nothing else, and how much of it came after a tenth."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        peaks = pool.submit(_peaks, model, clips, form).result()
+    grown = peaks[-1] - peaks[len(peaks) // 10]
+    name = (
+        f"peak memory of one process, {clips} clips as {form}; after a tenth it grew {grown:.0f} MB"
+    )
+    return Row(name, peaks[-1], "MB", "", None, MEMORY)
+
+
+def _peaks(model: Path, clips: int, form: str) -> list[float]:
+    with tempfile.TemporaryDirectory() as target:
+        return Bench.of(model, clips, form).export("folder", crew.alone, target)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("model", type=Path)
+    parser.add_argument("--clips", type=int, default=CLIPS)
+    parser.add_argument("--format", default=FORM)
+    parser.add_argument("--long", type=int, default=0)
+    given = parser.parse_args()
+    found = rows(given.model, given.clips, given.format)
+    if given.long:
+        found.append(_memory(given.model, given.long, given.format))
+    print(table(found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""The course of a clip: at which times its frames are, and where its root goes meanwhile."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from service.motion.answer import PoseAnswer
+from service.motion.conventions import Floats
+from service.motion.errors import InvalidField
+from service.synthesis import limits
+from service.synthesis.question import ClipQuestion
+from service.synthesis.walk import plane, stride
+from service.synthesis.walk.stride import Strides
+
+RATES = (1.0, 1000.0)
+MOST_POSES = 10_000
+
+
+def window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
+    """Frames a second, start and end, s, of a clip that takes `duration` at most."""
+    rate = limits.number("fps", asked.fps)
+    limits.within("fps", rate, *RATES, "frames a second")
+    last = duration if asked.end is None else limits.number("end", asked.end)
+    limits.within("end", last, 0.0, duration, "s")
+    start = limits.number("start", asked.start)
+    limits.within("start", start, 0.0, last, "s")
+    if asked.loop and (start > 0.0 or asked.end is not None):
+        field, value = ("start", start) if start > 0.0 else ("end", last)
+        raise InvalidField(field, f"{value:g} s with loop, expected none: a loop is a whole cycle")
+    return rate, start, last
+
+
+def times(asked: ClipQuestion, duration: float) -> Floats:
+    """Times (F,) of the frames asked for, s, of a clip that takes `duration`.
+
+    Those of a loop lack the last frame, which is the first again.
+    """
+    rate, start, last = window(asked, duration)
+    if asked.loop:
+        steps = max(1, round(duration * rate))
+        _check_count(steps + 1)
+        return np.arange(steps) * duration / steps
+    # A millionth of a frame forgives the rounding of duration * rate.
+    frames = math.floor((last - start) * rate + 1e-6) + 1
+    _check_count(frames)
+    return np.minimum(start + np.arange(frames) / rate, duration)
+
+
+def in_place(answer: PoseAnswer, way: Strides) -> PoseAnswer:
+    """The poses in the frame that goes along the way, which stays where the clip begins."""
+    poses = stride.beside(way, answer.times / way.durations, answer.rotations, answer.root_position)
+    root = plane.at_height(way.starts + poses.places, poses.heights)
+    return replace(answer, rotations=poses.rotations, root_position=root)
+
+
+def closed(answer: PoseAnswer, way: Strides | None) -> PoseAnswer:
+    """The poses and the first of them again, carried along the way if there is one."""
+    rotations, root = answer.rotations[:1], answer.root_position[:1]
+    if way is not None:
+        rotations = plane.turned(rotations, way.turns)
+        root = root + plane.at_height(plane.arc(way.ways, way.turns), np.zeros(1))
+    return replace(
+        answer,
+        times=np.append(answer.times, answer.trust.duration),
+        rotations=np.concatenate([answer.rotations, rotations]),
+        root_position=np.concatenate([answer.root_position, root]),
+    )
+
+
+def _check_count(frames: int) -> None:
+    if frames > MOST_POSES:
+        raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")

@@ -1,0 +1,218 @@
+"""Many clips over HTTP: archives of the files of single clips, and refusals that tell."""
+
+import hashlib
+import io
+import json
+import tarfile
+import zipfile
+
+import jsonschema
+import pytest
+from asking import asker
+
+from service.encode import ENCODERS
+from service.encode.packs import PACKS
+from service.web.app import create_app
+from service.web.settings import Settings
+
+CLIPS = "/v1/models/reach/clips"
+JSON = {"content-type": "application/json"}
+
+
+def unpacked(kind, content):
+    """Names and contents in their order."""
+    if kind == "tar":
+        with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as found:
+            return {m.name: found.extractfile(m).read() for m in found.getmembers()}
+    with zipfile.ZipFile(io.BytesIO(content)) as found:
+        return {name: found.read(name) for name in found.namelist()}
+
+
+@pytest.fixture
+def questions(controls):
+    """Clips that differ in all that can be asked."""
+    turned = {**controls, "turn": controls["turn"] + 5}
+    return [
+        {"controls": controls, "name": "as.it-is_1"},
+        {"controls": turned, "fps": 60, "start": 0.1, "end": 0.5},
+        {"controls": turned, "performer": "tall", "level": 2, "extrapolate": "refuse"},
+        {"controls": {**controls, "turn": 1000.0}},
+    ]
+
+
+NAMES = ["as.it-is_1", "clip-000001", "clip-000002", "clip-000003"]
+
+
+def asked(extension, clips):
+    return {"format": extension, "clips": clips}
+
+
+@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("extension", ENCODERS)
+def test_each_file_is_what_its_own_path_answers(extension, kind, ask, questions):
+    answer = ask("POST", f"{CLIPS}.{kind}", json=asked(extension, questions))
+    assert answer.status_code == 200, answer.text
+    found = unpacked(kind, answer.content)
+    assert list(found) == [*(f"{name}.{extension}" for name in NAMES), "manifest.jsonl"]
+    contents = list(found.values())
+    for question, content in zip(questions, contents, strict=False):
+        alone = {key: value for key, value in question.items() if key != "name"}
+        assert ask("POST", f"/v1/models/reach/clip.{extension}", json=alone).content == content
+    assert len(set(contents)) == len(contents)
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_the_manifest_says_what_each_file_is(kind, ask, questions, spec):
+    answer = ask("POST", f"{CLIPS}.{kind}", json=asked("json", questions))
+    found = unpacked(kind, answer.content)
+    lines = [json.loads(line) for line in found.pop("manifest.jsonl").splitlines()]
+    schema = {**spec["components"]["schemas"]["ManifestEntry"], "components": spec["components"]}
+    assert [line["file"] for line in lines] == list(found)
+    assert [line["name"] for line in lines] == NAMES
+    for line, content in zip(lines, found.values(), strict=True):
+        jsonschema.validate(line, schema, jsonschema.Draft202012Validator)
+        assert line.keys() == schema["properties"].keys()
+        assert line["sha256"] == hashlib.sha256(content).hexdigest()
+        assert line["bytes"] == len(content)
+        clip = json.loads(content)
+        assert line["frames"] == clip["frames"]
+        assert {key: line[key] for key in clip["trust"]} == clip["trust"]
+
+
+def test_an_archive_says_where_it_comes_from(ask, questions, loaded):
+    answer = ask("POST", f"{CLIPS}.zip", json=asked("usdc", questions))
+    assert answer.headers["posefield-model"] == loaded.find("reach").identity
+    assert answer.headers["content-disposition"] == 'attachment; filename="reach.zip"'
+    assert answer.headers["content-type"] == "application/zip"
+    warning = json.loads(answer.headers["posefield-warning"])
+    assert warning == "1 of 4 clips have some control outside what was sampled"
+    within = ask("POST", f"{CLIPS}.tar", json=asked("usdc", questions[:3]))
+    assert "posefield-warning" not in within.headers
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_the_same_questions_give_the_same_bytes(kind, ask, questions):
+    once, again, other = (
+        ask("POST", f"{CLIPS}.{kind}", json=asked("usdc", clips)).content
+        for clips in (questions, questions, questions[::-1])
+    )
+    assert once == again != other
+
+
+def test_more_clips_than_are_held_at_once_keep_their_order(ask, controls):
+    clips = [{"controls": controls, "fps": 10, "end": 0.01 * (i % 7)} for i in range(50)]
+    clips[20] = {"controls": controls, "fps": 1000}
+    answer = ask("POST", f"{CLIPS}.tar", json=asked("bvh", clips))
+    manifest = unpacked("tar", answer.content)["manifest.jsonl"].splitlines()
+    lines = [json.loads(line) for line in manifest]
+    assert [line["name"] for line in lines] == [f"clip-{i:06d}" for i in range(50)]
+    assert [line["frames"] > 1000 for line in lines] == [i == 20 for i in range(50)]
+
+
+REFUSED = {
+    # what is changed of the clip in the middle, status, end of the pointer, words of the detail
+    "a control that is missing": ({"controls": {}}, 422, "controls/stature", "missing"),
+    "a control out of reach": ({"controls": {"turn": 1e9}}, 422, "controls/turn", "expected"),
+    "a control that is none": ({"controls": {"a/b~": 1}}, 422, "controls/a~1b~0", "this model has"),
+    "a word for a control": ({"controls": {"turn": "x"}}, 400, "controls/turn", "finite number"),
+    "an unknown performer": ({"performer": "nobody"}, 422, "performer", "expected one of middle"),
+    "an unknown level": ({"level": 9}, 422, "level", "expected 0 to"),
+    "a level in parts": ({"level": 0.5}, 400, "level", "whole number"),
+    "a slow rate": ({"fps": 0.5}, 422, "fps", "expected 1 to 1000"),
+    "an end after the clip": ({"end": 99}, 422, "end", "expected 0 to"),
+    "a start after the end": ({"start": 0.4, "end": 0.2}, 422, "start", "expected 0 to 0.2"),
+    "a number for a word": ({"fps": "30"}, 400, "fps", "Expected `float`"),
+    "an unknown field": ({"frames": 3}, 400, "frames", "unknown field `frames`"),
+    "a path for a name": ({"name": "../up"}, 400, "name", "matching"),
+    "a hidden name": ({"name": ".up"}, 400, "name", "matching"),
+    "a name in two lines": ({"name": "up\n"}, 400, "name", "matching"),
+    "no name at all": ({"name": ""}, 400, "name", "matching"),
+    "a long name": ({"name": "x" * 101}, 400, "name", "matching"),
+    "a foreign name": ({"name": "ü"}, 400, "name", "matching"),
+    "a name in other capitals": ({"name": "FIRST"}, 422, "name", "'FIRST', expected a name of"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_clip_that_cannot_be_is_named(name, ask, controls):
+    changes, status, field, words = REFUSED[name]
+    given = changes.get("controls", controls)
+    wrong = {**changes, "controls": given and {**controls, **given}}
+    clips = [{"controls": controls, "name": "first"}, {"controls": controls}, wrong]
+    refused(ask("POST", f"{CLIPS}.zip", json=asked("usdc", clips)), status, f"2/{field}", words)
+
+
+def refused(answer, status, place, words):
+    problem = answer.json()
+    assert answer.status_code == problem["status"] == status, problem
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert problem["errors"][0]["pointer"] == f"/clips/{place}", problem
+    assert words in problem["detail"], problem
+
+
+def test_a_name_that_another_clip_is_given_is_refused(ask, controls):
+    clips = [{"controls": controls, "name": "Clip-000001"}, {"controls": controls}]
+    answer = ask("POST", f"{CLIPS}.zip", json=asked("usdc", clips))
+    refused(answer, 422, "1/name", "'clip-000001', expected a name of its own")
+
+
+def test_controls_outside_the_samples_can_be_refused(ask, controls):
+    far = {"controls": {**controls, "turn": 1000.0}, "extrapolate": "refuse"}
+    answer = ask("POST", f"{CLIPS}.tar", json=asked("bvh", [{"controls": controls}, far]))
+    refused(answer, 422, "1/controls", "turn = 1000")
+    assert answer.json()["type"] == "urn:posefield:problem:outside-samples"
+
+
+WRONG = {
+    "no clips": ({"format": "usdc", "clips": []}, 422, "/clips"),
+    "an unknown format": ({"format": "fbx", "clips": [{"controls": {}}]}, 400, "/format"),
+    "no format": ({"clips": [{"controls": {}}]}, 400, "/format"),
+    "an unknown field": ({"format": "usdc", "clips": [], "names": []}, 400, "/names"),
+    "a clip that is none": ({"format": "usdc", "clips": [5]}, 400, "/clips/0"),
+    "one clip, not in a list": ({"format": "usdc", "clips": {"controls": {}}}, 400, "/clips"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_body_that_is_none_is_refused(name, ask):
+    body, status, pointer = WRONG[name]
+    answer = ask("POST", f"{CLIPS}.tar", json=body)
+    assert answer.status_code == status, answer.text
+    assert answer.json()["errors"][0]["pointer"] == pointer, answer.text
+
+
+def test_more_than_the_service_takes_is_refused_before_it_is_made(loaded, controls):
+    limits = Settings(clips_limit=3, clips_poses=100, clips_body_limit=2000)
+    small = asker(create_app(loaded, limits))
+    short, long = ({"controls": controls, "fps": fps} for fps in (10, 1000))
+    assert small("POST", f"{CLIPS}.zip", json=asked("usdc", [short] * 3)).status_code == 200
+    many = small("POST", f"{CLIPS}.zip", json=asked("usdc", [short] * 4))
+    assert many.status_code == 422 and "4 clips, expected 1 to 3" in many.json()["detail"]
+    slow = small("POST", f"{CLIPS}.zip", json=asked("usdc", [short, long]))
+    assert slow.status_code == 422 and "expected at most 100" in slow.json()["detail"]
+    large = small("POST", f"{CLIPS}.zip", content=b" " * 2001, headers=JSON)
+    assert large.status_code == 413
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_other_methods_media_types_and_archives_are_refused(kind, ask):
+    for method in ("GET", "HEAD", "PUT"):
+        answer = ask(method, f"{CLIPS}.{kind}")
+        assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
+    assert ask("POST", f"{CLIPS}.{kind}", content=b"{}").status_code == 415
+    unknown = ask("POST", f"{CLIPS}.rar", json={})
+    assert unknown.status_code == 404 and "there are zip, tar" in unknown.json()["detail"]
+
+
+@pytest.mark.parametrize("kind", PACKS)
+def test_each_archive_has_the_media_type_of_its_maker(kind, spec):
+    answer = spec["components"]["responses"][f"Clips{kind.capitalize()}"]
+    assert list(answer["content"]) == [PACKS[kind].media_type]
+
+
+def test_a_named_question_is_a_question_with_a_name(spec):
+    schemas = spec["components"]["schemas"]
+    named, alone = (schemas[name] for name in ("NamedClipQuestion", "ClipQuestion"))
+    assert named["required"] == alone["required"]
+    assert {k: v for k, v in named["properties"].items() if k != "name"} == alone["properties"]
+    assert schemas["ClipsQuestion"]["properties"]["format"]["enum"] == [*ENCODERS]

@@ -1,0 +1,74 @@
+"""Tables of queries as files, and what a source makes of them."""
+
+import csv
+import json
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from service.export import queries
+from service.export.columns import OPTIONS
+from service.export.queries import Asked, Defaults
+from service.export.query import Fault, Query
+
+POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
+TYPES |= {"performer": pa.string(), "extrapolate": pa.string()}
+
+
+def columns(rows):
+    """Controls first, then whatever any row says, in the order of messages in JSON Lines."""
+    return [*POINT, *(option for option in OPTIONS if any(option in row for row in rows))]
+
+
+def write_csv(path: Path, rows):
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns(rows))
+        writer.writeheader()
+        # repr of a float gives the same float back.
+        writer.writerows({k: "" if v is None else v for k, v in row.items()} for row in rows)
+    return path
+
+
+def write_jsonl(path: Path, rows):
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    return path
+
+
+def write_parquet(path: Path, rows):
+    made = {
+        c: pa.array([r.get(c) for r in rows], TYPES.get(c, pa.float64())) for c in columns(rows)
+    }
+    pq.write_table(pa.table(made), path)
+    return path
+
+
+def text(path: Path, *lines, end="\n"):
+    """CSV of lines below a heading of the controls, or as they are if the first is a heading."""
+    path.write_text(end.join([*lines, ""]), newline="")
+    return path
+
+
+def source(model, path=None, usual=None, **asked):
+    return queries.source(Asked(path, **asked), usual or Defaults("usdc"), model)
+
+
+def rows(model, path=None, usual=None, **asked):
+    return list(source(model, path, usual, **asked).rows())
+
+
+def faults(model, path, usual=None):
+    """Places, without the folder, and messages of the faults; the survey's must be the same."""
+    opened = source(model, path, usual)
+    found = [row for row in opened.rows() if isinstance(row, Fault)]
+    survey = opened.survey()
+    assert (survey.faulty, survey.faults) == (len(found), tuple(found[:20]))
+    return [(fault.place.removeprefix(f"{path.parent}/"), fault.message) for fault in found]
+
+
+def asked(found):
+    """Names, formats and questions of rows that are all queries."""
+    found = list(found)
+    assert all(isinstance(row, Query) for row in found), found
+    return [(row.name, row.format, row.question) for row in found]

@@ -1,0 +1,177 @@
+"""`posefield export`: what it takes, what it says, and the code it ends with."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import exporting
+import pytest
+
+from service import cli
+
+POSEFIELD = Path(sys.executable).parent / "posefield"
+HEADING = "name,stature,hip_height,turn,target_height,format,fps\n"
+TABLE = f"{HEADING}low,1.7,0.9,10,0.6,usdc,30\nhigh,1.7,0.9,10,1.4,bvh,60\nusual,1.7,0.9,10,1.0,,\n"
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Path of a table of three clips."""
+    path = tmp_path / "queries.csv"
+    path.write_text(TABLE)
+    return path
+
+
+@pytest.fixture
+def export(model_path, monkeypatch, capsys):
+    """Function that runs the command in this process; gives exit code, output and errors."""
+
+    def run(*words):
+        argv = ["posefield", "export", str(model_path), *map(str, words), "--workers", "1"]
+        monkeypatch.setattr(sys, "argv", argv)
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as ending:
+            code = ending.code or 0
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+def test_a_table_becomes_files(export, table, tmp_path):
+    code, out, err = export(table, "-o", tmp_path / "made", "--format", "json")
+    assert (code, err) == (0, "")
+    assert out.startswith(f"{tmp_path}/made: 3 clips, ")
+    lines = exporting.lines(tmp_path / "made/manifest.jsonl")
+    assert [(line["file"], line["fps"]) for line in lines] == [
+        ("clips/000/low.usdc", 30.0),
+        ("clips/000/high.bvh", 60.0),
+        ("clips/000/usual.json", 30.0),
+    ]
+
+
+def test_what_is_done_is_said_to_be(export, table, tmp_path):
+    export(table, "-o", tmp_path / "made")
+    code, out, _ = export(table, "-o", tmp_path / "made")
+    assert code == 0 and out.strip().endswith("; it was complete before")
+
+
+def test_its_facts_as_json(export, table, tmp_path):
+    code, out, err = export(table, "-o", tmp_path / "made", "--json")
+    facts = json.loads(out)
+    assert (code, facts["rows"], facts["done"], facts["export"]["clips"]) == (0, 3, 3, 3)
+    assert facts["export"] == json.loads((tmp_path / "made/export.json").read_text())
+    assert err.startswith(f"{tmp_path}/made: 3 clips")
+
+
+def test_a_grid_and_a_sampling(export, tmp_path):
+    held = [
+        word for name in ("stature=1.7", "hip_height=0.9", "turn=0,10") for word in ("--grid", name)
+    ]
+    code, out, _ = export(*held, "--grid", "target_height=0.8:1.2:5", "-o", tmp_path / "grid")
+    assert (code, out.split(",")[0]) == (0, f"{tmp_path}/grid: 10 clips")
+    code, out, _ = export("--sample", "7", "--method", "hull", "--seed", "2", "-o", tmp_path / "s")
+    assert (code, out.split(",")[0]) == (0, f"{tmp_path}/s: 7 clips")
+
+
+def test_units_and_axes_are_what_was_said(export, table, tmp_path):
+    for name, more in {"m": (), "cm": ("--unit", "cm"), "z": ("--up", "z")}.items():
+        assert export(table, "-o", tmp_path / name, *more)[0] == 0
+    kinds = {n: json.loads((tmp_path / n / "export.json").read_text()) for n in ("m", "cm", "z")}
+    assert [(kind["unit"], kind["up"]) for kind in kinds.values()] == [
+        (None, None),
+        (0.01, None),
+        (None, "z"),
+    ]
+
+
+def test_rows_at_fault_are_told_of_by_line(export, table, tmp_path):
+    table.write_text(f"{TABLE}again,1.7,0.9,10,1.0,usdc,often\nlow,1.7,0.9,10,1.0,usdc,30\n")
+    code, out, err = export(table, "-o", tmp_path / "made")
+    assert (code, out) == (2, "")
+    assert err.startswith(
+        "posefield: queries: rows that cannot be answered: 2 (--skip-errors leaves them out):"
+    )
+    assert "/queries.csv:5: fps: 'often', expected" in err
+    assert "/queries.csv:6: name: 'low'" in err
+    assert not (tmp_path / "made").exists()
+
+
+def test_rows_at_fault_are_skipped_if_asked_to(export, table, tmp_path):
+    table.write_text(f"{TABLE}again,1.7,0.9,10,1.0,usdc,often\n")
+    code, out, err = export(table, "-o", tmp_path / "made", "--skip-errors")
+    assert code == 0
+    assert "3 clips, " in out and "rows skipped and listed in skipped.jsonl: 1" in out
+    assert err.startswith("skipped: queries.csv:5: fps: 'often'")
+    assert exporting.lines(tmp_path / "made/skipped.jsonl")[0]["place"] == "queries.csv:5"
+
+
+def test_a_part_says_that_others_are_missing(export, table, tmp_path):
+    words = (table, "-o", tmp_path / "made", "--chunk", "1", "--shard")
+    code, out, _ = export(*words, "1/2")
+    assert (code, out) == (
+        0,
+        f"{tmp_path}/made: clips of this part: 1, all done; other parts are not yet\n",
+    )
+    code, out, _ = export(*words, "0/2")
+    assert code == 0 and ": 3 clips, " in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--unit", "ft"), "unit: 'ft', expected one of m, cm"),
+        (("--layout", "heap"), "layout: 'heap', expected one of folder"),
+        (("--chunk", "0"), "chunk: 0, expected 1 or more"),
+        (("--shard", "2/2"), "shard: 2/2, expected 0/N to N-1/N"),
+        (("--shard", "one"), "shard: 'one', expected I/N"),
+        (("--format", "fbx"), "format: 'fbx', expected one of"),
+        (("--fps", "0"), "fps: 0 frames a second, expected"),
+        (("--sample", "3"), "queries: a file and --sample, expected one of"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(words, said, export, table, tmp_path):
+    code, out, err = export(table, "-o", tmp_path / "made", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"posefield: {said}")
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_target_of_something_else_is_a_file_that_cannot_be_used(export, table, tmp_path):
+    code, _, err = export(table, "-o", tmp_path)
+    assert code == 3
+    assert "holds files that are no export's, expected an empty place" in err
+
+
+def test_a_terminal_sees_a_bar(model_path, tmp_path):
+    ours, its = pty.openpty()
+    words = [
+        POSEFIELD,
+        "export",
+        model_path,
+        "--sample",
+        "200",
+        "--chunk",
+        "4",
+        "-o",
+        tmp_path / "t",
+    ]
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=its, env=environment) as process:
+        os.close(its)
+        seen = b""
+        # The system says that nobody has the other end any more by an error.
+        try:
+            while more := os.read(ours, 4096):
+                seen += more
+        except OSError:
+            pass
+        assert b"200 clips" in process.stdout.read()
+    os.close(ours)
+    assert process.returncode == 0
+    assert b"/200" in seen and b"a second" in seen and b"left" in seen

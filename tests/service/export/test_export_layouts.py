@@ -1,0 +1,117 @@
+"""Archives hold what folders would, and every reader opens them."""
+
+import hashlib
+import subprocess
+import tarfile
+import zipfile
+
+import exporting
+import orjson
+import pytest
+
+from service import check
+from service.export import run
+from service.motion.errors import UsdError
+
+ROWS, CHUNK = 20, 8
+
+
+@pytest.fixture(scope="module")
+def source():
+    return exporting.queries(ROWS, "usdc", fps=10.0)
+
+
+@pytest.fixture(scope="module")
+def made(source, model_path, tmp_path_factory):
+    """Folder of an export, by layout."""
+
+    def of(layout):
+        folder = tmp_path_factory.mktemp(layout)
+        work = exporting.work(model_path, source, folder, CHUNK, layout)
+        run.run(work, source, exporting.Watching())
+        return folder
+
+    return {layout: of(layout) for layout in ("folder", "tar", "zip")}
+
+
+def unpacked(folder, layout):
+    """Members of all archives in a folder: name and content, in order."""
+    for path in sorted(folder.glob(f"clips-*.{layout}")):
+        if layout == "zip":
+            with zipfile.ZipFile(path) as archive:
+                assert archive.testzip() is None
+                yield from ((name, archive.read(name)) for name in archive.namelist())
+        else:
+            with tarfile.open(path) as archive:
+                yield from ((m.name, archive.extractfile(m).read()) for m in archive)
+
+
+@pytest.mark.parametrize("layout", ["tar", "zip"])
+def test_an_archive_for_each_chunk_holds_the_files_of_the_folders(layout, made):
+    names = {path.name for path in made[layout].iterdir()}
+    archives = {f"clips-{n:06d}.{layout}" for n in range(3)}
+    assert names == {*archives, "manifest.jsonl", "export.json"}
+    members = list(unpacked(made[layout], layout))
+    clips = {name: content for name, content in members if not name.startswith("manifest")}
+    loose = exporting.content(made["folder"])
+    assert clips == {path: content for path, content in loose.items() if path.startswith("clips")}
+
+
+@pytest.mark.parametrize("layout", ["tar", "zip"])
+def test_the_manifest_of_an_archive_is_its_last_member(layout, made):
+    members = list(unpacked(made[layout], layout))
+    places = [index for index, (name, _) in enumerate(members) if name.startswith("manifest")]
+    assert places == [CHUNK, 2 * CHUNK + 1, ROWS + 2]
+    assert [members[place][0] for place in places] == [f"manifest-{n:06d}.jsonl" for n in range(3)]
+    together = b"".join(members[place][1] for place in places)
+    assert together == (made["folder"] / "manifest.jsonl").read_bytes()
+
+
+@pytest.mark.parametrize("layout", ["tar", "zip"])
+def test_the_manifest_says_which_archive_a_file_is_in(layout, made):
+    contents = dict(unpacked(made[layout], layout))
+    lines = exporting.lines(made[layout] / "manifest.jsonl")
+    assert [line["archive"] for line in lines[:: ROWS - 1]] == [
+        f"clips-000000.{layout}",
+        f"clips-000002.{layout}",
+    ]
+    for line in lines:
+        assert line["sha256"] == hashlib.sha256(contents[line["file"]]).hexdigest()
+    facts = orjson.loads((made[layout] / "export.json").read_bytes())
+    assert facts["bytes"] == sum(p.stat().st_size for p in made[layout].glob("clips-*"))
+
+
+def test_gnu_tar_unpacks_them(made, tmp_path):
+    for path in made["tar"].glob("*.tar"):
+        done = subprocess.run(
+            ["tar", "-xf", path, "-C", tmp_path], capture_output=True, text=True, check=True
+        )
+        assert done.stderr == ""
+    assert exporting.content(tmp_path / "clips") == exporting.content(made["folder"] / "clips")
+
+
+@pytest.mark.parametrize("layout", ["tar", "zip"])
+def test_an_archive_that_was_cut_short_is_made_again(layout, made, source, model_path, tmp_path):
+    work = exporting.work(model_path, source, tmp_path, CHUNK, layout)
+    run.run(work, source, exporting.Watching(2))
+    archive = tmp_path / f"clips-000001.{layout}"
+    archive.write_bytes(archive.read_bytes()[:-1])
+    watch = exporting.Watching()
+    run.run(work, source, watch)
+    assert watch.begun == (ROWS, CHUNK)
+    assert exporting.content(tmp_path) == exporting.content(made[layout])
+
+
+def test_every_file_passes_the_check(made):
+    files = sorted(made["folder"].glob("clips/*/*.usdc"))
+    assert len(files) == ROWS
+    assert [finding for file in files for finding in check.check(file)] == []
+
+
+def test_a_file_that_is_none_would_not_pass(made, tmp_path):
+    """Negative control of the test above."""
+    good = next(made["folder"].glob("clips/*/*.usdc")).read_bytes()
+    bad = tmp_path / "bad.usdc"
+    bad.write_bytes(good[: len(good) // 2])
+    with pytest.raises(UsdError):
+        check.check(bad)

@@ -1,0 +1,159 @@
+"""Exports to an object store: a real server that speaks S3, in a process of its own."""
+
+import os
+import re
+import subprocess
+import sys
+import urllib.request
+
+import exporting
+import pytest
+
+from service.export import crew, run
+from service.export.run import Shard
+from service.export.store import Store
+from service.export.target import open_target
+from service.motion.errors import FileError
+
+ROWS = 30
+
+
+@pytest.fixture(scope="module")
+def server():
+    """Address of a store's server, and what tells of it in the environment."""
+    words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        address = next(
+            filter(None, (re.search(r"http://[\d.:]+", line) for line in process.stdout))
+        )
+        yield address.group()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture(autouse=True)
+def told(server, monkeypatch):
+    """The environment that says where the store is and who asks."""
+    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "somebody")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
+    monkeypatch.setenv("AWS_REGION", "us-east-1")
+
+
+@pytest.fixture
+def bucket(server, request):
+    """URL of a place in a bucket of the test's own."""
+    name = re.sub("[^a-z0-9]+", "-", request.node.name.lower()).strip("-")[:60].strip("-")
+    urllib.request.urlopen(urllib.request.Request(f"{server}/{name}", method="PUT")).close()
+    return f"s3://{name}/exports/first"
+
+
+@pytest.fixture(scope="module")
+def source():
+    return exporting.queries(ROWS)
+
+
+@pytest.fixture(scope="module")
+def local(source, model_path, tmp_path_factory):
+    """Content of the same export to a folder, by layout."""
+
+    def of(layout):
+        folder = tmp_path_factory.mktemp(layout)
+        work = exporting.work(model_path, source, folder, layout=layout)
+        run.run(work, source, exporting.Watching())
+        return exporting.content(folder)
+
+    return {layout: of(layout) for layout in ("folder", "tar")}
+
+
+def content(url):
+    """Bytes of every object under a URL, by path."""
+    store = Store(url)
+    return {path: store.read(path) for path in paths(store)}
+
+
+def paths(store):
+    import obstore
+
+    return [meta["path"] for batch in obstore.list(store._store) for meta in batch]
+
+
+@pytest.mark.parametrize("layout", ["folder", "tar"])
+def test_a_store_gets_what_a_folder_would(layout, source, model_path, bucket, local):
+    work = exporting.work(model_path, source, bucket, layout=layout)
+    outcome = run.run(work, source, exporting.Watching(), crew.of(2))
+    assert outcome.done == ROWS
+    assert content(bucket) == local[layout]
+
+
+def test_what_was_stopped_goes_on_in_a_store(source, model_path, bucket, local):
+    work = exporting.work(model_path, source, bucket)
+    run.run(work, source, exporting.Watching(2))
+    assert "manifest.jsonl" not in paths(Store(bucket))
+    watch = exporting.Watching()
+    run.run(work, source, watch)
+    assert watch.begun == (ROWS, 16)
+    assert content(bucket) == local["folder"]
+    assert run.run(work, source, watch).before
+
+
+def test_shards_meet_in_a_store(source, model_path, bucket, local):
+    work = exporting.work(model_path, source, bucket)
+    for index in (1, 0):
+        run.run(work, source, exporting.Watching(), shard=Shard(index, 2))
+    assert content(bucket) == local["folder"]
+
+
+def test_a_store_of_something_else_is_refused_and_left(source, model_path, bucket):
+    Store(bucket).write([("mine.txt", b"mine")])
+    with pytest.raises(FileError, match="no export's"):
+        run.run(exporting.work(model_path, source, bucket), source, exporting.Watching())
+    assert content(bucket) == {"mine.txt": b"mine"}
+
+
+def test_a_bucket_that_there_is_not_is_named(source, model_path):
+    work = exporting.work(model_path, source, "s3://nowhere/at/all")
+    with pytest.raises(FileError, match=r"^s3://nowhere/at/all: cannot be written or read"):
+        run.run(work, source, exporting.Watching())
+
+
+def test_a_file_is_created_once(bucket):
+    store = Store(bucket)
+    assert store.create("a", b"1")
+    assert not store.create("a", b"2")
+    assert store.read("a") == b"1"
+
+
+def test_a_large_file_goes_in_pieces_and_what_breaks_off_is_not_there(bucket):
+    store = Store(bucket)
+    assert store.stream("large", (bytes([n]) * 1_000_000 for n in range(20))) == 20_000_000
+    assert store.read("large")[::1_000_000] == bytes(range(20))
+
+    def broken():
+        yield bytes(9_000_000)
+        raise KeyError("no more")
+
+    with pytest.raises(KeyError):
+        store.stream("broken", broken())
+    assert store.read("broken") is None
+
+
+def test_an_address_of_no_store_is_refused():
+    with pytest.raises(FileError, match=r"^ftp://somewhere: cannot"):
+        open_target("ftp://somewhere")
+
+
+def test_the_address_of_a_folder_is_the_folder(source, model_path, tmp_path, local):
+    work = exporting.work(model_path, source, f"file://{tmp_path}/with%20space")
+    run.run(work, source, exporting.Watching())
+    assert exporting.content(tmp_path / "with space") == local["folder"]
+
+
+def test_credentials_come_from_the_environment(bucket, monkeypatch):
+    """Negative control: with another address in it the server is not found."""
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    monkeypatch.setitem(os.environ, "AWS_MAX_RETRIES", "0")
+    with pytest.raises(FileError, match="cannot be written or read"):
+        Store(bucket).read("a")

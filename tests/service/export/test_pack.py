@@ -1,0 +1,93 @@
+"""Many clips are made a few at a time, and the manifest lists all of them."""
+
+import dataclasses
+import hashlib
+
+import orjson
+import pytest
+
+from service.encode import ENCODERS
+from service.encode.convention import METRES
+from service.export import pack
+from service.export.pack import CLIPS, POSES, Order
+from service.export.query import Query
+from service.synthesis import session
+from service.synthesis.question import ClipQuestion, Prospect
+from service.synthesis.synthesizer import Synthesizer
+
+
+@pytest.fixture(scope="module")
+def model(model_path):
+    return Synthesizer("reaching", session.load(model_path))
+
+
+@pytest.fixture
+def order(model):
+    """An order of clips at some rates, and the frames of each batch that was made."""
+    made = []
+
+    def write(answers, convention):
+        made.append([len(answer.clip) for answer in answers])
+        return [b"%d" % sum(made[-1])] * len(answers)
+
+    def ordered(rates):
+        middle = {control.name: control.default for control in model.session.card.controls}
+        questions = [ClipQuestion(middle, fps=rate) for rate in rates]
+        queries = [Query(f"c{i}", "json", q, f"/clips/{i}") for i, q in enumerate(questions)]
+        encoder = dataclasses.replace(ENCODERS["json"], write=write)
+        prospects = [model.prospect(question) for question in questions]
+        return Order(model, encoder, METRES, queries, prospects)
+
+    return ordered, made
+
+
+def test_batches_are_bounded_in_clips_and_in_poses(order):
+    ordered, made = order
+    rates = [10] * 40 + [1000] * 5 + [10] * 3
+    asked = ordered(rates)
+    assert len(list(pack.members(asked))) == len(rates) + 1
+    assert [frames for batch in made for frames in batch] == [p.frames for p in asked.prospects]
+    assert all(len(batch) <= CLIPS for batch in made)
+    assert all(sum(batch) <= POSES for batch in made)
+    assert [len(batch) for batch in made[:2]] == [CLIPS, CLIPS]
+    assert max(map(sum, made)) > POSES / 2
+
+
+def test_a_clip_that_alone_is_more_than_a_batch_is_one(order):
+    ordered, made = order
+    asked = ordered([10] * 4)
+    prospects = [Prospect(frames, ()) for frames in (1, POSES + 1, 1, 1)]
+    list(pack.members(dataclasses.replace(asked, prospects=prospects)))
+    assert [len(batch) for batch in made] == [1, 1, 2]
+
+
+def test_a_batch_is_made_when_its_first_file_is_taken(order):
+    ordered, made = order
+    members = pack.members(ordered([10] * 2 * CLIPS))
+    for _ in range(CLIPS):
+        next(members)
+    assert len(made) == 1
+    next(members)
+    assert len(made) == 2
+
+
+def test_the_manifest_lists_the_files_in_order(order):
+    ordered, _ = order
+    *files, (name, content) = pack.members(ordered([10, 20]))
+    assert name == pack.MANIFEST
+    lines = [orjson.loads(line) for line in content.splitlines()]
+    assert [(line["name"], line["file"]) for line in lines] == [
+        ("c0", "c0.json"),
+        ("c1", "c1.json"),
+    ]
+    assert [(line["file"], line["sha256"]) for line in lines] == [
+        (file, hashlib.sha256(data).hexdigest()) for file, data in files
+    ]
+
+
+def test_it_is_said_once_that_clips_are_extrapolated(model, order):
+    asked = order[0]([10, 10])
+    assert asked.warnings == []
+    prospects = [asked.prospects[0], dataclasses.replace(asked.prospects[1], warnings=("far",))]
+    (said,) = dataclasses.replace(asked, prospects=prospects).warnings
+    assert said == "1 of 2 clips have some control outside what was sampled"

@@ -1,0 +1,211 @@
+"""Samplings keep what their names promise: strata hit once, points in the hull, equal bytes."""
+
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+from asking import rows, source
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.stats import chisquare, qmc
+
+from service.export import permutation, sampling
+from service.export.blocks import SIZE
+from service.synthesis import library
+
+# Chance gives less once in a million times.
+UNLIKELY = 1e-6
+# A point is a sum of a few products of numbers up to 100.
+ROUNDING = 1e-12
+
+PRINTED = """
+import hashlib, sys
+from pathlib import Path
+from service.export import queries
+from service.synthesis import library
+model = library.load([Path(sys.argv[1])]).models["labelled"]
+for method in ("latin", "hull"):
+    asked = queries.Asked(sample=5000, method=method, seed=3)
+    source = queries.source(asked, queries.Defaults("usdc"), model)
+    found = hashlib.sha256()
+    for row in source.rows():
+        found.update(repr(row).encode())
+    print(source.digest, found.hexdigest())
+"""
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return library.load([labelled_path]).models["labelled"]
+
+
+@pytest.fixture(scope="module")
+def card(model):
+    return model.session.card
+
+
+def drawn(card, method, count, seed=0):
+    return np.concatenate(list(sampling.METHODS[method](card, count, seed)))
+
+
+def unit(card, points):
+    """Points in the unit cube of the sampled ranges."""
+    low = np.array([control.minimum for control in card.controls])
+    return (points - low) / (np.array([control.maximum for control in card.controls]) - low)
+
+
+def continua(card):
+    """The card with every control a continuum."""
+    return replace(card, controls=tuple(replace(c, values=()) for c in card.controls))
+
+
+def strata_hit_once(points):
+    """Whether each of n parts of each axis holds one of the points (n, d) of the unit cube."""
+    parts = np.arange(len(points))[:, None]
+    scaled = np.sort(points, axis=0) * len(points)
+    # A point may lie at the edge of its part, to rounding.
+    return bool(np.all((scaled >= parts - 1e-6) & (scaled <= parts + 1 + 1e-6)))
+
+
+@given(count=st.integers(1, 3000), seed=st.integers(0, 2**63))
+@settings(max_examples=60, deadline=None)
+def test_a_permutation_sends_every_place_to_another(count, seed):
+    sent = permutation.of(np.arange(count, dtype=np.uint64), count, (seed,))
+    assert sorted(sent.tolist()) == list(range(count))
+
+
+def test_a_permutation_is_the_same_whatever_is_asked_together():
+    places = np.arange(1000, dtype=np.uint64)
+    whole = permutation.of(places, 1000, (5,))
+    parts = [permutation.of(part, 1000, (5,)) for part in np.array_split(places, 7)]
+    assert np.concatenate(parts).tolist() == whole.tolist()
+
+
+def test_permutations_of_four_are_all_equally_likely():
+    places = np.arange(4, dtype=np.uint64)
+    found = Counter(tuple(permutation.of(places, 4, (s,)).tolist()) for s in range(4800))
+    assert chisquare([found[order] for order in permutations(range(4))]).pvalue > UNLIKELY
+
+
+def test_permutations_that_only_turn_would_be_noticed():
+    """Negative control of the test above."""
+    found = Counter(tuple(((np.arange(4) + s) % 4).tolist()) for s in range(4800))
+    assert chisquare([found[order] for order in permutations(range(4))]).pvalue < UNLIKELY
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 1000, 2 * SIZE + 77])
+def test_a_latin_hypercube_hits_every_stratum_once(card, count):
+    found = unit(card, drawn(continua(card), "latin", count))
+    assert found.shape == (count, 4)
+    assert strata_hit_once(found)
+
+
+def test_the_strata_of_scipys_are_hit_once_and_those_of_chance_are_not(rng):
+    """Oracle and negative control of what the test above looks for."""
+    assert strata_hit_once(qmc.LatinHypercube(4, rng=rng).random(1000))
+    assert not strata_hit_once(rng.random((1000, 4)))
+
+
+def test_a_latin_hypercube_is_as_even_as_scipys(card, rng):
+    """Centred discrepancy: 200 points of ours lie as scipy's do, and chance does worse."""
+    ours = [qmc.discrepancy(unit(card, drawn(continua(card), "latin", 200, s))) for s in range(30)]
+    theirs = [qmc.discrepancy(qmc.LatinHypercube(4, rng=rng).random(200)) for _ in range(30)]
+    chance = [qmc.discrepancy(rng.random((200, 4))) for _ in range(30)]
+    spread = np.std(theirs) / np.sqrt(15)
+    assert abs(np.mean(ours) - np.mean(theirs)) < 5 * spread
+    assert np.mean(chance) - np.mean(theirs) > 5 * spread
+
+
+def test_a_control_of_few_values_takes_them_in_equal_shares(card):
+    statures = card.controls[0].values
+    assert len(statures) == 3
+    found = Counter(drawn(card, "latin", 10_000)[:, 0].tolist())
+    assert set(found) == set(statures)
+    assert max(found.values()) - min(found.values()) <= 1
+
+
+def in_hull(point, examples):
+    """Whether a point (d,) is a mixture of examples (n, d): a linear programme's feasibility."""
+    equal = np.vstack([examples.T, np.ones(len(examples))])
+    found = linprog(np.zeros(len(examples)), A_eq=equal, b_eq=[*point, 1.0], bounds=(0, None))
+    return found.status == 0
+
+
+def test_points_of_the_hull_are_mixtures_of_captured_clips(card):
+    examples = np.array(card.examples)
+    assert all(in_hull(point, examples) for point in drawn(card, "hull", 200))
+
+
+def test_points_of_the_box_are_not_all_mixtures(card):
+    """Negative control of the test above."""
+    examples = np.array(card.examples)
+    inside = [in_hull(point, examples) for point in drawn(continua(card), "latin", 200)]
+    assert 0 < sum(inside) < 180
+
+
+def test_points_of_the_hull_lie_on_average_where_clips_do(card):
+    """Each corner of a simplex weighs the same, so the mean is the clips' mean."""
+    points, examples = drawn(card, "hull", 20_000), np.array(card.examples)
+    error = (points.mean(0) - examples.mean(0)) / (points.std(0) / np.sqrt(len(points)))
+    assert np.abs(error).max() < 6.0
+    assert np.all(points.std(0) < examples.std(0))
+
+
+def test_weights_are_even_in_the_simplex(card):
+    """Even weights of n corners have E w^2 = 2 / (n (n + 1)); here n = 5."""
+    corners = replace(card, examples=tuple(map(tuple, np.eye(4).tolist())))
+    points = drawn(corners, "hull", 50_000)
+    # A corner is each of the four examples alike: variance p (1 - p) n E w^2.
+    expected = (1 / 4) * (3 / 4) * (2 / 6)
+    assert points.var(0) == pytest.approx([expected] * 4, rel=0.03)
+    assert points.sum(1) == pytest.approx(np.ones(50_000), abs=ROUNDING)
+
+
+@pytest.mark.parametrize("method", sampling.METHODS)
+def test_every_point_can_be_asked_for_where_it_was_sampled(model, method):
+    usual = source(model, sample=1).usual
+    strict = replace(usual, question=replace(usual.question, extrapolate="refuse"))
+    survey = source(model, usual=strict, sample=10_000, method=method).survey()
+    assert (survey.total, survey.faulty) == (10_000, 0)
+
+
+@pytest.mark.parametrize("method", sampling.METHODS)
+def test_seeds_differ_and_are_kept_to(card, method):
+    assert np.array_equal(drawn(card, method, 100, 1), drawn(card, method, 100, 1))
+    assert not np.array_equal(drawn(card, method, 100, 1), drawn(card, method, 100, 2))
+
+
+def test_a_sampling_is_latin_by_seed_0_unless_it_is_said(model):
+    assert rows(model, sample=50) == rows(model, sample=50, method="latin", seed=0)
+    assert rows(model, sample=50) != rows(model, sample=50, method="hull", seed=0)
+    assert rows(model, sample=50)[7].place == "sample 8"
+
+
+def test_a_sampling_is_the_same_in_every_process(labelled_path):
+    def printed():
+        command = [sys.executable, "-c", PRINTED, labelled_path]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    first = printed()
+    assert len(set(first.split())) == 4
+    assert printed() == first
+
+
+def test_numbers_of_a_seed_are_those_of_ever(card):
+    """Golden: NumPy may not change them, nor may we without a word in the changelog."""
+    plain = [replace(c, minimum=0.0, maximum=1.0, values=()) for c in card.controls[:2]]
+    square = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+    plain_card = replace(card, controls=tuple(plain), examples=square)
+    sent = permutation.of(np.arange(10, dtype=np.uint64), 10, (0,))
+    assert sent.tolist() == [4, 6, 8, 9, 0, 2, 5, 7, 3, 1]
+    assert drawn(plain_card, "latin", 2, 7).tolist() == LATIN
+    assert drawn(plain_card, "hull", 2, 7).tolist() == HULL
+
+
+LATIN = [[0.3125477333023335, 0.8850704755017371], [0.9486069004847877, 0.05596362215884215]]
+HULL = [[0.7747928100094081, 1.0], [0.6708655240916745, 0.6708655240916745]]

@@ -1,0 +1,87 @@
+"""Joints are called as a convention calls them, uniquely, and nothing else changes."""
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from service.motion import roles
+from service.motion.errors import InvalidField
+from service.motion.roles import Names
+from service.motion.skeleton import Skeleton
+
+CONVENTIONS = [names for names in get_args(Names) if names != "own"]
+
+
+def chain(*names):
+    count = len(names)
+    return Skeleton(names, (-1, *range(count - 1)), np.zeros((count, 3)), (), np.zeros((0, 3)))
+
+
+def test_every_convention_has_a_name_of_its_own_for_every_role():
+    assert set(roles.TABLES) == set(CONVENTIONS)
+    for table in roles.TABLES.values():
+        assert tuple(table) == roles.ROLES
+        assert len(set(table.values())) == len(roles.ROLES) == 22
+
+
+@pytest.mark.parametrize(
+    ("names", "hips", "upper_chest", "left_arm", "right_toes"),
+    [
+        ("mixamo", *(f"mixamorig:{n}" for n in ("Hips", "Spine2", "LeftArm", "RightToeBase"))),
+        ("ue5", "pelvis", "spine_05", "upperarm_l", "ball_r"),
+        ("vrm", "hips", "upperChest", "leftUpperArm", "rightToes"),
+        ("humanik", "Hips", "Spine2", "LeftArm", "RightToeBase"),
+    ],
+)
+def test_conventions_name_joints_as_their_users_do(names, hips, upper_chest, left_arm, right_toes):
+    found = [roles.TABLES[names][r] for r in ("hips", "upperChest", "leftUpperArm", "rightToes")]
+    assert found == [hips, upper_chest, left_arm, right_toes]
+
+
+@pytest.mark.parametrize("names", CONVENTIONS)
+def test_joints_without_a_role_keep_their_names(names):
+    found = roles.renamed(chain("root", "thorax", "thumb"), {"hips": "root"}, names)
+    assert found.names == (roles.TABLES[names]["hips"], "thorax", "thumb")
+
+
+def test_own_names_need_no_roles():
+    own = chain("root", "thorax")
+    assert roles.renamed(own, {}, "own") is own
+
+
+def test_names_that_a_convention_takes_are_left_to_it():
+    """CMU's spine is shifted by one: LowerBack, Spine, Spine1 become Spine, Spine1, Spine2."""
+    given = chain("Hips", "LowerBack", "Spine", "Spine1", "Neck")
+    cast = {"spine": "LowerBack", "chest": "Spine", "upperChest": "Spine1"}
+    assert roles.renamed(given, cast, "humanik").names == (
+        "Hips",
+        "Spine",
+        "Spine1",
+        "Spine2",
+        "Neck",
+    )
+
+
+def test_a_joint_whose_name_was_taken_gets_an_ending_that_nobody_has():
+    given = chain("hips", "Spine", "Spine_2", "low")
+    assert roles.renamed(given, {"spine": "low"}, "humanik").names == (
+        "hips",
+        "Spine_3",
+        "Spine_2",
+        "Spine",
+    )
+
+
+def test_nothing_but_names_changes():
+    given = chain("a", "b", "c")
+    found = roles.renamed(given, {"hips": "a", "spine": "b"}, "vrm")
+    assert found.parents == given.parents
+    assert found.offsets is given.offsets and found.tip_joints is given.tip_joints
+
+
+def test_without_roles_a_convention_is_refused():
+    with pytest.raises(InvalidField) as caught:
+        roles.renamed(chain("a"), {}, "mixamo")
+    assert caught.value.field == "names"
+    assert "expected 'own': this model's recipe gives its joints no [roles]" in str(caught.value)

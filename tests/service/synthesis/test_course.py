@@ -1,0 +1,193 @@
+"""Clips in place and loops: what is taken out, and that a loop ends in its first pose."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from service.motion import quat
+from service.motion.conventions import UP
+from service.motion.errors import InvalidField
+from service.synthesis import library
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.walk import plane, stride
+
+POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+STROLL = {"haste": 4.0, "veer": 400.0}
+# The graph answers in float32, and sums a batch in another order than one row.
+FLOAT32 = 1e-5
+
+
+@pytest.fixture(scope="module")
+def walker(walk_path):
+    return library.load([walk_path]).models["stroll"]
+
+
+@pytest.fixture(scope="module")
+def reacher(model_path):
+    return library.load([model_path]).models["reaching"]
+
+
+def clip(model, controls, **asked):
+    return model.clip(ClipQuestion(controls, **asked)).clip
+
+
+def end_of(model, controls):
+    """The pose at the end of the clip, s, and when that is."""
+    duration = model.pose(controls, [0.0], "warn").trust.duration
+    return model.pose(controls, [duration], "warn"), duration
+
+
+def apart(a, b):
+    """Largest difference of quaternions that may be of either sign."""
+    return np.minimum(np.abs(a - b).max(axis=-1), np.abs(a + b).max(axis=-1)).max()
+
+
+@pytest.mark.parametrize("fps", [1.0, 24.0, 29.97, 120.0])
+def test_a_loop_is_the_whole_cycle_in_even_steps(walker, fps):
+    found = walker.clip(ClipQuestion(STROLL, fps, loop=True))
+    _, duration = end_of(walker, STROLL)
+    steps = max(1, round(duration * fps))
+    assert len(found.clip) == steps + 1
+    assert (found.clip.rate, found.clip.duration) == (fps, steps / fps)
+    assert found.trust.duration == duration
+    middle = steps // 2
+    there = walker.pose(STROLL, [middle * duration / steps], "warn")
+    assert np.abs(found.clip.rotations[middle] - there.rotations[0]).max() < FLOAT32
+    assert np.abs(found.clip.root_path[middle] - there.root_position[0]).max() < FLOAT32
+
+
+@pytest.mark.parametrize("fps", [7.0, 30.0, 1.0])
+def test_the_frames_of_a_loop_are_known_before_it_is_made(walker, fps):
+    asked = ClipQuestion(STROLL, fps, loop=True)
+    assert walker.prospect(asked).frames == len(walker.clip(asked).clip)
+
+
+def test_a_loop_in_place_ends_in_every_number_as_it_begins(walker):
+    found = clip(walker, STROLL, root="in_place", loop=True)
+    assert np.array_equal(found.rotations[-1], found.rotations[0])
+    assert np.array_equal(found.translations[-1], found.translations[0])
+    # Negative control: without the loop the last frame is short of the end.
+    open_end = clip(walker, STROLL, root="in_place")
+    assert not np.array_equal(open_end.rotations[-1], open_end.rotations[0])
+
+
+def test_a_loop_that_travels_ends_as_it_begins_but_for_its_way_and_turn(walker):
+    found, (end, _) = clip(walker, STROLL, loop=True), end_of(walker, STROLL)
+    assert np.array_equal(found.rotations[-1, 1:], found.rotations[0, 1:])
+    assert found.root_path[-1, 1] == found.root_path[0, 1]
+    turned = quat.mul(found.rotations[-1, 0], quat.conj(found.rotations[0, 0]))
+    assert quat.twist(turned, UP) == pytest.approx(0.4, abs=0.02)
+    assert np.abs(np.delete(turned, [0, 2])).max() < 1e-12
+    # It is where the model itself has the end of the cycle.
+    assert apart(found.rotations[-1], end.rotations[0]) < FLOAT32
+    assert np.abs(found.root_path[-1] - end.root_position[0]).max() < FLOAT32
+    # Negative control: the frame before is elsewhere.
+    assert np.abs(found.root_path[-2] - end.root_position[0]).max() > 1000 * FLOAT32
+
+
+def test_a_loop_goes_on_as_smoothly_over_its_seam_as_elsewhere(walker):
+    found = clip(walker, STROLL, root="in_place", loop=True, fps=60.0)
+    steps = np.abs(np.diff(np.concatenate([found.rotations, found.rotations[1:3]]), n=2, axis=0))
+    seam = len(found) - 2
+    assert steps[seam].max() < 1.5 * np.delete(steps, seam, axis=0).max()
+
+
+def test_a_cycle_in_place_is_posed_as_in_crowds(walker):
+    found = clip(walker, STROLL, root="in_place")
+    point = np.array([[STROLL[c.name] for c in walker.session.card.controls]])
+    count = len(found)
+    _, duration = end_of(walker, STROLL)
+    phases = np.arange(count) / 30.0 / duration
+    labels = stride.labels(walker.session, np.full(count, -1))
+    crowd = stride.poses(walker.session, np.tile(point, (count, 1)), labels, phases)
+    own = stride.strides(walker.session, point, labels[:1])
+    assert np.abs(found.rotations - crowd.rotations).max() < FLOAT32
+    assert np.abs(plane.of(found.root_path) - own.starts - crowd.places).max() < FLOAT32
+    assert np.abs(found.root_path[:, 1] - crowd.heights).max() < FLOAT32
+
+
+def test_a_cycle_in_place_keeps_its_heights_and_its_first_pose(walker):
+    still, going = (clip(walker, STROLL, root=root) for root in ("in_place", "travelling"))
+    assert np.array_equal(still.root_path[:, 1], going.root_path[:, 1])
+    assert np.array_equal(still.rotations[:, 1:], going.rotations[:, 1:])
+    assert apart(still.rotations[0], going.rotations[0]) < FLOAT32
+    assert np.abs(still.root_path[0] - going.root_path[0]).max() < FLOAT32
+    # What sways about the arc stays: a few centimetres of more than a metre.
+    assert np.ptp(still.root_path, axis=0).max() < 0.15 < np.ptp(going.root_path, axis=0).max()
+
+
+def test_what_is_no_cycle_ends_over_where_it_began(reacher):
+    _, duration = end_of(reacher, POINT)
+    # The clip's last frame is its end.
+    asked = {"fps": 30.0 / duration}
+    still, going = (clip(reacher, POINT, root=root, **asked) for root in ("in_place", "travelling"))
+    assert len(still) == 31
+    assert np.abs((still.root_path[-1] - still.root_path[0])[[0, 2]]).max() < FLOAT32
+    assert np.abs((going.root_path[-1] - going.root_path[0])[[0, 2]]).max() > 1000 * FLOAT32
+    assert np.array_equal(still.root_path[:, 1], going.root_path[:, 1])
+    assert np.array_equal(still.rotations, going.rotations)
+    taken = (going.root_path - still.root_path)[:, [0, 2]]
+    assert np.abs(np.diff(taken, n=2, axis=0)).max() < FLOAT32
+
+
+def test_a_span_in_place_is_a_slice_of_the_whole(reacher):
+    whole = clip(reacher, POINT, root="in_place")
+    part = clip(reacher, POINT, root="in_place", start=0.2, end=0.7)
+    assert np.abs(part.translations - whole.translations[6:22]).max() < FLOAT32
+    assert np.abs(part.translations - whole.translations[7:23]).max() > 10 * FLOAT32
+
+
+def test_a_model_in_place_is_as_it_is(walker):
+    card = dataclasses.replace(walker.session.card, root="in_place")
+    model = Synthesizer("still", dataclasses.replace(walker.session, card=card))
+    asked, given = (clip(model, STROLL, root=root) for root in ("in_place", "travelling"))
+    assert np.array_equal(asked.rotations, given.rotations)
+    assert np.array_equal(asked.translations, given.translations)
+
+
+@pytest.mark.parametrize("level", [0, 3])
+def test_every_level_of_detail_closes(walker, level):
+    found = clip(walker, STROLL, root="in_place", loop=True, level=level)
+    assert np.array_equal(found.rotations[-1], found.rotations[0])
+
+
+def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
+    for ask in (reacher.clip, reacher.check):
+        with pytest.raises(InvalidField, match=r"^loop: true, expected false: this model's last"):
+            ask(ClipQuestion(POINT, loop=True))
+
+
+@pytest.mark.parametrize(
+    ("span", "said"),
+    [
+        ({"start": 0.2}, "start: 0.2 s with loop, expected none: a loop is a whole cycle"),
+        ({"end": 0.5}, "end: 0.5 s with loop, expected none: a loop is a whole cycle"),
+    ],
+)
+def test_a_part_of_a_loop_is_refused(walker, span, said):
+    for ask in (walker.clip, walker.check):
+        with pytest.raises(InvalidField) as caught:
+            ask(ClipQuestion(STROLL, loop=True, **span))
+        assert str(caught.value) == said
+
+
+@pytest.mark.parametrize("fps", [0.5, 1001.0, True, "30"])
+def test_a_loop_at_no_rate_is_refused(walker, fps):
+    with pytest.raises(InvalidField, match=r"^fps: "):
+        clip(walker, STROLL, loop=True, fps=fps)
+
+
+def test_joints_are_called_as_asked_for_and_stay_where_they_are(reacher):
+    own, theirs = clip(reacher, POINT), clip(reacher, POINT, names="mixamo")
+    assert theirs.skeleton.names[:2] == ("mixamorig:Hips", "mixamorig:LeftUpLeg")
+    assert "LeftThumb1" in theirs.skeleton.names
+    assert np.array_equal(own.positions(), theirs.positions())
+    assert clip(reacher, POINT, names="mixamo").skeleton is theirs.skeleton
+
+
+def test_names_of_a_convention_need_roles(walker):
+    for ask in (walker.clip, walker.check):
+        with pytest.raises(InvalidField, match=r"^names: 'ue5', expected 'own'"):
+            ask(ClipQuestion(STROLL, names="ue5"))
