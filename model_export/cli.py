@@ -15,7 +15,7 @@ import typer
 from service.cli import Controls, Json, as_json, encoder, numbers, wrote
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
-from service.motion.errors import InvalidField
+from service.motion.errors import InvalidField, TrainingError
 
 if TYPE_CHECKING:
     from model_export.export import Exported
@@ -67,8 +67,11 @@ def sample(
 
 
 def train_command(
-    recipe_file: Annotated[Path, typer.Argument(help="a TOML file", metavar="RECIPE")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="the .onnx file to write")],
+    recipe_files: Annotated[list[Path], typer.Argument(help="TOML files", metavar="RECIPE...")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="the .onnx file to write; of several recipes a folder"),
+    ],
     data: Annotated[
         Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
     ] = None,
@@ -76,15 +79,28 @@ def train_command(
         Path | None,
         typer.Option(help="the .html file to write on the training, with a .json beside it"),
     ] = None,
+    jobs: Annotated[int | None, typer.Option(help="of several recipes: processes")] = None,
+    scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
-    """Train a recipe's model and write it as one .onnx file."""
+    """Train a recipe's model and write it as one .onnx file; several recipes at once."""
+    _expect_html(report)
+    if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):
+        _train(recipe_files[0], data, output, report, json)
+    elif report:
+        raise InvalidField("report", "of several recipes or on a cluster, expected none")
+    else:
+        _sweep(recipe_files, data, output, _Place(jobs, scheduler), json)
+
+
+def _train(
+    recipe_file: Path, data: Path | None, output: Path, report: Path | None, json: bool
+) -> None:
     # SciPy and onnx take a second to import, which every other command would wait for.
     from model_export import export, ingest, recipe, train
 
     if output.suffix != ".onnx":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
-    _expect_html(report)
     progress = _Progress()
     progress(f"reading {recipe_file}")
     own = recipe.read(recipe_file)
@@ -97,6 +113,42 @@ def train_command(
         _write_report(own, trained, exported, progress, report)
     progress("done")
     typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where several are trained: in so many processes here, or on a cluster."""
+
+    jobs: int | None
+    scheduler: str | None
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
+
+
+def _sweep(
+    recipe_files: list[Path], data: Path | None, folder: Path, place: _Place, json: bool
+) -> None:
+    from model_export import sweep
+
+    if folder.suffix == ".onnx":
+        raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
+    found, failed = [], []
+    with _jobs(place.scheduler):
+        for made in sweep.models(recipe_files, data, place.jobs):
+            if isinstance(made.found, TrainingError):
+                failed.append(made.name)
+                typer.echo(f"{made.name}: {made.found}", err=True)
+                continue
+            path = folder / f"{made.name}.onnx"
+            files.write(made.found.content, path)
+            found.append(_facts(made.found, path))
+            typer.echo(_summary(made.found, path), err=json)
+    if json:
+        typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
+    if failed:
+        raise TrainingError(f"{', '.join(sorted(failed))} of {len(recipe_files)} made no model")
 
 
 def _expect_html(report: Path | None) -> None:
@@ -192,7 +244,7 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
         files.write(render.html(own.description, results), wanted.report)
 
 
-def _jobs(scheduler: str | None, shared: Sequence[Any]) -> AbstractContextManager[None]:
+def _jobs(scheduler: str | None, shared: Sequence[Any] = ()) -> AbstractContextManager[None]:
     """Inside, jobs run on a cluster, or here where none is named."""
     if scheduler is None:
         return nullcontext()
