@@ -6,19 +6,23 @@ keep their names, which may be any text here.
 
 import struct
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import orjson
 
-from service.encode import body, convention
-from service.encode.body import Body
+from service.encode import body, character, convention
+from service.encode.body import Integers
+from service.encode.character import Rest, Rig
 from service.encode.convention import METRES, Convention
 from service.motion import quat
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles
+
+Bytes = npt.NDArray[np.uint8]
 
 MAGIC, VERSION, TEXT, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 VERTICES, CORNERS = 34962, 34963
@@ -73,19 +77,18 @@ def glb(answer: ClipAnswer, said: Convention) -> bytes:
     """
     convention.refuse_other(said, METRES, "glb")
     clip, store = answer.clip, Store()
-    offsets = clip.translations[0].copy()
-    offsets[0] = clip.skeleton.offsets[0]
-    rest = clip.skeleton.at_rest(offsets)
-    made = body.build(body.bones(clip.skeleton, rest), middle=rest[0, 0])
+    rig = character.rig(clip.skeleton)
+    resting = character.resting(rig, clip.translations[:1])
+    offsets = resting.offsets[0]
     joints = len(offsets)
     document = {
         "asset": _asset(answer),
         "scene": 0,
         "scenes": [{"nodes": [0, joints]}],
         "nodes": [*_joints(clip, offsets), {"name": "Body", "mesh": 0, "skin": 0}],
-        "meshes": [{"name": "Body", "primitives": [_primitive(store, made, joints)]}],
+        "meshes": [{"name": "Body", "primitives": [_primitive(store, resting)]}],
         "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.8}}],
-        "skins": [_skin(store, rest)],
+        "skins": [_skin(store, clip.skeleton.at_rest(offsets))],
         "animations": [_animation(store, clip)],
         "bufferViews": store.views,
         "accessors": store.accessors,
@@ -113,25 +116,44 @@ def _joints(clip: Clip, offsets: Floats) -> list[dict[str, Any]]:
     return nodes
 
 
-def _primitive(store: Store, made: Body, joints: int) -> dict[str, Any]:
-    count = len(made.points)
-    skinned = np.zeros((count, 4), _smallest(joints))
-    skinned[:, 0] = made.joints
-    weights = np.tile(WHOLE, (count, 1))
+def _primitive(store: Store, resting: Rest) -> dict[str, Any]:
+    points, normals = (_single(values[0]) for values in body.mesh(resting.boxes))
+    fixed = _fixed(resting.rig)
     return {
         "attributes": {
-            "POSITION": store.bounded(_single(made.points), "VEC3", target=VERTICES),
-            "NORMAL": store.add(_single(made.normals), "VEC3", target=VERTICES),
-            "COLOR_0": _shares(store, COLORS[made.tints]),
-            "JOINTS_0": store.add(skinned, "VEC4", target=VERTICES),
-            "WEIGHTS_0": _shares(store, weights),
+            "POSITION": store.bounded(points, "VEC3", target=VERTICES),
+            "NORMAL": store.add(normals, "VEC3", target=VERTICES),
+            "COLOR_0": _shares(store, fixed.colors),
+            "JOINTS_0": store.add(fixed.joints, "VEC4", target=VERTICES),
+            "WEIGHTS_0": _shares(store, fixed.weights),
         },
-        "indices": store.add(_triangles(made), "SCALAR", target=CORNERS),
+        "indices": store.add(fixed.corners, "SCALAR", target=CORNERS),
         "material": 0,
     }
 
 
-def _shares(store: Store, values: npt.NDArray[np.uint8]) -> int:
+@dataclass(frozen=True)
+class Fixed:
+    """What of a body its size does not change: colours, joints and weights (P, 4) of its points,
+    and the corners of its triangles (3 T,)."""
+
+    colors: Bytes
+    joints: npt.NDArray[Any]
+    weights: Bytes
+    corners: npt.NDArray[Any]
+
+
+@lru_cache(maxsize=64)
+def _fixed(rig: Rig) -> Fixed:
+    owners = np.repeat(rig.bones.joints, body.POINTS)
+    joints = np.zeros((len(owners), 4), _smallest(len(rig.skeleton)))
+    joints[:, 0] = owners
+    weights = np.tile(WHOLE, (len(owners), 1))
+    corners = _triangles(*body.faces(rig.bones)).astype(_smallest(len(owners)))
+    return Fixed(np.repeat(COLORS[rig.bones.tints], body.POINTS, axis=0), joints, weights, corners)
+
+
+def _shares(store: Store, values: Bytes) -> int:
     view = store.view(values.tobytes(), target=VERTICES)
     return store.accessor(values, "VEC4", view, normalized=True)
 
@@ -166,7 +188,7 @@ def _animation(store: Store, clip: Clip) -> dict[str, Any]:
     }
 
 
-def _tracks(store: Store, tracks: npt.NDArray[np.float32], kind: str) -> list[int]:
+def _tracks(store: Store, tracks: Singles, kind: str) -> list[int]:
     """Accessors of each joint's frames (J, F, ...), which share a view."""
     view, size = store.view(tracks.tobytes()), tracks[0].nbytes
     return [
@@ -174,18 +196,17 @@ def _tracks(store: Store, tracks: npt.NDArray[np.float32], kind: str) -> list[in
     ]
 
 
-def _single(values: Floats) -> npt.NDArray[np.float32]:
+def _single(values: Floats | Singles) -> Singles:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
-def _triangles(made: Body) -> npt.NDArray[Any]:
-    """Corners (3 T,) of the faces cut into fans."""
-    cut = made.face_counts - 2
+def _triangles(counts: Integers, points: Integers) -> Integers:
+    """Corners (3 T,) of faces cut into fans."""
+    cut = counts - 2
     owner = np.repeat(np.arange(len(cut)), cut)
-    first = (np.cumsum(made.face_counts) - made.face_counts)[owner]
+    first = (np.cumsum(counts) - counts)[owner]
     turn = np.arange(len(owner)) - (np.cumsum(cut) - cut)[owner]
-    corners = made.face_points[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)]
-    return corners.reshape(-1).astype(_smallest(len(made.points)))
+    return points[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)].reshape(-1)
 
 
 def _smallest(count: int) -> type[np.unsignedinteger[Any]]:

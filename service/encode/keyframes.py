@@ -4,7 +4,8 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
-from service.encode.convention import Convention, applied
+from service.encode import axes
+from service.encode.convention import Convention
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 from service.motion.conventions import Floats
@@ -24,7 +25,7 @@ DECIMALS = 6
 
 def json(answer: ClipAnswer, convention: Convention) -> bytes:
     """One JSON object: the skeleton, every frame's rotations and root position, and the trust."""
-    clip = applied(answer.clip, convention)
+    clip = axes.moved(convention, answer.clip)
     content = {
         "units": units(convention),
         "names": clip.skeleton.names,

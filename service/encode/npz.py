@@ -3,14 +3,14 @@
 import numpy as np
 import orjson
 
-from service.encode import arrays, keyframes
-from service.encode.convention import Convention, applied
+from service.encode import arrays, axes, keyframes
+from service.encode.convention import Convention
 from service.motion.answer import ClipAnswer
 
 
 def npz(answer: ClipAnswer, convention: Convention) -> bytes:
     """Archive that numpy.load opens without pickle, of what `keyframes.json` holds."""
-    clip = applied(answer.clip, convention)
+    clip = axes.moved(convention, answer.clip)
     return arrays.archive(
         {
             "times": keyframes.times(clip),

@@ -6,7 +6,7 @@ import numpy as np
 import orjson
 import pytest
 
-from service.encode import ENCODERS, convention
+from service.encode import ENCODERS, axes, convention
 from service.encode.convention import CENTIMETRES, METRES, Convention
 from service.motion import bvh, skeleton
 
@@ -140,7 +140,7 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
 
 def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     """Its front is -Y where Z is up."""
-    found = convention.applied(walk.clip, STAGE).skeleton
+    found = axes.moved(STAGE, walk.clip).skeleton
     meant = on_stage(walk.clip.skeleton.offsets)
     np.testing.assert_allclose(found.offsets, meant, atol=1e-12)
     np.testing.assert_allclose(
