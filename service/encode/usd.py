@@ -48,7 +48,7 @@ class Clips:
             root = character.root(made, "Character", self.rig)
             character.fill(root, content.values)
             animation = character.animation(root, "Anim", self.rig.paths)
-            character.bind(root, animation)
+            character.bind(root, animation.path)
             specs.samples(animation, content.samples)
         return made
 
