@@ -15,6 +15,7 @@ import clips_http
 import crowd
 import crowd_usd
 import export
+import export_formats
 import newcomer
 import paper
 import precompute
@@ -37,6 +38,7 @@ def main() -> None:
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
+        *export_formats.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),
         *export.rows(model),
