@@ -74,8 +74,7 @@ def main() -> int:
         ]
         cases.write_invalid(folder)
         rows += khronos(node, folder)
-    print("
-".join(faults) or f"no fault in {exports.CLIPS} exported files")
+    print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     return _report(rows) or bool(faults)
 
 
