@@ -71,7 +71,7 @@ def test_a_cluster_trains_the_same_models(folder, alone, tmp_path):
 
 def test_a_recipe_that_makes_no_model_stops_no_other(folder, alone, tmp_path):
     few = folder / "few.toml"
-    few.write_text(TOML + "[clips.where]\nv = { max = 1 }\n")
+    few.write_text(TOML + "[clips.where]\nv = { maximum = 1 }\n")
     done = train(few, *recipes(folder), "-o", tmp_path / "made")
     assert done.returncode == 4
     assert re.search(r"^few: 2 samples, expected at least 3", done.stderr, re.MULTILINE)
