@@ -13,6 +13,7 @@ from pathlib import Path
 
 import crowd
 import crowd_usd
+import export_formats
 import newcomer
 import paper
 import precompute
@@ -33,6 +34,7 @@ def main() -> None:
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
+        *export_formats.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
