@@ -6,11 +6,13 @@ not become -0.
 """
 
 import math
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from service.encode.convention import Convention
+from service.encode.convention import METRES, Convention
+from service.motion.clip import Clip
 from service.motion.conventions import Floats, Singles
 
 Either = TypeVar("Either", Floats, Singles)
@@ -36,6 +38,21 @@ def rotations(convention: Convention, turns: Singles) -> Singles:
     if convention.up == "y":
         return turns
     return turns[..., [*TURNED, 3]] * np.array([1, -1, 1, 1], turns.dtype) + turns.dtype.type(0.0)
+
+
+def moved(convention: Convention, clip: Clip) -> Clip:
+    """The clip in a file's units and axes, in which its skeleton is at rest as well."""
+    if convention == METRES:
+        return clip
+    joints, turns = clip.skeleton, clip.rotations
+    offsets, tips = (places(convention, o) for o in (joints.offsets, joints.tip_offsets))
+    turned = np.concatenate([turns[..., :1], directions(convention, turns[..., 1:])], axis=-1)
+    return Clip(
+        replace(joints, offsets=offsets, tip_offsets=tips),
+        turned,
+        places(convention, clip.translations),
+        clip.rate,
+    )
 
 
 def box(convention: Convention, corners: Floats) -> Floats:
