@@ -61,6 +61,26 @@ def test_each_file_is_what_its_own_path_answers(extension, kind, ask, questions)
     assert len(set(contents)) == len(contents)
 
 
+def test_an_archive_has_one_convention_and_clips_their_own_names_and_roots(ask, controls):
+    clips = [{"controls": controls, "root": "in_place"}, {"controls": controls, "names": "vrm"}]
+    measures = {"unit": "cm", "up": "z"}
+    answer = ask("POST", f"{CLIPS}.tar", json=asked("bvh", clips) | measures)
+    contents = [*unpacked("tar", answer.content).values()][:2]
+    alone = [ask("POST", "/v1/models/reach/clip.bvh", json=each | measures) for each in clips]
+    assert [each.content for each in alone] == contents
+    plain = ask("POST", f"{CLIPS}.tar", json=asked("bvh", clips)).content
+    assert contents[0] not in plain and contents[1] not in plain
+
+
+def test_what_a_format_or_model_forbids_is_refused_before_the_answer_begins(ask, controls):
+    still = {"controls": controls}
+    metres = ask("POST", f"{CLIPS}.zip", json=asked("glb", [still]) | {"unit": "cm"})
+    assert metres.status_code == 422
+    assert metres.json()["errors"][0]["pointer"] == "/unit"
+    loop = ask("POST", f"{CLIPS}.zip", json=asked("usdc", [still, {**still, "loop": True}]))
+    refused(loop, 422, "1/loop", "does not lead into its first")
+
+
 @pytest.mark.parametrize("kind", PACKS)
 def test_the_manifest_says_what_each_file_is(kind, ask, questions, spec):
     answer = ask("POST", f"{CLIPS}.{kind}", json=asked("json", questions))
