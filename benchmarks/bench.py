@@ -14,6 +14,7 @@ from pathlib import Path
 import crowd
 import crowd_usd
 import export
+import export_formats
 import newcomer
 import paper
 import precompute
@@ -36,6 +37,7 @@ def main() -> None:
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
+        *export_formats.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),
         *export.rows(model),

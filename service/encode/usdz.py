@@ -6,7 +6,7 @@ USDZ would have to end it goes on in the records of Zip64.
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,9 +41,9 @@ class Member:
     chunks: Iterable[bytes]
 
 
-def usdz(answer: ClipAnswer, convention: Convention) -> bytes:
-    """USDZ of one binary layer."""
-    return package(usd.usdc(answer, convention))
+def usdz(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """USDZ of one binary layer each."""
+    return list(map(package, usd.usdc(answers, convention)))
 
 
 def package(data: bytes) -> bytes:
