@@ -9,7 +9,7 @@ from pxr import Sdf
 from service.encode import character, facts, layers, specs, takes
 from service.encode.content import Array, Content
 from service.encode.convention import Convention
-from service.encode.press import PRESS
+from service.encode.press import CRATES
 from service.motion.answer import ClipAnswer
 
 PRIM = "Anim"
@@ -33,12 +33,17 @@ class Animations:
         """Arrays that every layer holds."""
         return ()
 
+    def head(self, content: Content) -> Any:
+        """The layer without its prims."""
+        made = Sdf.Layer.CreateAnonymous("animation.usda")
+        layers.head(made, PRIM, content.frames, self.rate, self.convention)
+        layers.say(made, facts.dictionary(content.facts.whole()))
+        return made
+
     def layer(self, content: Content) -> Any:
         """The layer, made by usd-core; the caller must keep it, since its prims do not."""
-        made = Sdf.Layer.CreateAnonymous("animation.usda")
+        made = self.head(content)
         with Sdf.ChangeBlock():
-            layers.head(made, PRIM, content.frames, self.rate, self.convention)
-            layers.say(made, facts.dictionary(content.facts.whole()))
             specs.samples(character.animation(made, PRIM, self.paths), content.samples)
         return made
 
@@ -46,6 +51,6 @@ class Animations:
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Binary layers of the clips' animations, without a character; the facts are in each."""
     return [
-        PRESS.write(Animations(take.rig.paths, take.rate, convention), take.content)
+        CRATES.write(Animations(take.rig.paths, take.rate, convention), take.content)
         for take in takes.bare(answers, convention)
     ]

@@ -138,9 +138,9 @@ def fill(root: Any, numbers: Numbers) -> None:
 
 
 def bind(root: Any, animation: Any) -> None:
-    """Let the skeleton of a SkelRoot move as a SkelAnimation does."""
+    """Let the skeleton of a SkelRoot move as the SkelAnimation at a path does."""
     skeleton = root.layer.GetPrimAtPath(root.path.AppendChild("Skel"))
-    specs.relation(skeleton, "skel:animationSource", animation.path)
+    specs.relation(skeleton, "skel:animationSource", animation)
 
 
 def animation(parent: Any, name: str, paths: tuple[str, ...]) -> Any:

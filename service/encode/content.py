@@ -57,6 +57,9 @@ class Author(Protocol):
     def values(self) -> tuple[Array, ...]:
         """Arrays that every layer of this kind holds."""
 
+    def head(self, content: Content) -> Any:
+        """The layer without its prims."""
+
     def layer(self, content: Content) -> Any:
         """The layer, made by usd-core; the caller must keep it, since its prims do not."""
 

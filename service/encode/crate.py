@@ -83,6 +83,11 @@ class Template:
         return any(contents.alike(every[a], every[b]) for a, b in self.apart)
 
 
+def pattern(author: Author, content: Content) -> Pattern:
+    """What decides how the bytes of a layer are laid out."""
+    return contents.pattern(content, author.numbers)
+
+
 def ordinary(author: Author, content: Content) -> bytes:
     """The layer as usd-core writes it."""
     return layers.crate(author.layer(content))

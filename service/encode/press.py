@@ -4,14 +4,36 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from threading import Lock
+from typing import Any, Protocol
 
-from service.encode import content as contents
-from service.encode import crate
+from service.encode import crate, text
 from service.encode.content import Author, Content
-from service.encode.crate import Template
 
 ENTRY = 1000
 """Bytes that are counted for what is known of a pattern without a template."""
+
+
+class Template(Protocol):
+    """Writes layers of one pattern."""
+
+    def __len__(self) -> int:
+        """Bytes that it takes, about."""
+
+    def write(self, author: Author, content: Content) -> bytes | None:
+        """The layer as usd-core writes it; None where it can do no such thing."""
+
+
+class Form(Protocol):
+    """A way to write layers: `crate` or `text`."""
+
+    def pattern(self, author: Author, content: Content) -> Any:
+        """What a template hangs on; it can be hashed."""
+
+    def ordinary(self, author: Author, content: Content) -> bytes:
+        """The layer as usd-core writes it."""
+
+    def template(self, author: Author, content: Content, pattern: Any) -> Template | None:
+        """Template of an author's layers of one pattern, or None where it cannot be trusted."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +43,10 @@ class Refused:
     def __len__(self) -> int:
         return 0
 
+    def write(self, author: Author, content: Content) -> bytes | None:
+        """Nothing."""
+        return None
+
 
 @dataclass(frozen=True)
 class Seen(Refused):
@@ -29,36 +55,38 @@ class Seen(Refused):
 
 @dataclass
 class Press:
-    """Writes binary layers, by a template from the third of a pattern on.
+    """Writes layers in one form, by a template from the second of a pattern on.
 
     limit: bytes that templates take together at most; those that were not used for longest go.
     Any thread may write.
     """
 
+    form: Form
     limit: int
-    _kept: OrderedDict[Hashable, Template | Refused] = field(default_factory=OrderedDict)
+    _kept: OrderedDict[Hashable, Template] = field(default_factory=OrderedDict)
     _taken: int = 0
     _lock: Lock = field(default_factory=Lock)
 
     def write(self, author: Author, content: Content) -> bytes:
         """The layer of a content, as usd-core writes it."""
-        pattern = contents.pattern(content, author.numbers)
+        pattern = self.form.pattern(author, content)
         known = self._look((author, pattern))
         if isinstance(known, Seen):
-            known = crate.template(author, content, pattern) or Refused()
+            known = self.form.template(author, content, pattern) or Refused()
             self._keep((author, pattern), known)
         elif known is None:
-            self._keep((author, pattern), Seen())
-        made = known.write(author, content) if isinstance(known, Template) else None
-        return made or crate.ordinary(author, content)
+            known = Seen()
+            self._keep((author, pattern), known)
+        return known.write(author, content) or self.form.ordinary(author, content)
 
-    def _look(self, key: Hashable) -> Template | Refused | None:
+    def _look(self, key: Hashable) -> Template | None:
         with self._lock:
-            if key in self._kept:
+            known = self._kept.get(key)
+            if known is not None:
                 self._kept.move_to_end(key)
-            return self._kept.get(key)
+            return known
 
-    def _keep(self, key: Hashable, known: Template | Refused) -> None:
+    def _keep(self, key: Hashable, known: Template) -> None:
         with self._lock:
             before = self._kept.pop(key, None)
             self._kept[key] = known
@@ -68,5 +96,5 @@ class Press:
                 self._taken -= ENTRY + len(gone)
 
 
-PRESS = Press(limit=64_000_000)
-"""The one press of the process."""
+CRATES, TEXTS = Press(crate, 64_000_000), Press(text, 8_000_000)
+"""The presses of the process."""

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from service.encode import body
 from service.encode.moves import Moves
 from service.motion.conventions import Floats, Singles
 from service.motion.skeleton import Skeleton
@@ -73,6 +74,20 @@ def boxes(tree: Tree, moves: Moves, balls: Floats) -> Floats:
     found = [_boxes(tree, part) for part in moves.parts(FRAMES)]
     (low, high), radii = np.concatenate(found, axis=-1), balls.T[tree.order]
     return outwards((low - radii).min(axis=1).T, (high + radii).max(axis=1).T)
+
+
+def anywhere(skeleton: Skeleton, offsets: Floats, path: Floats) -> Floats:
+    """Lowest and highest corner (2, 3) of the skeleton's body in any pose, if its bones have the
+    offsets (J, 3) and its root follows a path (F, 3), m."""
+    own = np.linalg.norm(np.concatenate([skeleton.offsets, skeleton.tip_offsets]), axis=-1)
+    arms = own.copy()
+    arms[: len(offsets)] = np.maximum(own[: len(offsets)], np.linalg.norm(offsets, axis=-1))
+    far = [0.0]
+    for arm, parent in zip(arms[1:], (*skeleton.parents[1:], *skeleton.tip_joints), strict=True):
+        far.append(far[parent] + arm)
+    # A body that is nowhere wide is drawn as if it were a metre.
+    reached = max(far) + body.THICKEST * (2.0 * max(far) or 1.0)
+    return outwards(path.min(axis=0) - reached, path.max(axis=0) + reached)
 
 
 def outwards(low: Floats, high: Floats) -> Floats:

@@ -15,7 +15,7 @@ from service.encode import body, character, facts, layers, specs, takes
 from service.encode.character import Rig
 from service.encode.content import Array, Content
 from service.encode.convention import Convention
-from service.encode.press import PRESS
+from service.encode.press import CRATES, TEXTS
 from service.motion.answer import ClipAnswer
 
 TINTS = body.TINTS.astype(np.float32)
@@ -39,28 +39,33 @@ class Clips:
         """Arrays that every layer holds."""
         return (TINTS,)
 
+    def head(self, content: Content) -> Any:
+        """The layer without its prims."""
+        made = Sdf.Layer.CreateAnonymous("clip.usda")
+        layers.head(made, "Character", content.frames, self.rate, self.convention)
+        layers.say(made, facts.dictionary(content.facts.whole()))
+        return made
+
     def layer(self, content: Content) -> Any:
         """The layer, made by usd-core; the caller must keep it, since its prims do not."""
-        made = Sdf.Layer.CreateAnonymous("clip.usda")
+        made = self.head(content)
         with Sdf.ChangeBlock():
-            layers.head(made, "Character", content.frames, self.rate, self.convention)
-            layers.say(made, facts.dictionary(content.facts.whole()))
             root = character.root(made, "Character", self.rig)
             character.fill(root, content.values)
             animation = character.animation(root, "Anim", self.rig.paths)
-            character.bind(root, animation)
+            character.bind(root, animation.path)
             specs.samples(animation, content.samples)
         return made
 
 
 def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """USD as text."""
-    return [_text(*each) for each in _authored(answers, convention)]
+    return [TEXTS.write(*each) for each in _authored(answers, convention)]
 
 
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """USD in its binary form."""
-    return [PRESS.write(*each) for each in _authored(answers, convention)]
+    return [CRATES.write(*each) for each in _authored(answers, convention)]
 
 
 def _authored(
@@ -68,8 +73,3 @@ def _authored(
 ) -> Iterator[tuple[Clips, Content]]:
     for take in takes.whole(answers, convention):
         yield Clips(take.rig, take.rate, convention), take.content
-
-
-def _text(author: Clips, content: Content) -> bytes:
-    text: str = author.layer(content).ExportToString()
-    return text.encode()

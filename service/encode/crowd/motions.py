@@ -14,7 +14,7 @@ from service.encode.content import Content, Samples
 from service.encode.convention import METRES
 from service.encode.crowd import reach
 from service.encode.crowd.reach import Hull
-from service.encode.press import PRESS
+from service.encode.press import CRATES
 from service.motion.conventions import Floats, Indices
 from service.motion.crowd import CrowdClip, Motions
 
@@ -57,7 +57,7 @@ def each(crowd: CrowdClip, rig: Rig) -> Iterator[Motion]:
 
 def layer(rig: Rig, rate: float, samples: Samples) -> bytes:
     """Binary layer of one motion."""
-    return PRESS.write(Animations(rig.paths, rate, METRES), Content(samples, {}, facts.NONE))
+    return CRATES.write(Animations(rig.paths, rate, METRES), Content(samples, {}, facts.NONE))
 
 
 def _of(crowd: CrowdClip, hull: Hull, batch: Motions) -> Iterator[Motion]:

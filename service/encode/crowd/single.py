@@ -73,4 +73,4 @@ def _play(characters: list[Any], rig: Rig, motion: Motion) -> None:
             specs.samples(made, motion.samples)
         else:
             Sdf.CopySpec(root.layer, made.path, root.layer, root.path.AppendChild(root.name))
-        character.bind(root, root.layer.GetPrimAtPath(root.path.AppendChild(root.name)))
+        character.bind(root, root.path.AppendChild(root.name))

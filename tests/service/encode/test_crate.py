@@ -23,11 +23,15 @@ class Plain:
     numbers: tuple[float, ...] = (RATE, UNIT)
     values: tuple[np.ndarray, ...] = ()
 
-    def layer(self, content):
+    def head(self, content):
         made = Sdf.Layer.CreateAnonymous("moves.usda")
         layers.say(made, facts.dictionary(content.facts.whole()))
         made.timeCodesPerSecond = RATE
         made.pseudoRoot.SetInfo("metersPerUnit", UNIT)
+        return made
+
+    def layer(self, content):
+        made = self.head(content)
         prim = specs.prim(made, "Anim", "SkelAnimation")
         specs.attribute(prim, "translations", Type.Float3Array)
         specs.attribute(prim, "rotations", Type.QuatfArray)
@@ -213,7 +217,7 @@ class Counted(Plain):
 @pytest.mark.parametrize("author", [Negated(), Derived(), Sorted(), Counted()])
 def test_what_cannot_be_trusted_is_written_the_ordinary_way(author):
     assert template(author, content(1)) is None
-    press = Press(limit=10**6)
+    press = Press(crate, limit=10**6)
     for seed in range(4):
         assert press.write(author, content(seed)) == crate.ordinary(author, content(seed))
 
@@ -227,7 +231,7 @@ def counting(monkeypatch):
 
 
 def test_a_template_is_made_for_the_second_of_a_pattern(monkeypatch):
-    press, made = Press(limit=10**6), counting(monkeypatch)
+    press, made = Press(crate, limit=10**6), counting(monkeypatch)
     press.write(Plain(), content(1))
     assert len(made) == 1
     press.write(Plain(), content(2))
@@ -241,13 +245,13 @@ def test_a_template_is_made_for_the_second_of_a_pattern(monkeypatch):
 
 def test_templates_are_kept_within_a_limit():
     size = len(template(Plain(), content(1)))
-    press = Press(limit=3 * size)
+    press = Press(crate, limit=3 * size)
     for frames in (7, 8, 9, 10, 7):
         for seed in range(3):
             other = content(seed, frames)
             assert press.write(Plain(), other) == crate.ordinary(Plain(), other)
         assert press._taken <= press.limit
     assert press._taken > size
-    nothing = Press(limit=0)
+    nothing = Press(crate, limit=0)
     assert nothing.write(Plain(), content(1)) == crate.ordinary(Plain(), content(1))
     assert nothing._taken == 0

@@ -230,13 +230,13 @@ def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, tempor
 def test_without_templates_the_same_is_written(clip, made, tmp_path, monkeypatch):
     crowd.write(clip, tmp_path / "crowd.usd")
     before = contents(tmp_path)
-    monkeypatch.setattr(motions, "PRESS", Press(limit=0))
+    monkeypatch.setattr(motions, "CRATES", Press(crate, limit=0))
     crowd.write(replace(clip, batches=crowds.cut(made, 3)), tmp_path / "crowd.usd")
     assert contents(tmp_path) == before
 
 
 def test_motions_are_written_by_template(clip, made, tmp_path, monkeypatch):
-    monkeypatch.setattr(motions, "PRESS", Press(limit=10**6))
+    monkeypatch.setattr(motions, "CRATES", Press(crate, limit=10**6))
     crate._words.cache_clear()
     crate._usual.cache_clear()
     write, ordinary = crate.ordinary, []

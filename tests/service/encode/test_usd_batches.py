@@ -7,7 +7,7 @@ import conftest
 import numpy as np
 import pytest
 
-from service.encode import ENCODERS, METRES, crate, usd
+from service.encode import ENCODERS, METRES, crate, press, text, usd
 from service.encode.convention import CENTIMETRES, Convention
 from service.motion import clip as clips
 from service.motion import quat
@@ -36,15 +36,22 @@ def _answer(rng, frames, person, said):
     return ClipAnswer(made, replace(trust, **said))
 
 
-def ordinary(given, convention=METRES):
-    return [crate.ordinary(*each) for one in given for each in usd._authored([one], convention)]
+def ordinary(given, convention=METRES, form=crate):
+    return [form.ordinary(*each) for one in given for each in usd._authored([one], convention)]
 
 
-def written(given, convention=METRES):
+def written(given, convention=METRES, write=usd.usdc):
     """All of them twice: templates are made on the way."""
-    first = usd.usdc(given, convention)
-    assert usd.usdc(given, convention) == first
+    first = write(given, convention)
+    assert write(given, convention) == first
     return first
+
+
+def both(given, convention=METRES):
+    """Whether both forms are written as usd-core does."""
+    return written(given, convention) == ordinary(given, convention) and (
+        written(given, convention, usd.usda) == ordinary(given, convention, text)
+    )
 
 
 def moved(answer, translations=None, rotations=None):
@@ -56,8 +63,7 @@ def moved(answer, translations=None, rotations=None):
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_a_batch_is_written_as_usd_writes_it(convention):
-    given = answers(5)
-    assert written(given, convention) == ordinary(given, convention)
+    assert both(answers(5), convention)
 
 
 def test_other_clips_have_other_bytes():
@@ -126,9 +132,8 @@ def signed(answer):
 @pytest.mark.parametrize("convention", [METRES, INCHES])
 def test_equal_samples_are_written_as_usd_does(change, convention):
     given = [change(one) for one in answers(4)]
-    found = written(given, convention)
-    assert found == ordinary(given, convention)
-    assert (len(found[0]) < len(written(answers(1))[0])) == (change is not signed)
+    assert both(given, convention)
+    assert (len(written(given)[0]) < len(written(answers(1))[0])) == (change is not signed)
 
 
 FACTS = [
@@ -151,7 +156,7 @@ FACTS = [
 def test_any_facts_are_written_as_usd_does(said):
     given = [*answers(2), *answers(3, seed=4, **said)]
     for convention in (METRES, INCHES):
-        assert written(given, convention) == ordinary(given, convention)
+        assert both(given, convention)
 
 
 def chain(joints):
@@ -163,14 +168,14 @@ def chain(joints):
 @pytest.mark.parametrize("joints", [1, 2, 3, 10, 40])
 def test_skeletons_whose_arrays_are_as_large_as_others_will_do(joints):
     given = answers(4, person=chain(joints))
-    assert written(given) == ordinary(given)
+    assert both(given)
 
 
 def test_samples_that_equal_the_tints_are_written_as_usd_does():
     given = answers(4, person=chain(3))
     tinted = np.broadcast_to(usd.TINTS.astype(float), given[3].clip.translations.shape)
     given[3] = moved(given[3], tinted)
-    assert written(given) == ordinary(given)
+    assert both(given)
 
 
 def test_a_root_that_rests_nowhere_else_than_its_children_will_do():
@@ -179,4 +184,27 @@ def test_a_root_that_rests_nowhere_else_than_its_children_will_do():
         chain(3), parents=(-1, 0, 0), offsets=np.array([(0.0, 0, 0), (0, 1, 0), (1, 0, 0)])
     )
     given = answers(4, person=person)
-    assert written(given) == ordinary(given)
+    assert both(given)
+
+
+def test_awkward_numbers_are_written_as_usd_does():
+    given = answers(6)
+    odd = np.array([1e-7, 3e-6, 1e-5, 1.0, 1e13, 1e16, 2.0**24, -0.0, 5e-324, 1e-40])
+    for one, scale in zip(given, (1, 1, 1e-6, 1e-3, 1e12, 1e15), strict=True):
+        one.clip.translations[:10, 0, 0] = odd
+        one.clip.translations[:, 1:] *= scale
+    assert both(given)
+    assert both(given, INCHES)
+
+
+def test_templates_are_used(monkeypatch):
+    """Else all that is above would hold without them."""
+    given = answers(3, 37)
+    for form, write in ((crate, usd.usdc), (text, usd.usda)):
+        write(given, METRES)
+        with monkeypatch.context() as patch:
+            patch.setattr(form, "ordinary", lambda *each: b"the ordinary way")
+            assert b"the ordinary way" not in write(given, METRES)
+            longer = write(answers(1, 38), METRES)
+        assert longer == [b"the ordinary way"]
+    assert press.TEXTS._taken <= press.TEXTS.limit
