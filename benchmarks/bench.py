@@ -11,6 +11,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import clips_http
 import crowd
 import crowd_usd
 import export
@@ -41,6 +42,7 @@ def main() -> None:
         *crowd.rows(made),
         *crowd_usd.rows(),
         *export.rows(model),
+        *clips_http.rows(made),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))
