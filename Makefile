@@ -45,7 +45,7 @@ test: $(ENV) ## lint, types, layers and all tests (no Blender, no browser)
 	$(BIN)/python -m pytest -n auto
 
 .PHONY: interop
-interop: $(ENV) ## read our USD back through Blender and three.js, in environments of their own
+interop: $(ENV) ## read our files back through Blender, three.js and the glTF validator
 	$(BIN)/python tests/interop/run.py
 
 .PHONY: bench

@@ -11,9 +11,11 @@ import shutil
 import sys
 from pathlib import Path
 
+import clips_http
 import crowd
 import crowd_usd
 import export
+import export_formats
 import newcomer
 import paper
 import precompute
@@ -36,9 +38,11 @@ def main() -> None:
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
+        *export_formats.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),
         *export.rows(model),
+        *clips_http.rows(made),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))

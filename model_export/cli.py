@@ -58,7 +58,7 @@ def sample(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
         return
-    encode = encoder(output)
+    encode = encoder(output).encode
     controls = numbers(control or [])
     clip = truths.clip(controls, fps)
     answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))

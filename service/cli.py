@@ -17,7 +17,8 @@ import orjson
 import typer
 
 from service import __version__, exports
-from service.encode import ENCODERS, poses
+from service.encode import ENCODERS, Encoder, poses
+from service.encode.convention import Unit, Up
 from service.motion import card as cards
 from service.motion import files
 from service.motion.answer import ClipAnswer
@@ -30,8 +31,9 @@ from service.motion.errors import (
     UnknownFormat,
     WorkerDied,
 )
+from service.motion.roles import Names
 from service.synthesis import library, pace, session
-from service.synthesis.question import ClipQuestion, Policy
+from service.synthesis.question import ClipQuestion, Policy, Root
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 
@@ -49,6 +51,13 @@ Performer = Annotated[
     str | None, typer.Option(help="who moves, by name; somebody never seen if not said")
 ]
 LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the finest")]
+JointNames = Annotated[Names, typer.Option(help="what joints are called")]
+RootMotion = Annotated[Root, typer.Option(help="whether the root travels")]
+Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last frame is its first")]
+LengthUnit = Annotated[
+    Unit | None, typer.Option(help="of length in the file; the format's own if not said")
+]
+UpAxis = Annotated[Up | None, typer.Option(help="in the file; the format's own if not said")]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
 # Whose extra a missing module is; everything else that can be missing is training's.
@@ -134,15 +143,23 @@ def clip(
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
     level: LevelOfDetail = 0,
+    names: JointNames = "own",
+    root: RootMotion = "travelling",
+    loop: Loop = False,
+    unit: LengthUnit = None,
+    up: UpAxis = None,
     json: Json = False,
 ) -> None:
-    """Write a clip as usda, usdc, usdz, json or bvh."""
-    encode = encoder(output)
+    """Write a clip as usda, usdc, usdz, glb, bvh, json or npz."""
+    found = encoder(output)
+    convention = found.convention(unit, up)
     synthesizer = open_model(model)
     controls = numbers(control or [])
-    asked = ClipQuestion(controls, fps, extrapolate, start, end, performer, level)
+    asked = ClipQuestion(
+        controls, fps, extrapolate, start, end, performer, level, names, root, loop
+    )
     answer = synthesizer.clip(asked)
-    files.write(encode(answer), output)
+    files.write(found.encode(answer, convention), output)
     _warn(answer.trust.warnings)
     typer.echo(wrote(output, answer, json))
 
@@ -270,12 +287,12 @@ def numbers(pairs: Sequence[str]) -> dict[str, float]:
     return controls
 
 
-def encoder(path: Path) -> Any:
-    """Function that turns a ClipAnswer into the bytes of the format that a path ends in."""
+def encoder(path: Path) -> Encoder:
+    """Encoder of the format that a path ends in."""
     ending = path.suffix.removeprefix(".")
     if ending not in ENCODERS:
         raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(ENCODERS)}")
-    return ENCODERS[ending].encode
+    return ENCODERS[ending]
 
 
 def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:

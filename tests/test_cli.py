@@ -14,6 +14,7 @@ from pxr import Usd, UsdSkel
 from model_export.sample import truth
 from service import __version__, cli
 from service.encode import ENCODERS
+from service.encode.convention import Convention
 from service.motion import bvh
 from service.synthesis import library
 from service.synthesis.question import ClipQuestion
@@ -21,7 +22,7 @@ from service.synthesis.question import ClipQuestion
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
 TALL = ("--performer", "tall")
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh")
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz")
 
 
 @pytest.fixture
@@ -379,8 +380,8 @@ def test_inspect_lists_the_performers_there_are(posefield, labelled_path, model_
 # --- clip -----------------------------------------------------------------------------------------
 
 
-def test_the_five_formats_are_tested():
-    assert set(FORMATS) <= set(ENCODERS)
+def test_all_formats_are_tested():
+    assert set(FORMATS) == set(ENCODERS)
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -420,6 +421,41 @@ def test_clip_takes_a_rate_and_a_span(posefield, model_path, tmp_path):
     assert code == 0
     assert re.match(rf"{path}: 31 frames at 60 a second, [0-9.]+ s, give or take [0-9.]+ cm", out)
     assert (len(bvh.read(path).values), bvh.read(path).rate) == (31, 60.0)
+
+
+def test_clip_names_joints_and_measures_as_asked_for(posefield, model_path, tmp_path):
+    path = tmp_path / "clip.json"
+    words = ("--names", "humanik", "--root", "in_place", "--unit", "cm", "--up", "z")
+    assert posefield("clip", model_path, *CONTROLS, "-o", path, *words)[0] == 0
+    found = json.loads(path.read_text())
+    # What the model calls LowerBack, Spine and Spine1.
+    assert found["names"][9:12] == ["Spine", "Spine1", "Spine2"]
+    assert (found["units"]["length"], found["units"]["up"]) == ("centimetre", "Z")
+    asked = ClipQuestion(POINT, names="humanik", root="in_place")
+    answer = library.load([model_path]).models["reaching"].clip(asked)
+    assert path.read_bytes() == ENCODERS["json"].encode(answer, Convention(0.01, "z"))
+
+
+def test_clip_writes_a_loop(posefield, walk_path, tmp_path):
+    path = tmp_path / "clip.json"
+    words = ("-c", "haste=4", "-c", "veer=100", "--loop", "--root", "in_place")
+    assert posefield("clip", walk_path, *words, "-o", path)[0] == 0
+    found = json.loads(path.read_text())
+    assert found["rotations"][0] == found["rotations"][-1]
+
+
+@pytest.mark.parametrize(
+    ("ending", "words", "said"),
+    [
+        ("glb", ("--unit", "cm"), "unit: 0.01 m, expected 1 m: the law of glb"),
+        ("glb", ("--up", "z"), "up: 'z', expected 'y': the law of glb"),
+        ("bvh", ("--loop",), "loop: true, expected false: this model's last pose does not lead"),
+    ],
+)
+def test_what_a_clip_cannot_be_is_refused(refused, model_path, tmp_path, ending, words, said):
+    path = tmp_path / f"clip.{ending}"
+    assert refused(2, "clip", model_path, *CONTROLS, *words, "-o", path).startswith(said)
+    assert not path.exists()
 
 
 FAILING = {

@@ -4,8 +4,19 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from service.encode import bvh, crowd_arrow, crowd_npz, crowd_poses, keyframes, usd, usdz
-from service.encode.convention import CENTIMETRES, METRES, Convention
+from service.encode import (
+    bvh,
+    crowd_arrow,
+    crowd_npz,
+    crowd_poses,
+    glb,
+    keyframes,
+    npz,
+    usd,
+    usdz,
+)
+from service.encode import convention as conventions
+from service.encode.convention import CENTIMETRES, METRES, Convention, Unit, Up
 from service.motion.answer import ClipAnswer
 from service.motion.crowd import CrowdPoses
 
@@ -15,13 +26,23 @@ class Encoder:
     """How one format is named and made; the same answer always gives the same bytes.
 
     write: files of several answers, as long as they and in their order; those of one model and
-    length are made together. usual: the convention that readers of the format expect.
+    length are made together. usual: the convention that readers of the format expect; law: whether
+    it allows no other.
     """
 
     extension: str
     media_type: str
     write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
     usual: Convention = METRES
+    law: bool = False
+
+    def convention(self, unit: Unit | None, up: Up | None) -> Convention:
+        """What is asked for, and as usual where nothing is; InvalidField where the format's law is
+        another."""
+        found = conventions.of(unit, up, self.usual)
+        if self.law:
+            conventions.refuse_other(found, self.usual, self.extension)
+        return found
 
     def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
         """File of one answer, in the usual convention if none is said."""
@@ -38,12 +59,15 @@ def one_by_one(
 ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        Encoder("usda", "model/vnd.usda", one_by_one(usd.usda)),
+        Encoder("usda", "model/vnd.usda", usd.usda),
         # The binary form has no registered media type.
-        Encoder("usdc", "application/octet-stream", one_by_one(usd.usdc)),
-        Encoder("usdz", "model/vnd.usdz+zip", one_by_one(usdz.usdz)),
+        Encoder("usdc", "application/octet-stream", usd.usdc),
+        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz),
         Encoder("json", "application/json", one_by_one(keyframes.json)),
         Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
+        Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), law=True),
+        # An archive of arrays has no registered media type; as a zip some browsers would unpack it.
+        Encoder("npz", "application/octet-stream", one_by_one(npz.npz)),
     )
 }
 
@@ -62,7 +86,6 @@ CROWD_ENCODERS = {
     encoder.extension: encoder
     for encoder in (
         CrowdEncoder("arrow", "application/vnd.apache.arrow.stream", crowd_arrow.arrow),
-        # An archive of arrays has no registered media type; as a zip some browsers would unpack it.
         CrowdEncoder("npz", "application/octet-stream", crowd_npz.npz),
         CrowdEncoder("json", "application/json", crowd_poses.json, crowd_poses.JSON_LIMIT),
     )

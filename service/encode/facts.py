@@ -1,6 +1,8 @@
 """Plain facts as values of a USD dictionary, which knows no none and no mixed lists."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,99 @@ LARGEST = 2**63 - 1
 """Of the integers that every reader of a layer can take."""
 
 
+@dataclass(frozen=True)
+class Facts:
+    """Facts in parts: a shape that many answers share, and the numbers and texts that fill it."""
+
+    shape: Hashable
+    numbers: tuple[float, ...]
+    texts: tuple[str, ...]
+
+    def whole(self) -> Any:
+        """The facts again."""
+        return _joined(self.shape, iter(self.numbers), iter(self.texts))
+
+
+@dataclass(frozen=True)
+class Number:
+    """Place of a finite number."""
+
+
+@dataclass(frozen=True)
+class Text:
+    """Place of a text."""
+
+
+@dataclass(frozen=True)
+class Texts:
+    """Place of a list of texts."""
+
+    count: int
+
+
+@dataclass(frozen=True)
+class Group:
+    """Facts by name."""
+
+    names: tuple[str, ...]
+    shapes: tuple[Hashable, ...]
+
+
+@dataclass(frozen=True)
+class Same:
+    """A fact that belongs to the shape: what is neither a finite number nor text."""
+
+    spelt: str
+    fact: Any = field(compare=False)
+
+
+NUMBER, TEXT = Number(), Text()
+NONE = Facts(Group((), ()), (), ())
+
+
+def parted(facts: Mapping[str, Any]) -> Facts:
+    """The same facts in parts."""
+    numbers: list[float] = []
+    texts: list[str] = []
+    shape = _shape(facts, numbers, texts)
+    return Facts(shape, tuple(numbers), tuple(texts))
+
+
 def dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
     """The same facts, but for those that are None."""
     return {name: _value(fact) for name, fact in facts.items() if fact is not None}
+
+
+def _shape(fact: Any, numbers: list[float], texts: list[str]) -> Hashable:
+    match fact:
+        case dict():
+            shapes = tuple(_shape(each, numbers, texts) for each in fact.values())
+            return Group(tuple(fact), shapes)
+        case float() if math.isfinite(fact):
+            numbers.append(float(fact))
+            return NUMBER
+        case str():
+            texts.append(fact)
+            return TEXT
+        case list() if all(isinstance(each, str) for each in fact):
+            texts.extend(fact)
+            return Texts(len(fact))
+    return Same(repr(fact), fact)
+
+
+def _joined(shape: Hashable, numbers: Iterator[float], texts: Iterator[str]) -> Any:
+    match shape:
+        case Group(names, shapes):
+            values = (_joined(each, numbers, texts) for each in shapes)
+            return dict(zip(names, values, strict=True))
+        case Number():
+            return next(numbers)
+        case Text():
+            return next(texts)
+        case Texts(count):
+            return [next(texts) for _ in range(count)]
+        case Same(_, fact):
+            return fact
 
 
 def _value(fact: Any) -> Any:

@@ -2,22 +2,33 @@
 
 import errno
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pxr import Tf
 
+from service.encode.convention import METRES, Convention
+
 MEMORY = Path("/dev/shm")
 
 
-def head(made: Any, default: str, frames: int, rate: float) -> None:
+def head(
+    made: Any, default: str, frames: int, rate: float, convention: Convention = METRES
+) -> None:
     """State default prim, units, axes and times: frames at the time codes 0 to frames - 1."""
     made.defaultPrim = default
     made.startTimeCode, made.endTimeCode = 0.0, float(frames - 1)
     # Readers differ in which of the two they believe.
     made.timeCodesPerSecond = made.framesPerSecond = float(rate)
-    made.pseudoRoot.SetInfo("metersPerUnit", 1.0)
-    made.pseudoRoot.SetInfo("upAxis", "Y")
+    made.pseudoRoot.SetInfo("metersPerUnit", convention.metres_per_unit)
+    made.pseudoRoot.SetInfo("upAxis", convention.up.upper())
+
+
+def say(made: Any, facts: Mapping[str, Any]) -> None:
+    """State facts where there are any."""
+    if facts:
+        made.customLayerData = {"posefield": dict(facts)}
 
 
 def crate(made: Any) -> bytes:

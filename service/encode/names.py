@@ -5,8 +5,8 @@ and readers that know joints by their leaf name alone merge joints that share on
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from itertools import count
 
 LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -18,7 +18,8 @@ def legal(names: Iterable[str]) -> tuple[str, ...]:
     """
     given = list(names)
     taken = {name for name in given if LEGAL.fullmatch(name)}
-    return tuple(name if name in taken else _unique(_clean(name), taken) for name in given)
+    counts: Counter[str] = Counter()
+    return tuple(n if n in taken else _unique(_clean(n), taken, counts) for n in given)
 
 
 def paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
@@ -34,8 +35,12 @@ def _clean(name: str) -> str:
     return cleaned if LEGAL.fullmatch(cleaned) else f"_{cleaned}"
 
 
-def _unique(name: str, taken: set[str]) -> str:
-    candidates = (name if n == 1 else f"{name}_{n}" for n in count(1))
-    found = next(candidate for candidate in candidates if candidate not in taken)
-    taken.add(found)
-    return found
+def _unique(name: str, taken: set[str], counts: Counter[str]) -> str:
+    """A name that is not taken yet; counts: of each name the last ending that was tried."""
+    found = name
+    while True:
+        counts[name] += 1
+        found = name if counts[name] == 1 else f"{name}_{counts[name]}"
+        if found not in taken:
+            taken.add(found)
+            return found

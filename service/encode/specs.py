@@ -1,11 +1,12 @@
 """Short forms for writing prims, attributes and relationships straight into a layer."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from pxr import Sdf, Vt
 
+from service.encode.content import Samples
 from service.motion.conventions import Floats
 
 Type = Sdf.ValueTypeNames
@@ -27,13 +28,14 @@ def attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
     return spec
 
 
-def uniform(owner: Any, name: str, kind: Any, value: Any) -> None:
-    """New attribute that never varies in time."""
+def uniform(owner: Any, name: str, kind: Any, value: Any = None) -> None:
+    """New attribute that never varies in time, with its value where one is given."""
     spec = Sdf.AttributeSpec(owner, name, kind, Sdf.VariabilityUniform)
-    spec.default = value
+    if value is not None:
+        spec.default = value
 
 
-def per_point(owner: Any, name: str, kind: Any, value: Any) -> Any:
+def per_point(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
     """New attribute with one element for each point of a mesh."""
     spec = attribute(owner, name, kind, value)
     spec.SetInfo("interpolation", "vertex")
@@ -51,25 +53,13 @@ def vectors(values: Floats) -> Any:
     return Vt.Vec3fArray.FromNumpy(values.astype(np.float32))
 
 
-def vector_frames(values: Floats) -> Iterator[Any]:
-    """float3[] of each frame of (F, N, 3)."""
-    return map(Vt.Vec3fArray.FromNumpy, values.astype(np.float32))
+def samples(prim: Any, values: Samples) -> None:
+    """Samples of the translations and rotations of a SkelAnimation."""
+    _samples(prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"]))
+    _samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
 
 
-def quaternion_frames(values: Floats) -> Iterator[Any]:
-    """quatf[] of each frame of (F, N, 4) in the order w x y z; USD keeps the real part last."""
-    return map(Vt.QuatfArray.FromNumpy, np.roll(values, -1, axis=-1).astype(np.float32))
-
-
-def translations(values: Floats) -> Any:
-    """matrix4d[] that move by (N, 3); USD multiplies row vectors, so the last row holds them."""
-    matrices = np.tile(np.eye(4), (len(values), 1, 1))
-    # The nearest float32 as a short decimal: a reader computes in float32 anyway.
-    matrices[:, 3, :3] = np.round(values, 7)
-    return Vt.Matrix4dArray.FromNumpy(matrices)
-
-
-def samples(layer: Any, path: Any, values: Iterable[Any]) -> None:
-    """Values of an attribute at the time codes 0, 1, 2 and so on."""
+def _samples(prim: Any, name: str, values: Iterable[Any]) -> None:
+    layer, path = prim.layer, prim.path.AppendProperty(name)
     for frame, value in enumerate(values):
         layer.SetTimeSample(path, frame, value)

@@ -1,55 +1,75 @@
-"""A clip as one USD layer: a bound skeleton, its baked animation and a light skinned body.
+"""Clips as USD layers: a bound skeleton, its baked animation and a light skinned body.
 
 Written into a layer without a stage: it is faster, and a stage leaks for each that is opened.
 The names of prims never vary, because USD keeps every name that it has ever seen.
 """
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from pxr import Sdf
 
-from service.encode import bounds, character, facts, layers, specs
+from service.encode import body, character, facts, layers, specs, takes
 from service.encode.character import Rig
+from service.encode.content import Array, Content
 from service.encode.convention import Convention
-from service.motion import quat
+from service.encode.press import CRATES, TEXTS
 from service.motion.answer import ClipAnswer
-from service.motion.clip import Clip
+
+TINTS = body.TINTS.astype(np.float32)
 
 
-def usda(answer: ClipAnswer, convention: Convention) -> bytes:
+@dataclass(frozen=True)
+class Clips:
+    """Layers of clips of one skeleton and rate."""
+
+    rig: Rig
+    rate: float
+    convention: Convention
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Those that every layer holds."""
+        return (self.rate, self.convention.metres_per_unit)
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """Arrays that every layer holds."""
+        return (TINTS,)
+
+    def head(self, content: Content) -> Any:
+        """The layer without its prims."""
+        made = Sdf.Layer.CreateAnonymous("clip.usda")
+        layers.head(made, "Character", content.frames, self.rate, self.convention)
+        layers.say(made, facts.dictionary(content.facts.whole()))
+        return made
+
+    def layer(self, content: Content) -> Any:
+        """The layer, made by usd-core; the caller must keep it, since its prims do not."""
+        made = self.head(content)
+        with Sdf.ChangeBlock():
+            root = character.root(made, "Character", self.rig)
+            character.fill(root, content.values)
+            animation = character.animation(root, "Anim", self.rig.paths)
+            character.bind(root, animation.path)
+            specs.samples(animation, content.samples)
+        return made
+
+
+def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """USD as text."""
-    text: str = layer(answer).ExportToString()
-    return text.encode()
+    return [TEXTS.write(*each) for each in _authored(answers, convention)]
 
 
-def usdc(answer: ClipAnswer, convention: Convention) -> bytes:
+def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """USD in its binary form."""
-    return layers.crate(layer(answer))
+    return [CRATES.write(*each) for each in _authored(answers, convention)]
 
 
-def layer(answer: ClipAnswer) -> Any:
-    """Layer that holds the clip; the caller must keep it, since its prims do not."""
-    made = Sdf.Layer.CreateAnonymous("clip.usda")
-    clip = answer.clip
-    with Sdf.ChangeBlock():
-        layers.head(made, "Character", len(clip), clip.rate)
-        made.customLayerData = {"posefield": facts.dictionary(answer.trust.facts())}
-        _character(made, clip, _rig(clip))
-    return made
-
-
-def _rig(clip: Clip) -> Rig:
-    offsets = clip.translations[0].copy()
-    offsets[0] = clip.skeleton.offsets[0]
-    return character.rig(clip.skeleton, offsets)
-
-
-def _character(made: Any, clip: Clip, rig: Rig) -> None:
-    root = character.root(made, "Character", rig, bounds.over(clip, rig.bones, rig.rest))
-    animation = character.animation(root, "Anim", rig.paths)
-    character.bind(root, animation)
-    # Readers that interpolate quaternions by component need neighbours of the same sign.
-    moves = specs.vector_frames(clip.translations)
-    specs.samples(made, animation.path.AppendProperty("translations"), moves)
-    turns = specs.quaternion_frames(quat.unroll(clip.rotations))
-    specs.samples(made, animation.path.AppendProperty("rotations"), turns)
+def _authored(
+    answers: Sequence[ClipAnswer], convention: Convention
+) -> Iterator[tuple[Clips, Content]]:
+    for take in takes.whole(answers, convention):
+        yield Clips(take.rig, take.rate, convention), take.content

@@ -6,7 +6,7 @@ USDZ would have to end it goes on in the records of Zip64.
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,8 +19,9 @@ NAME = "clip.usdc"
 ALIGNMENT = 64
 PADDING = 0x1986
 """Identifier of the extra field that pxr's own writer pads with."""
-MEMBERS, BYTES = 0xFFFF, 0xFFFFFFFF
-"""How many members an archive has at most, and how many bytes; USDZ knows no larger zip."""
+MEMBERS, BYTES = 0xFFFE, 0xFFFFFFFE
+"""How many members an archive has at most, and how many bytes; USDZ knows no larger zip. One more
+stands for what Zip64 says elsewhere."""
 
 # 1980-01-01 00:00, the first moment a zip archive can name: the bytes hang on the content alone.
 TIME, DATE = 0, 0x21
@@ -41,9 +42,9 @@ class Member:
     chunks: Iterable[bytes]
 
 
-def usdz(answer: ClipAnswer, convention: Convention) -> bytes:
-    """USDZ of one binary layer."""
-    return package(usd.usdc(answer, convention))
+def usdz(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """USDZ of one binary layer each."""
+    return list(map(package, usd.usdc(answers, convention)))
 
 
 def package(data: bytes) -> bytes:
@@ -94,17 +95,17 @@ def _padding(before: int) -> bytes:
 def _central(common: tuple[int, ...], at: int, name: bytes) -> bytes:
     """Entry of the index for a member at a place."""
     version, extra = VERSION, b""
-    if at >= BYTES:
+    if at > BYTES:
         version, extra = VERSION_64, struct.pack("<2HQ", 1, 8, at)
-    fields = (version, version, *common, len(extra), 0, 0, 0, 0, min(at, BYTES))
+    fields = (version, version, *common, len(extra), 0, 0, 0, 0, min(at, BYTES + 1))
     return CENTRAL.pack(b"PK\1\2", *fields) + name + extra
 
 
 def _end(count: int, size: int, at: int) -> bytes:
     """End of an archive whose index has so many entries and bytes, and its place."""
-    shown = min(count, MEMBERS), min(size, BYTES), min(at, BYTES)
+    shown = min(count, MEMBERS + 1), min(size, BYTES + 1), min(at, BYTES + 1)
     end = END.pack(b"PK\5\6", 0, 0, shown[0], *shown, 0)
-    if shown == (count, size, at) and MEMBERS not in shown and BYTES not in shown:
+    if count <= MEMBERS and max(size, at) <= BYTES:
         return end
     versions = VERSION_64, VERSION_64
     whole = END_64.pack(b"PK\6\6", END_64.size - 12, *versions, 0, 0, count, count, size, at)

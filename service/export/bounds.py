@@ -12,8 +12,7 @@ import numpy as np
 from service.export.columns import CONTROL
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
-from service.synthesis import limits
-from service.synthesis.course import RATES
+from service.synthesis import course, limits
 from service.synthesis.question import ClipQuestion
 
 Values = Mapping[str, Sequence[Any]]
@@ -24,8 +23,10 @@ def pass_all(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
     return (
         _controls_pass(card, values, usual)
         and _within(_column(values, "level", usual.level), 0, len(card.levels) - 1)
-        and _within(_column(values, "fps", usual.fps), *RATES)
+        and _within(_column(values, "fps", usual.fps), *course.RATES)
         and _window_passes(card, values, usual)
+        and _loops_pass(card, values, usual)
+        and (bool(card.roles) or {*values.get("names", ()), usual.names} <= {"own", None})
     )
 
 
@@ -47,6 +48,15 @@ def _window_passes(card: ModelCard, values: Values, usual: ClipQuestion) -> bool
         and _within(last, 0.0, longest)
         and bool(np.all(start <= last))
     )
+
+
+def _loops_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    loops = _column(values, "loop", usual.loop) > 0.0
+    if not loops.any():
+        return True
+    whole = _column(values, "start", usual.start) <= 0.0
+    last = _column(values, "end", math.inf if usual.end is None else usual.end) == math.inf
+    return card.cyclic and bool(np.all(~loops | (whole & last)))
 
 
 def _column(values: Values, field: str, usual: float) -> Floats:

@@ -12,9 +12,10 @@ from difflib import get_close_matches
 from typing import Any, get_args
 
 from service.encode import ENCODERS
-from service.export.cells import Kind, Name, Number, Whole, Word
+from service.export.cells import Flag, Kind, Name, Number, Whole, Word
 from service.motion.card import ModelCard
-from service.synthesis.question import Policy
+from service.motion.roles import Names
+from service.synthesis.question import Policy, Root
 
 CONTROL = "controls/"
 LONGEST = 200
@@ -30,6 +31,9 @@ OPTIONS: Mapping[str, Callable[[ModelCard], Kind]] = {
     "end": lambda _: Number("s"),
     "performer": lambda card: Word(card.performers),
     "extrapolate": lambda _: Word(get_args(Policy)),
+    "names": lambda _: Word(get_args(Names)),
+    "root": lambda _: Word(get_args(Root)),
+    "loop": lambda _: Flag(),
 }
 """Every column but the controls; those that are neither name nor format are fields of a
 ClipQuestion."""

@@ -39,20 +39,19 @@ def members(order: Order) -> Iterator[tuple[str, bytes]]:
     A batch is made when its first file is asked for; of those before only lines of the manifest
     are kept.
     """
-    lines: list[bytes] = []
+    # Not a list: what orjson returns has taken a page, whatever its length.
+    lines = bytearray()
     for batch in _batches([prospect.frames for prospect in order.prospects]):
         yield from _files(order, order.queries[batch], lines)
-    yield MANIFEST, b"".join(lines)
+    yield MANIFEST, bytes(lines)
 
 
-def _files(
-    order: Order, queries: Sequence[Query], lines: list[bytes]
-) -> Iterator[tuple[str, bytes]]:
+def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator[tuple[str, bytes]]:
     answers = [order.model.clip(query.question) for query in queries]
     contents = order.encoder.write(answers, order.convention)
     for query, answer, content in zip(queries, answers, contents, strict=True):
         file = f"{query.name}.{query.format}"
-        lines.append(manifest.line(manifest.entry(query.name, file, content, answer)))
+        lines += manifest.line(manifest.entry(query.name, file, content, answer))
         yield file, content
 
 

@@ -13,7 +13,7 @@ def of(places: Places, count: int, seed: tuple[int, ...]) -> Places:
     """Where a permutation of 0 to count - 1, one for each seed, sends places (n,).
 
     A Feistel network permutes the numbers of an even count of bits; who lands beyond `count` walks
-    on until he is back (Black and Rogaway 2002), twice on average at most four times.
+    on until he is back (Black and Rogaway 2002), after fewer than four steps on average.
     """
     keys: Places = np.array(np.random.SeedSequence(seed).generate_state(ROUNDS, np.uint64))
     half = np.uint64(max(1, ((count - 1).bit_length() + 1) // 2))

@@ -44,10 +44,10 @@ class Skeleton:
         return len(self.names)
 
     def at_rest(self, offsets: Floats) -> Floats:
-        """Joint positions (J, 3) where none turns and offsets (J, 3) lead from the parents, m."""
+        """Joint positions (..., J, 3) where none turns and offsets lead from the parents, m."""
         positions = offsets.copy()
         for joint, parent in self._children():
-            positions[joint] += positions[parent]
+            positions[..., joint, :] += positions[..., parent, :]
         return positions
 
     def same_tree(self, other: "Skeleton") -> bool:

@@ -6,6 +6,7 @@ from typing import Annotated
 import msgspec
 
 from service.encode import Encoder
+from service.encode.convention import Unit, Up
 from service.export import names
 from service.export.cells import LEGAL_NAME
 from service.export.pack import Order
@@ -33,6 +34,8 @@ class ClipsBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     format: str
     clips: list[NamedClipBody]
+    unit: Unit | None = None
+    up: Up | None = None
 
 
 _CLIPS = msgspec.json.Decoder(ClipsBody)
@@ -53,11 +56,12 @@ def order(
     if not 1 <= len(body.clips) <= settings.clips_limit:
         expected = f"expected 1 to {settings.clips_limit}"
         raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
+    encoder = encoders[body.format]
+    convention = encoder.convention(body.unit, body.up)
     queries = [_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
     _check_names(queries)
     prospects = _prospects(model, queries, settings.clips_poses)
-    encoder = encoders[body.format]
-    return Order(model, encoder, encoder.usual, queries, prospects)
+    return Order(model, encoder, convention, queries, prospects)
 
 
 def _query(index: int, body: NamedClipBody, extension: str) -> Query:

@@ -19,7 +19,6 @@ from service.motion.answer import PoseAnswer
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.library import Library
-from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
@@ -32,7 +31,7 @@ from service.web import (
     sending,
     walk_query,
 )
-from service.web.query import PoseQuestion
+from service.web.query import FileQuestion, PoseQuestion
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
 
@@ -85,7 +84,7 @@ async def query_pose(service: Service, request: Request) -> Response:
 async def get_clip(encoder: Encoder, service: Service, request: Request) -> Response:
     """A clip in the encoder's format, asked for by query parameters."""
     model = _model(service, request)
-    question = query.clip_of_pairs(request.query_params.multi_items())
+    question = query.file_of_pairs(request.query_params.multi_items())
     return await _clip(model, question, encoder)
 
 
@@ -93,7 +92,7 @@ async def query_clip(encoder: Encoder, service: Service, request: Request) -> Re
     """A clip in the encoder's format, asked for by a body."""
     model = _model(service, request)
     content = await body.read(request, service.settings.body_limit)
-    return await _clip(model, query.clip_of_body(content), encoder)
+    return await _clip(model, query.file_of_body(content), encoder)
 
 
 async def query_crowd(encoder: CrowdEncoder, service: Service, request: Request) -> Response:
@@ -196,9 +195,10 @@ async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
     return Response(content, media_type="application/json")
 
 
-async def _clip(model: Synthesizer, question: ClipQuestion, encoder: Encoder) -> Response:
-    answer = model.clip(question)
-    content = await _made(len(answer.clip), encoder.encode, answer)
+async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) -> Response:
+    convention = encoder.convention(question.unit, question.up)
+    answer = model.clip(question.clip)
+    content = await _made(len(answer.clip), encoder.encode, answer, convention)
     return answers.file(content, encoder, answer.trust)
 
 

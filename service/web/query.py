@@ -8,11 +8,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast, get_args
+from typing import Any, TypeVar, cast, get_args
 
 import msgspec
 
-from service.synthesis.question import FPS, POLICY, ClipQuestion, Policy
+from service.encode.convention import Unit, Up
+from service.motion.roles import Names
+from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
 from service.web import decoding
 from service.web.problems import BAD_PARAMETER, RequestFault, pointer
 
@@ -21,6 +23,9 @@ NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
 
 Pairs = Sequence[tuple[str, str]]
 """Names and values of a query string in their order."""
+
+Word = TypeVar("Word")
+FLAGS = {"true": True, "false": False}
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,15 @@ class PoseQuestion:
     level: int = 0
 
 
+@dataclass(frozen=True)
+class FileQuestion:
+    """Which clip, and what its file measures in; none for what is usual in its format."""
+
+    clip: ClipQuestion
+    unit: Unit | None = None
+    up: Up | None = None
+
+
 class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Schema PoseQuestion of the contract."""
 
@@ -46,7 +60,7 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Schema ClipQuestion of the contract."""
+    """What the schemas ClipQuestion and NamedClipQuestion of the contract have in common."""
 
     controls: dict[str, msgspec.Raw]
     fps: float = FPS
@@ -55,10 +69,20 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     extrapolate: Policy = POLICY
     performer: str | None = None
     level: float = 0.0
+    names: Names = NAMES
+    root: Root = ROOT
+    loop: bool = False
+
+
+class FileBody(ClipBody, frozen=True):
+    """Schema ClipQuestion of the contract."""
+
+    unit: Unit | None = None
+    up: Up | None = None
 
 
 _POSE = msgspec.json.Decoder(PoseBody)
-_CLIP = msgspec.json.Decoder(ClipBody)
+_FILE = msgspec.json.Decoder(FileBody)
 _FLOAT = msgspec.json.Decoder(float)
 
 
@@ -69,17 +93,26 @@ def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
     if not times:
         raise bad_parameter("time", "missing; give seconds from the start of the clip")
     single = unique([pair for pair in pairs if pair[0] != "time"])
-    policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
+    policy, performer = _policy(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
     return PoseQuestion(_numbers(single), times, policy, performer, level)
 
 
-def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
-    """Question of query parameters: fps, start, end, extrapolate, performer, level, and one per
-    control."""
+def file_of_pairs(pairs: Pairs) -> FileQuestion:
+    """Question of query parameters: those of the contract's clip paths, and one per control."""
     single = unique(pairs)
-    policy, performer = _policy(single.pop("extrapolate", POLICY)), single.pop("performer", None)
+    unit: Unit | None = _word(single, "unit", get_args(Unit), None)
+    up: Up | None = _word(single, "up", get_args(Up), None)
+    return FileQuestion(_clip_of_single(single), unit, up)
+
+
+def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
+    """Question of texts by name, of which none is left over: what is no option is a control."""
+    policy, performer = _policy(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
+    names = _word(single, "names", get_args(Names), NAMES)
+    root = _word(single, "root", get_args(Root), ROOT)
+    loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
     numbers = _numbers(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -89,6 +122,9 @@ def clip_of_pairs(pairs: Pairs) -> ClipQuestion:
         extrapolate=policy,
         performer=performer,
         level=level,
+        names=names,
+        root=root,
+        loop=loop,
     )
 
 
@@ -100,9 +136,10 @@ def pose_of_body(content: bytes) -> PoseQuestion:
     return PoseQuestion(controls, body.times, body.extrapolate, body.performer, level)
 
 
-def clip_of_body(content: bytes) -> ClipQuestion:
+def file_of_body(content: bytes) -> FileQuestion:
     """Question of a JSON body."""
-    return clip_of(decoding.decoded(_CLIP, content))
+    body = decoding.decoded(_FILE, content)
+    return FileQuestion(clip_of(body), body.unit, body.up)
 
 
 def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
@@ -115,6 +152,9 @@ def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
         body.end,
         body.performer,
         _level(body.level, *within),
+        body.names,
+        body.root,
+        body.loop,
     )
 
 
@@ -128,10 +168,17 @@ def unique(pairs: Pairs) -> dict[str, str]:
     return single
 
 
-def _policy(text: str) -> Policy:
-    if text not in get_args(Policy):
-        raise bad_parameter("extrapolate", f"{text!r}, expected one of {get_args(Policy)}")
-    return cast(Policy, text)
+def _policy(single: dict[str, str]) -> Policy:
+    return _word(single, "extrapolate", get_args(Policy), POLICY)
+
+
+def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Word) -> Word:
+    """The text of that name, which is taken out, or the usual one; RequestFault where it is none of
+    the choices."""
+    text = single.pop(name, usual)
+    if text is not usual and text not in choices:
+        raise bad_parameter(name, f"{text!r}, expected one of {', '.join(choices)}")
+    return cast(Word, text)
 
 
 def _numbers(texts: dict[str, str]) -> dict[str, float]:

@@ -17,7 +17,7 @@ from service.web.operations import OPERATIONS
 from service.web.settings import Settings
 
 CLIP = "/v1/models/reach/clip"
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh")
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz")
 
 
 def url(path, controls, **more):
@@ -40,6 +40,40 @@ def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded)
     assert float(answer.headers["posefield-duration"]) == trust.duration
     assert "posefield-warning" not in answer.headers
     assert answer.headers["content-disposition"] == f'attachment; filename="reach.{extension}"'
+
+
+def test_a_file_measures_as_asked_for(ask, controls):
+    usual, stage = (
+        ask("GET", url(f"{CLIP}.json", controls, **said)).json()
+        for said in ({}, {"unit": "cm", "up": "z"})
+    )
+    assert (usual["units"]["length"], usual["units"]["up"]) == ("metre", "Y")
+    assert (stage["units"]["length"], stage["units"]["up"]) == ("centimetre", "Z")
+    root = np.array(usual["root_position"])
+    turned = 100.0 * np.stack([root[:, 0], -root[:, 2], root[:, 1]], axis=-1)
+    np.testing.assert_allclose(stage["root_position"], turned, atol=1e-4)
+    assert stage["trust"] == usual["trust"]
+    metres, usual = (ask("GET", url(f"{CLIP}.bvh", controls, **u)) for u in ({"unit": "m"}, {}))
+    assert metres.content != usual.content
+    assert usual.content == ask("GET", url(f"{CLIP}.bvh", controls, unit="cm")).content
+
+
+def test_joints_are_called_and_the_root_moves_as_asked_for(ask, controls):
+    asked = url(f"{CLIP}.json", controls, names="mixamo", root="in_place")
+    found = ask("GET", asked).json()
+    assert found["names"][0] == "mixamorig:Hips"
+    usual = ask("GET", url(f"{CLIP}.json", controls)).json()
+    assert usual["names"][0] == "Hips"
+    assert found["rotations"] == usual["rotations"]
+    assert found["root_position"][-1] != usual["root_position"][-1]
+
+
+def test_a_loop_ends_in_the_numbers_that_it_begins_with(ask):
+    asked = "/v1/models/walk/clip.json?haste=4&veer=100&loop=true&root=in_place"
+    found = ask("GET", asked).json()
+    assert found["rotations"][0] == found["rotations"][-1]
+    assert found["root_position"][0] == found["root_position"][-1]
+    assert found["frames"] == round(found["trust"]["duration"] * 30) + 1
 
 
 def test_each_control_outside_the_samples_gives_a_warning(ask, controls, loaded):

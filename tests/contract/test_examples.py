@@ -37,7 +37,9 @@ def test_the_example_body_matches_the_schema(name, spec):
     jsonschema.validate(read(name, "request")["body"], schema, jsonschema.Draft202012Validator)
 
 
-@pytest.mark.parametrize("name", ["Pose", *(f"Clip{e}" for e in ("Usda", "Usdc", "Json", "Bvh"))])
+@pytest.mark.parametrize(
+    "name", ["Pose", *(f"Clip{e}" for e in ("Usda", "Usdc", "Json", "Bvh", "Glb", "Npz"))]
+)
 def test_both_ways_to_ask_give_the_same_answer(name, ask):
     get, post = read(f"get{name}", "request"), read(f"query{name}", "request")
     by_query = ask("GET", get["path"])

@@ -60,6 +60,19 @@ WRONG_PARAMETERS = [
     ({"performer": ""}, 422, "invalid-field", "performer", "'', expected one of middle, short, t"),
     ({"performer": ["tall", "tall"]}, 400, "bad-parameter", "performer", "expected once"),
     ({"fps": ["30", "30"]}, 400, "bad-parameter", "fps", "expected once"),
+    ({"names": "maya"}, 400, "bad-parameter", "names", "expected one of own, mixamo, ue5, vrm"),
+    ({"root": "still"}, 400, "bad-parameter", "root", "expected one of travelling, in_place"),
+    ({"loop": "True"}, 400, "bad-parameter", "loop", "expected one of true, false"),
+    (
+        {"loop": "true"},
+        422,
+        "invalid-field",
+        "loop",
+        "true, expected false: this model's last pose",
+    ),
+    ({"unit": "inch"}, 400, "bad-parameter", "unit", "expected one of m, cm"),
+    ({"up": "x"}, 400, "bad-parameter", "up", "expected one of y, z"),
+    ({"up": ["y", "y"]}, 400, "bad-parameter", "up", "expected once"),
 ]
 
 
@@ -117,11 +130,43 @@ WRONG_BODIES = [
     (b'{"controls": {"turn": ' + b"[" * 20000 + b"]" * 20000 + b"}}", 400, "bad-body", ""),
     (b'{"controls": {}, "fps": "30"}', 400, "bad-body", "/fps"),
     (b'{"controls": {}, "extrapolate": "other"}', 400, "bad-body", "/extrapolate"),
+    (b'{"controls": {}, "names": "maya"}', 400, "bad-body", "/names"),
+    (b'{"controls": {}, "root": null}', 400, "bad-body", "/root"),
+    (b'{"controls": {}, "loop": 1}', 400, "bad-body", "/loop"),
+    (b'{"controls": {}, "unit": "inch"}', 400, "bad-body", "/unit"),
+    (b'{"controls": {}, "up": 2}', 400, "bad-body", "/up"),
     (b'{"controls": {}}', 422, "invalid-field", "/controls/stature"),
     (b'{"controls": {}, "performer": 1}', 400, "bad-body", "/performer"),
     (b'{"controls": {}, "performer": "Tall"}', 422, "invalid-field", "/performer"),
     (b'{"controls": {}, "performer": "tall"}', 422, "invalid-field", "/controls/stature"),
 ]
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({"unit": "cm"}, "0.01 m, expected 1 m: the law of glb"),
+        ({"up": "z"}, "'z', expected 'y': the law of glb"),
+    ],
+)
+def test_what_glTF_cannot_be_is_refused_by_name(said, words, refuse, controls):
+    path, (name,) = CLIP.replace("json", "glb"), said
+    query = urlencode({**controls, **said})
+    problem = refuse(422, "invalid-field", "GET", f"{path}?{query}")
+    assert problem["errors"][0]["parameter"] == name and words in problem["detail"]
+    problem = refuse(422, "invalid-field", "POST", path, json={"controls": controls, **said})
+    assert problem["errors"][0]["pointer"] == f"/{name}"
+    many = {"format": "glb", "clips": [{"controls": controls}], **said}
+    problem = refuse(422, "invalid-field", "POST", "/v1/models/reach/clips.zip", json=many)
+    assert problem["errors"][0]["pointer"] == f"/{name}"
+
+
+def test_a_model_without_roles_has_no_names_but_its_own(refuse):
+    problem = refuse(
+        422, "invalid-field", "GET", "/v1/models/walk/clip.bvh?haste=4&veer=100&names=ue5"
+    )
+    assert problem["errors"][0]["parameter"] == "names"
+    assert "expected 'own': this model's recipe gives its joints no [roles]" in problem["detail"]
 
 
 @pytest.mark.parametrize(("content", "status", "kind", "pointer"), WRONG_BODIES)

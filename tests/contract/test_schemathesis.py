@@ -90,6 +90,11 @@ def narrowed(spec, card):
         parts["parameters"][name]["schema"] = between
         for question in ("ClipQuestion", "NamedClipQuestion"):
             parts["schemas"][question]["properties"][name] = between
+    # This model's last pose leads nowhere, and one schema serves all formats, glTF too.
+    parts["schemas"]["Loop"] = {"type": "boolean", "enum": [False]}
+    for name, only in (("unit", "m"), ("up", "y")):
+        for question in ("ClipQuestion", "ClipsQuestion"):
+            parts["schemas"][question]["properties"][name] = {"enum": [only, None]}
     # That names differ cannot be said in a schema.
     del parts["schemas"]["NamedClipQuestion"]["properties"]["name"]
     parts["schemas"]["ClipsQuestion"]["properties"]["clips"]["maxItems"] = 3

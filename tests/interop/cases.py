@@ -12,9 +12,11 @@ from service.motion.answer import ClipAnswer, Trust
 from service.motion.clip import Clip
 from service.motion.skeleton import Skeleton
 
-FORMATS = ("usda", "usdc", "usdz")
+FORMATS = ("usda", "usdc", "usdz", "glb")
 CONTROL = "control"
 """Name of the clip whose quaternions are written in the wrong order."""
+
+INVALID = "invalid.glb"
 
 WHO = "Character"
 """Name of a clip's only character."""
@@ -47,17 +49,21 @@ TIPS = [(5, (0, 0.18, 0.02)), (9, (0, -0.08, 0.15)), (13, (0, -0.08, 0.15)), (16
 
 def answers() -> list[tuple[str, ClipAnswer]]:
     """The clips by name."""
+    return [*answers_by_hand(), *trained.answers()]
+
+
+def answers_by_hand() -> list[tuple[str, ClipAnswer]]:
+    """Those that no model made."""
     return [
         ("film", _answer(frames=45, rate=29.97)),
         ("fast", _answer(frames=100, rate=60.0)),
         ("pose", _answer(frames=1, rate=30.0)),
-        *trained.answers(),
     ]
 
 
 def write(folder: Path) -> dict[str, dict[str, Path]]:
-    """Every clip and the control in every USD format, and by file name and character what to
-    expect of it."""
+    """Every clip and the control in every format that the readers read, and by file name and
+    character what to expect of it."""
     given = answers()
     control = given[0][1]
     expected = {}
@@ -65,13 +71,22 @@ def write(folder: Path) -> dict[str, dict[str, Path]]:
         *((name, answer, answer) for name, answer in given),
         (CONTROL, _swapped(control), control),
     ):
-        expectation = folder / f"{name}.npz"
-        np.savez(expectation, **matrices_of(meant.clip))
+        found = matrices_of(meant.clip)
         for extension in FORMATS:
             path = folder / f"{name}.{extension}"
             path.write_bytes(ENCODERS[extension].encode(written))
+            expectation = folder / f"{path.name}.npz"
+            np.savez(expectation, **found | {"joints": _names(meant.clip, extension)})
             expected[path.name] = {WHO: expectation}
     return expected
+
+
+def write_invalid(folder: Path) -> str:
+    """Name of a glTF file whose quaternions are no rotations."""
+    clip, trust = (made := answers_by_hand()[0][1]).clip, made.trust
+    longer = Clip(clip.skeleton, 1.1 * clip.rotations, clip.translations, clip.rate)
+    (folder / INVALID).write_bytes(ENCODERS["glb"].encode(ClipAnswer(longer, trust)))
+    return INVALID
 
 
 def person() -> Skeleton:
@@ -89,6 +104,12 @@ def matrices_of(clip: Clip) -> dict[str, np.ndarray]:
     matrices[..., :3, :3], matrices[..., :3, 3] = quat.to_matrix(turns), positions
     matrices[..., 3, 3] = 1.0
     return {"joints": np.array(names.legal(clip.skeleton.names)), "matrices": matrices}
+
+
+def _names(clip: Clip, extension: str) -> np.ndarray:
+    """What joints are called in a format: glTF allows any names."""
+    own = clip.skeleton.names
+    return np.array(own if extension == "glb" else names.legal(own))
 
 
 def _answer(frames: int, rate: float) -> ClipAnswer:

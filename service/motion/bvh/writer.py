@@ -1,6 +1,7 @@
 """A clip to the bytes of a BVH file that every reader understands alike."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ POSITIONS = "Xposition Yposition Zposition"
 STILL = 1e-9
 """A translation that varies by no more, in metres, is the bone's offset and gets no channels."""
 
+MOST_STEPS = 1e18
 FINEST = 1e-8
 FEWEST_DECIMALS = 7
 """Step of written lengths in metres, and digits of an angle in degrees.
@@ -37,7 +39,7 @@ def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
     refuse_unwritable(clip, metres_per_unit)
     sheet = Sheet(clip, metres_per_unit)
     header = f"MOTION\nFrames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.10g}\n"
-    return ("HIERARCHY\n" + sheet.hierarchy() + header + sheet.rows()).encode()
+    return ("HIERARCHY\n" + sheet.hierarchy() + header).encode() + sheet.rows()
 
 
 def refuse_unwritable(clip: Clip, metres_per_unit: float) -> None:
@@ -65,9 +67,18 @@ class Sheet:
         """The clip's skeleton."""
         return self.clip.skeleton
 
-    def moving(self, joint: int) -> bool:
-        """Whether the joint has position channels."""
-        return joint == 0 or bool(np.ptp(self.clip.translations[:, joint], axis=0).max() > STILL)
+    @cached_property
+    def moving(self) -> list[bool]:
+        """Whether each joint has position channels."""
+        spread = np.ptp(self.clip.translations, axis=0).max(axis=-1)
+        return [True, *(spread[1:] > STILL).tolist()]
+
+    @cached_property
+    def offsets(self) -> Floats:
+        """Where each joint is from its parent (J, 3), on average; the root is nowhere."""
+        offsets = self.clip.translations.mean(axis=0)
+        offsets[0] = 0.0
+        return offsets
 
     def hierarchy(self) -> str:
         """The lines of the joints, from the root to its last closing brace."""
@@ -83,12 +94,11 @@ class Sheet:
 
     def joint(self, joint: int) -> list[str]:
         """The lines of one joint and its end sites, without its children and closing brace."""
-        offset = self.clip.translations[:, joint].mean(axis=0) if joint else np.zeros(3)
-        channels = f"6 {POSITIONS} {ROTATIONS}" if self.moving(joint) else f"3 {ROTATIONS}"
+        channels = f"6 {POSITIONS} {ROTATIONS}" if self.moving[joint] else f"3 {ROTATIONS}"
         lines = [
             f"{'JOINT' if joint else 'ROOT'} {self.skeleton.names[joint]}",
             "{",
-            f"\tOFFSET {self.numbers(offset)}",
+            f"\tOFFSET {self.numbers(self.offsets[joint])}",
             f"\tCHANNELS {channels}",
         ]
         for tip in self.tips(joint):
@@ -103,36 +113,49 @@ class Sheet:
 
     def numbers(self, metres: Floats) -> str:
         """Three lengths as text."""
-        return template(3, self.decimals) % tuple(
-            rounded(metres / self.metres_per_unit, self.decimals)
-        )
+        # Without a negative zero.
+        lengths = np.round(metres / self.metres_per_unit, self.decimals) + 0.0
+        return " ".join(f"{length:.{self.decimals}f}" for length in lengths.tolist())
 
     @property
     def decimals(self) -> int:
         """Digits behind the point of every number: more for a unit above a decimetre."""
         return max(FEWEST_DECIMALS, int(np.ceil(np.log10(self.metres_per_unit / FINEST))))
 
-    def rows(self) -> str:
+    def rows(self) -> bytes:
         """A line of numbers a frame."""
         angles = np.rad2deg(continuous(quat.to_euler(self.clip.rotations, AXES)))
         lengths = self.clip.translations / self.metres_per_unit
         blocks = []
         for joint, _ in depth_first(self.skeleton):
-            blocks += [lengths[:, joint]] if self.moving(joint) else []
+            blocks += [lengths[:, joint]] if self.moving[joint] else []
             blocks.append(angles[:, joint])
-        values = rounded(np.concatenate(blocks, axis=1), self.decimals)
-        row = template(values.shape[1], self.decimals) + "\n"
-        return (row * len(values)) % tuple(values.ravel().tolist())
+        return written(np.concatenate(blocks, axis=1), self.decimals)
 
 
-def template(count: int, decimals: int) -> str:
-    """A format of `count` numbers."""
-    return " ".join([f"%.{decimals}f"] * count)
+def written(values: Floats, decimals: int) -> bytes:
+    """Numbers (rows, columns) as text of so many decimals, without a negative zero.
 
-
-def rounded(values: Floats, decimals: int) -> Floats:
-    """Values as they will be written, without a negative zero."""
-    return np.round(values, decimals) + 0.0
+    The bytes of %f in a fifth of its time: all numbers' digits are found at once, a place at a
+    time from the last, and what is not written is a zero byte until the end. Raises ValueError
+    for numbers of more digits than 64 bits hold.
+    """
+    scaled = np.rint(np.abs(values) * 10.0**decimals)
+    if scaled.max() > MOST_STEPS:
+        raise ValueError(f"numbers of up to {np.abs(values).max():g}, expected fewer digits")
+    steps = scaled.astype(np.int64)
+    places = max(len(str(steps.max())), decimals + 1)
+    text = np.zeros((*values.shape, places + 3), np.uint8)
+    text[..., 0] = np.where((values < 0.0) & (steps > 0), ord("-"), 0)
+    text[..., -decimals - 2], text[..., -1], text[:, -1, -1] = b". \n"
+    rest = steps
+    for place in range(places):
+        column = -2 - place - (place >= decimals)
+        tenth = rest // 10
+        needed = True if place <= decimals else rest > 0
+        text[..., column] = np.where(needed, rest - 10 * tenth + ord("0"), 0)
+        rest = tenth
+    return text.tobytes().translate(None, b"\0")
 
 
 def depth_first(skeleton: Skeleton) -> list[tuple[int, int]]:
@@ -152,14 +175,19 @@ def continuous(angles: Floats) -> Floats:
     """The same turns about ZYX (frames, ..., 3) with each frame as near the one before as can be.
 
     Besides whole turns there is a second triple for each rotation: the outer angles half a turn
-    on, the middle one mirrored.
+    on, the middle one mirrored. Whether the other triple is nearer than the same is alike from
+    either, so that the choice of all frames is how often it was.
     """
     mirrored = np.array([1.0, -1.0, 1.0]) * angles + np.pi
-    near = angles.copy()
-    for frame in range(1, len(angles)):
-        before = near[frame - 1]
-        both = np.stack([angles[frame], mirrored[frame]])
-        both += 2.0 * np.pi * np.round((before - both) / (2.0 * np.pi))
-        distance = np.sum((both - before) ** 2, axis=-1, keepdims=True)
-        near[frame] = np.where(distance[0] <= distance[1], both[0], both[1])
-    return near
+    same, other = (_squared(both[1:] - angles[:-1]) for both in (angles, mirrored))
+    crossed = np.zeros(angles.shape[:-1], bool)
+    crossed[1:] = other < same
+    chosen = np.where(np.cumsum(crossed, axis=0)[..., None] % 2, mirrored, angles)
+    turns = np.round(np.diff(chosen, axis=0, prepend=chosen[:1]) / (2.0 * np.pi))
+    return chosen - 2.0 * np.pi * np.cumsum(turns, axis=0)
+
+
+def _squared(apart: Floats) -> Floats:
+    """Squares (...) of the shortest ways between triples of angles (..., 3) so far apart."""
+    nearest = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+    return np.einsum("...k,...k->...", nearest, nearest)

@@ -5,7 +5,7 @@ import pytest
 from pxr import Gf, Sdf, Vt
 
 from service.check import Finding, check
-from service.encode import usd
+from service.encode import ENCODERS
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 from service.motion.errors import UsdError
@@ -19,7 +19,7 @@ def test_a_pose_has_no_finding(answer, tmp_path):
     clip = answer.clip
     pose = Clip(clip.skeleton, clip.rotations[:1], clip.translations[:1], clip.rate)
     path = tmp_path / "pose.usdc"
-    path.write_bytes(usd.usdc(ClipAnswer(pose, answer.trust)))
+    path.write_bytes(ENCODERS["usdc"].encode(ClipAnswer(pose, answer.trust)))
     assert check(path) == []
 
 

@@ -1,3 +1,5 @@
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -6,9 +8,23 @@ from service.motion.skeleton import Skeleton
 
 
 def made(skeleton):
-    rest = skeleton.at_rest(skeleton.offsets)
-    found = body.bones(skeleton, rest)
-    return found, body.build(found, middle=rest[0, 0])
+    bones = body.bones(skeleton)
+    boxes = body.boxes(skeleton, bones, skeleton.offsets)
+    points, normals = body.mesh(boxes)
+    counts, corners = body.faces(bones)
+    joints = bones.joints.tolist()
+    return Drawn(joints, bones.tints.tolist(), boxes, points, normals, counts, corners)
+
+
+@dataclass
+class Drawn:
+    joints: list
+    tints: list
+    boxes: body.Boxes
+    points: np.ndarray
+    normals: np.ndarray
+    face_counts: np.ndarray
+    face_points: np.ndarray
 
 
 def chain(*offsets, tips=()):
@@ -29,21 +45,21 @@ def faces(mesh):
 
 
 def test_no_two_points_coincide(person):
-    _, mesh = made(person)
+    mesh = made(person)
     points = mesh.points.astype(np.float32)
     assert len(np.unique(points, axis=0)) == len(points)
 
 
 def test_every_box_is_closed(person):
-    _, mesh = made(person)
+    mesh = made(person)
     edges = {(a, b) for face in faces(mesh) for a, b in zip(face, np.roll(face, -1), strict=True)}
     assert len(edges) == len(mesh.face_points)
     assert edges == {(b, a) for a, b in edges}
 
 
 def test_faces_and_normals_look_outwards(person):
-    found, mesh = made(person)
-    centres = np.repeat(found.starts + found.arms / 2, body.POINTS, axis=0)
+    mesh = made(person)
+    centres = np.repeat(mesh.boxes.starts + mesh.boxes.arms / 2, body.POINTS, axis=0)
     assert np.all(np.sum(mesh.normals * (mesh.points - centres), axis=-1) > 0)
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=-1), 1.0)
     for face in faces(mesh):
@@ -52,31 +68,53 @@ def test_faces_and_normals_look_outwards(person):
 
 
 def test_a_bone_without_length_gets_no_box():
-    found, _ = made(chain((0, 1, 0), (0, 0, 0), (0, 0.5, 0), tips=[(2, (0, 0.3, 0))]))
-    assert found.joints.tolist() == [1, 2]
+    mesh = made(chain((0, 1, 0), (0, 0, 0), (0, 0.5, 0), tips=[(2, (0, 0.3, 0))]))
+    assert mesh.joints == [1, 2]
 
 
 def test_a_joint_where_nothing_follows_gets_a_stub():
-    found, mesh = made(chain((0, 1, 0), (0, 0.5, 0), tips=[(1, (0, 0, 0))]))
-    assert found.joints.tolist() == [0, 1]
-    np.testing.assert_allclose(found.starts[1] + found.arms[1] / 2, [0, 1.5, 0])
+    mesh = made(chain((0, 1, 0), (0, 0.5, 0), tips=[(1, (0, 0, 0))]))
+    assert mesh.joints == [0, 1]
+    np.testing.assert_allclose(mesh.boxes.starts[1] + mesh.boxes.arms[1] / 2, [0, 1.5, 0])
     assert np.ptp(mesh.points[body.POINTS :], axis=0).max() < 0.1
 
 
 def test_a_single_joint_has_a_body():
-    _, mesh = made(chain((0, 0, 0)))
+    mesh = made(chain((0, 0, 0)))
     assert len(mesh.points) == body.POINTS
 
 
 def test_boxes_in_one_place_are_drawn_once():
     parents, offsets = (-1, 0, 0), np.array([(0, 1, 0), (0, 0.5, 0), (0, 0.5, 0)])
-    found, mesh = made(Skeleton(("a", "b", "c"), parents, offsets, (), np.empty((0, 3))))
+    mesh = made(Skeleton(("a", "b", "c"), parents, offsets, (), np.empty((0, 3))))
     assert len(np.unique(mesh.points, axis=0)) == len(mesh.points)
-    assert found.joints.tolist() == [0, 1]
+    assert mesh.joints == [0, 1]
 
 
 def test_sides_are_told_apart_by_their_place(person):
-    found, mesh = made(person)
-    tints = dict(zip(found.joints.tolist(), mesh.tints[:: body.POINTS].tolist(), strict=True))
+    mesh = made(person)
+    tints = dict(zip(mesh.joints, mesh.tints, strict=True))
     assert (tints[3], tints[7], tints[11]) != (0, 0, 0)
     assert (tints[2], tints[7], tints[11]) == (0, 1, 2)
+
+
+def test_many_bodies_are_the_same_as_one_by_one(person):
+    """To the bit, and the same boxes whatever the bones of a clip."""
+    rng = np.random.default_rng(2)
+    offsets = person.offsets * rng.uniform(0.5, 1.5, (9, len(person), 1))
+    offsets[3, 5] = 0.0
+    bones = body.bones(person)
+    many = body.mesh(body.boxes(person, bones, offsets))
+    for index, own in enumerate(offsets):
+        alone = body.mesh(body.boxes(person, bones, own))
+        for values, value in zip(many, alone, strict=True):
+            np.testing.assert_array_equal(values[index], value)
+
+
+def test_a_bone_that_has_no_length_in_one_clip_keeps_its_box(person):
+    offsets = person.offsets.copy()
+    offsets[5] = 0.0
+    points, normals = body.mesh(body.boxes(person, body.bones(person), offsets))
+    assert points.shape == made(person).points.shape
+    assert np.all(np.isfinite(points))
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0)

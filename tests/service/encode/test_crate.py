@@ -1,111 +1,257 @@
+"""Filled templates against what usd-core writes of the same content, byte for byte."""
+
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
-from pxr import Sdf
+from pxr import Sdf, Vt
 
-from service.encode import crate, layers, specs
+from service.encode import content as contents
+from service.encode import crate, facts, layers, specs
+from service.encode.content import Content
+from service.encode.press import Press
 from service.encode.specs import Type
 
-SHAPES = {"translations": (7, 5, 3), "rotations": (7, 5, 4)}
+RATE, UNIT = 29.97, 0.01
+MIX = 1.0 / 3.0
 
 
-@pytest.fixture
-def samples(rng):
-    return {name: rng.standard_normal(shape).astype("f4") for name, shape in SHAPES.items()}
+@dataclass(frozen=True)
+class Plain:
+    """Layers of a SkelAnimation that has an extent, and of facts."""
+
+    numbers: tuple[float, ...] = (RATE, UNIT)
+    values: tuple[np.ndarray, ...] = ()
+
+    def head(self, content):
+        made = Sdf.Layer.CreateAnonymous("moves.usda")
+        layers.say(made, facts.dictionary(content.facts.whole()))
+        made.timeCodesPerSecond = RATE
+        made.pseudoRoot.SetInfo("metersPerUnit", UNIT)
+        return made
+
+    def layer(self, content):
+        made = self.head(content)
+        prim = specs.prim(made, "Anim", "SkelAnimation")
+        specs.attribute(prim, "translations", Type.Float3Array)
+        specs.attribute(prim, "rotations", Type.QuatfArray)
+        extent = Vt.Vec3fArray.FromNumpy(content.values["extent"])
+        specs.attribute(prim, "extent", Type.Float3Array, extent)
+        specs.samples(prim, content.samples)
+        return made
+
+    def __hash__(self):
+        return hash(self.numbers)
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(3)
+def content(seed=0, frames=7, joints=5, **said):
+    rng = np.random.default_rng(seed)
+    sizes = {"translations": (frames, joints, 3), "rotations": (frames, joints, 4)}
+    samples = {name: rng.standard_normal(size, np.float32) for name, size in sizes.items()}
+    told = {"model": f"m@{seed}", "sigma": 0.5 * seed, "mix": MIX + seed, "warnings": ["a", "b"]}
+    extent = rng.standard_normal((2, 3), np.float32)
+    return Content(samples, {"extent": extent}, facts.parted(told | said))
 
 
-def ordinary(samples):
-    made = Sdf.Layer.CreateAnonymous("moves.usdc")
-    prim = specs.prim(made, "Anim", "SkelAnimation")
-    moves = specs.attribute(prim, "translations", Type.Float3Array).path
-    turns = specs.attribute(prim, "rotations", Type.QuatfArray).path
-    specs.samples(made, moves, specs.vector_frames(samples["translations"]))
-    specs.samples(made, turns, specs.quaternion_frames(samples["rotations"]))
-    return layers.crate(made)
+def changed(made, **samples):
+    return replace(made, samples=made.samples | samples)
 
 
-def last(samples):
-    """The same as it is in memory: USD keeps the real part last."""
-    return samples | {"rotations": np.roll(samples["rotations"], -1, axis=-1)}
+def template(author, made):
+    return crate.template(author, made, contents.pattern(made, author.numbers))
 
 
-def stored(samples):
-    return ordinary(samples | {"rotations": np.roll(samples["rotations"], 1, axis=-1)})
+def pattern(made):
+    return contents.pattern(made, Plain().numbers)
 
 
-def test_a_template_writes_what_usd_writes(samples):
-    made = crate.template(stored, SHAPES)
-    assert made is not None
-    assert made.write(last(samples)) == ordinary(samples)
+@pytest.mark.parametrize("frames", [1, 2, 7, 40])
+def test_a_template_writes_what_usd_writes(frames):
+    made = template(Plain(), content(1, frames))
+    for seed in range(2, 5):
+        other = content(seed, frames)
+        assert pattern(other) == pattern(content(1, frames))
+        assert made.write(Plain(), other) == crate.ordinary(Plain(), other)
     # The real part at the wrong end would be seen.
-    assert made.write(samples) != ordinary(samples)
+    swapped = changed(other, rotations=np.roll(other.samples["rotations"], 1, axis=-1))
+    assert made.write(Plain(), swapped) != crate.ordinary(Plain(), other)
 
 
-@pytest.mark.parametrize("frames", [1, 2])
-def test_few_frames_will_do(frames, samples):
-    shapes = {name: (frames, *shape[1:]) for name, shape in SHAPES.items()}
-    short = {name: value[:frames] for name, value in samples.items()}
-    made = crate.template(stored, shapes)
-    assert made is not None
-    assert made.write(last(short)) == ordinary(short)
+def test_a_template_is_not_changed_by_what_it_writes():
+    made = template(Plain(), content(1))
+    first = made.write(Plain(), content(2))
+    made.write(Plain(), content(3))
+    assert made.write(Plain(), content(2)) == first
 
 
-def test_a_template_is_not_changed_by_what_it_writes(samples):
-    made = crate.template(stored, SHAPES)
-    first = made.write(samples)
-    made.write({name: value + 1 for name, value in samples.items()})
-    assert made.write(samples) == first
+def looped(made):
+    rows = {name: rows.copy() for name, rows in made.samples.items()}
+    for each in rows.values():
+        each[-1] = each[0]
+    return changed(made, **rows)
 
 
-def test_equal_samples_are_read_back_though_usd_would_write_them_once(samples, tmp_path):
-    still = {name: np.broadcast_to(value[:1], value.shape) for name, value in samples.items()}
-    data = crate.template(stored, SHAPES).write(last(still))
-    assert len(data) > len(ordinary(still))
-    path = tmp_path / "still.usdc"
-    path.write_bytes(data)
-    found = Sdf.Layer.FindOrOpen(str(path))
-    for frame in range(7):
-        turns = np.array(found.QueryTimeSample("/Anim.rotations", frame))
-        np.testing.assert_array_equal(turns, last(still)["rotations"][frame])
+def still(made):
+    return changed(made, translations=made.samples["translations"] * 0 + 2)
 
 
-# Ways to write that a template must not be made of, as bytes that need no USD.
-def changed(samples):
-    return b"head" + b"".join((-value).tobytes() for value in samples.values())
+def pausing(made):
+    return changed(made, rotations=made.samples["rotations"][[0, 1, 1, 1, 4, 5, 0]])
 
 
-def twice(samples):
-    return b"head" + b"".join(value.tobytes() * 2 for value in samples.values())
+def lifeless(made):
+    return pausing(still(made))
 
 
-def uneven(samples):
-    values = (value for array in samples.values() for value in array)
-    return b"".join(value.tobytes() + b"." * index for index, value in enumerate(values))
+REPEATS = [looped, still, pausing, lifeless]
 
 
-def derived(samples):
-    """Even and unique, but with something at the end that hangs on the samples."""
-    return even(samples) + samples["translations"].max().tobytes()
+@pytest.mark.parametrize("repeat", REPEATS)
+def test_equal_samples_are_written_once_as_usd_does(repeat):
+    made = template(Plain(), repeat(content(1)))
+    for seed in range(2, 5):
+        other = repeat(content(seed))
+        assert made.write(Plain(), other) == crate.ordinary(Plain(), other)
+    assert pattern(other) != pattern(content(1))
+    assert len(made) < len(template(Plain(), content(1)))
 
 
-def cut(samples):
-    return even(samples)[:-1]
+@pytest.mark.parametrize("repeat", REPEATS)
+def test_the_pattern_of_other_samples_would_not_do(repeat):
+    made = template(Plain(), content(1))
+    assert made.write(Plain(), repeat(content(2))) != crate.ordinary(Plain(), repeat(content(2)))
 
 
-def even(samples):
-    return b"head" + b"".join(value.tobytes() for value in samples.values())
+def test_samples_of_equal_sums_are_told_apart():
+    rows = np.array([[1, 2, 3], [3, 2, 1], [2, 2, 2], [1, 2, 3]], np.float32)[:, None]
+    made = changed(content(1, 4, 1), translations=rows)
+    assert pattern(made).samples[0][2] == (0, 1, 2, 0)
 
 
-@pytest.mark.parametrize("write", [changed, twice, uneven, derived, cut])
-def test_what_cannot_be_trusted_is_written_the_ordinary_way(write, samples):
-    assert crate.template(write, SHAPES) is None
-    assert crate.writer(write, SHAPES)(samples) == write(samples)
+NUMBERS = [
+    {"mix": 0.25},
+    {"mix": RATE},
+    {"mix": UNIT},
+    {"mix": 0.1, "sigma": 0.1},
+    {"mix": 0.1, "sigma": 0.2},
+    {"mix": 0.0, "sigma": -0.0},
+    {"mix": 1e300, "sigma": -1e-300},
+    {"mix": 3.4028235677973366e38, "sigma": 1e-45},
+]
 
 
-def test_what_can_be_trusted_is_not(samples):
-    assert crate.template(even, SHAPES) is not None
-    assert crate.writer(even, SHAPES)(samples) == even(samples)
+@pytest.mark.parametrize("said", NUMBERS)
+def test_numbers_are_kept_as_usd_does(said):
+    """USD keeps what float32 holds beside its type, and any other number once."""
+    first, second = content(1, **said), content(2, **said)
+    made = template(Plain(), first)
+    assert made.write(Plain(), second) == crate.ordinary(Plain(), second)
+
+
+def test_numbers_of_another_pattern_would_not_do():
+    made, other = template(Plain(), content(1)), content(2, mix=0.25)
+    assert made.write(Plain(), other) != crate.ordinary(Plain(), other)
+
+
+@pytest.mark.parametrize("word", ["Anim", "posefield", "translations", "rotations", "token"])
+def test_a_text_that_is_a_word_of_the_layer_is_left_to_usd(word):
+    made = template(Plain(), content(1))
+    assert made.write(Plain(), content(2, model="another")) is not None
+    other = content(2, model=word)
+    found = made.write(Plain(), other)
+    assert found is None or found == crate.ordinary(Plain(), other)
+    assert made.write(Plain(), content(2, model="Anim")) is None
+    assert made.write(Plain(), content(2, warnings=["a", "a"])) is None
+
+
+@pytest.mark.parametrize("text", ["", "ünïcode 左腕", 'quo"ted\n', "x" * 5000])
+def test_any_text_is_spelt_as_usd_does(text):
+    made, other = template(Plain(), content(1)), content(2, model=text)
+    found = made.write(Plain(), other)
+    assert found is None or found == crate.ordinary(Plain(), other)
+    assert (found is None) == (text == "")
+
+
+def test_arrays_that_usd_would_merge_are_left_to_usd():
+    first, other = content(1, joints=2), content(2, joints=2)
+    made = template(Plain(), first)
+    assert made.write(Plain(), other) == crate.ordinary(Plain(), other)
+    moves = other.samples["translations"].copy()
+    moves[3] = other.values["extent"]
+    assert made.write(Plain(), changed(other, translations=moves)) is None
+    known = replace(Plain(), values=(np.ones((2, 3), np.float32),))
+    made = template(known, first)
+    assert made.write(known, other) is not None
+    moves[3] = 1
+    assert made.write(known, changed(other, translations=moves)) is None
+
+
+# Layers of which no template can be made: what they hold is no copy of what was given.
+class Negated(Plain):
+    def layer(self, content):
+        return super().layer(changed(content, translations=-content.samples["translations"]))
+
+
+class Derived(Plain):
+    def layer(self, content):
+        made = super().layer(content)
+        spec = specs.attribute(made.GetPrimAtPath("/Anim"), "highest", Type.Double)
+        spec.default = float(content.samples["translations"].max()) / 3
+        return made
+
+
+class Sorted(Plain):
+    def layer(self, content):
+        moves = np.sort(content.samples["translations"], axis=0)
+        return super().layer(changed(content, translations=moves))
+
+
+class Counted(Plain):
+    def layer(self, content):
+        made = super().layer(content)
+        if content.values["extent"][0, 0] > 0.5:
+            specs.attribute(made.GetPrimAtPath("/Anim"), "more", Type.Double, 1.0)
+        return made
+
+
+@pytest.mark.parametrize("author", [Negated(), Derived(), Sorted(), Counted()])
+def test_what_cannot_be_trusted_is_written_the_ordinary_way(author):
+    assert template(author, content(1)) is None
+    press = Press(crate, limit=10**6)
+    for seed in range(4):
+        assert press.write(author, content(seed)) == crate.ordinary(author, content(seed))
+
+
+def counting(monkeypatch):
+    crate._words.cache_clear()
+    crate._usual.cache_clear()
+    write, made = crate.ordinary, []
+    monkeypatch.setattr(crate, "ordinary", lambda *one: made.append(one) or write(*one))
+    return made
+
+
+def test_a_template_is_made_for_the_second_of_a_pattern(monkeypatch):
+    press, made = Press(crate, limit=10**6), counting(monkeypatch)
+    press.write(Plain(), content(1))
+    assert len(made) == 1
+    press.write(Plain(), content(2))
+    before = len(made)
+    for _ in range(5):
+        press.write(Plain(), content(2))
+    assert len(made) == before
+    press.write(Plain(), content(3, frames=8))
+    assert len(made) == before + 1
+
+
+def test_templates_are_kept_within_a_limit():
+    size = len(template(Plain(), content(1)))
+    press = Press(crate, limit=3 * size)
+    for frames in (7, 8, 9, 10, 7):
+        for seed in range(3):
+            other = content(seed, frames)
+            assert press.write(Plain(), other) == crate.ordinary(Plain(), other)
+        assert press._taken <= press.limit
+    assert press._taken > size
+    nothing = Press(crate, limit=0)
+    assert nothing.write(Plain(), content(1)) == crate.ordinary(Plain(), content(1))
+    assert nothing._taken == 0

@@ -19,6 +19,7 @@ from pxr import Sdf, Usd, UsdUtils
 
 from service.encode import crate, crowd
 from service.encode.crowd import motions, package
+from service.encode.press import Press
 from service.motion.errors import FileError, InvalidField
 from service.motion.skeleton import Skeleton
 
@@ -229,17 +230,22 @@ def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, tempor
 def test_without_templates_the_same_is_written(clip, made, tmp_path, monkeypatch):
     crowd.write(clip, tmp_path / "crowd.usd")
     before = contents(tmp_path)
-    motions.writer.cache_clear()
-    monkeypatch.setattr(crate, "template", lambda write, shapes: None)
+    monkeypatch.setattr(motions, "CRATES", Press(crate, limit=0))
     crowd.write(replace(clip, batches=crowds.cut(made, 3)), tmp_path / "crowd.usd")
-    motions.writer.cache_clear()
     assert contents(tmp_path) == before
 
 
-def test_motions_are_written_by_template(clip):
-    joints = len(clip.skeleton)
-    write = motions.writer(tuple(f"j{i}" for i in range(joints)), 12, 30.0)
-    assert isinstance(getattr(write, "__self__", None), crate.Template)
+def test_motions_are_written_by_template(clip, made, tmp_path, monkeypatch):
+    monkeypatch.setattr(motions, "CRATES", Press(crate, limit=10**6))
+    crate._words.cache_clear()
+    crate._usual.cache_clear()
+    write, ordinary = crate.ordinary, []
+    monkeypatch.setattr(crate, "ordinary", lambda *one: ordinary.append(one) or write(*one))
+    crowd.write(clip, tmp_path / "crowd.usd")
+    # The first, what a template takes to make, and two for the words of a layer.
+    assert len(ordinary) == 1 + 3 + 2
+    crowd.write(replace(clip, batches=crowds.cut(made, 3)), tmp_path / "crowd.usd")
+    assert len(ordinary) == 1 + 3 + 2
 
 
 PRINT_DIGESTS = """

@@ -1,11 +1,13 @@
 import dataclasses
+import io
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import orjson
 import pytest
 
-from service.encode import ENCODERS
+from service.encode import ENCODERS, axes, convention
+from service.encode.convention import CENTIMETRES, METRES, Convention
 from service.motion import bvh, skeleton
 
 
@@ -16,6 +18,8 @@ def test_the_table_names_each_format_once():
         "usdz": "model/vnd.usdz+zip",
         "json": "application/json",
         "bvh": "application/x-bvh",
+        "glb": "model/gltf-binary",
+        "npz": "application/octet-stream",
     }
     assert all(found.extension == key for key, found in ENCODERS.items())
 
@@ -62,6 +66,100 @@ def test_bvh_is_in_centimetres(walk):
     # A BVH file lists joints depth first.
     order = [walk.clip.skeleton.names.index(name) for name in clip.skeleton.names]
     np.testing.assert_allclose(clip.positions(), walk.clip.positions()[:, order], atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def arrays(walk):
+    with np.load(io.BytesIO(ENCODERS["npz"].encode(walk)), allow_pickle=False) as found:
+        return dict(found)
+
+
+def test_npz_holds_the_clip(arrays, walk):
+    clip = walk.clip
+    assert tuple(arrays["names"]) == clip.skeleton.names
+    assert tuple(arrays["parents"]) == clip.skeleton.parents
+    assert arrays["rate"] == clip.rate
+    assert np.array_equal(arrays["times"], np.arange(45) / 29.97)
+    assert np.array_equal(arrays["rotations"], clip.rotations.astype(np.float32))
+    assert np.array_equal(arrays["root_position"], clip.root_path.astype(np.float32))
+    assert np.array_equal(arrays["bone_offsets"][1:], clip.translations[0, 1:].astype(np.float32))
+
+
+def test_npz_says_what_json_says(arrays, keyframes):
+    assert orjson.loads(str(arrays["units"])) == keyframes["units"]
+    assert orjson.loads(str(arrays["trust"])) == keyframes["trust"]
+    assert set(arrays) == set(keyframes) - {"frames"}
+
+
+def positions(found):
+    """Joints (F, J, 3) of JSON or npz."""
+    rotations = np.array(found["rotations"], float)
+    offsets = np.tile(np.array(found["bone_offsets"], float), (len(rotations), 1, 1))
+    offsets[:, 0] = found["root_position"]
+    return skeleton.forward(tuple(found["parents"]), rotations, offsets)[0]
+
+
+STAGE = Convention(0.01, "z")
+
+
+def on_stage(points):
+    """Points in centimetres with Z up, of metres with Y up."""
+    return 100.0 * np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1)
+
+
+def test_json_and_npz_heed_the_convention_and_say_it(walk):
+    text = orjson.loads(ENCODERS["json"].encode(walk, STAGE))
+    with np.load(io.BytesIO(ENCODERS["npz"].encode(walk, STAGE))) as found:
+        binary = dict(found)
+    meant = on_stage(walk.clip.positions())
+    for read in (text, binary):
+        np.testing.assert_allclose(positions(read), meant, atol=1e-3)
+    for units in (text["units"], orjson.loads(str(binary["units"]))):
+        assert (units["length"], units["up"]) == ("centimetre", "Z")
+    # Negative control: as usual it is elsewhere.
+    usual = positions(orjson.loads(ENCODERS["json"].encode(walk)))
+    assert np.abs(usual - meant).max() > 10.0
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
+    data = ENCODERS["bvh"].encode(walk, Convention(unit, "z"))
+    file = bvh.loads(data, "clip.bvh")
+    clip = bvh.to_clip(file, metres_per_unit=unit, up="z", root_offset="replace")
+    order = [walk.clip.skeleton.names.index(name) for name in clip.skeleton.names]
+    np.testing.assert_allclose(clip.positions(), walk.clip.positions()[:, order], atol=1e-5)
+    np.testing.assert_allclose(
+        clip.skeleton.offsets[1:], walk.clip.translations[0, order[1:]], atol=1e-6
+    )
+    np.testing.assert_allclose(
+        np.abs(np.sum(clip.rotations * walk.clip.rotations[:, order], axis=-1)), 1.0, atol=1e-9
+    )
+    lying = bvh.to_clip(file, metres_per_unit=unit, up="y", root_offset="replace")
+    assert np.abs(lying.positions() - walk.clip.positions()[:, order]).max() > 0.1
+
+
+def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
+    """Its front is -Y where Z is up."""
+    found = axes.moved(STAGE, walk.clip).skeleton
+    meant = on_stage(walk.clip.skeleton.offsets)
+    np.testing.assert_allclose(found.offsets, meant, atol=1e-12)
+    np.testing.assert_allclose(
+        found.tip_offsets, on_stage(walk.clip.skeleton.tip_offsets), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "up", "usual", "meant"),
+    [
+        (None, None, CENTIMETRES, CENTIMETRES),
+        (None, "z", CENTIMETRES, Convention(0.01, "z")),
+        ("m", None, CENTIMETRES, METRES),
+        ("cm", "z", METRES, STAGE),
+        ("m", "y", Convention(0.01, "z"), METRES),
+    ],
+)
+def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):
+    assert convention.of(unit, up, usual) == meant
 
 
 @pytest.mark.parametrize("extension", ENCODERS)

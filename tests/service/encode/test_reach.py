@@ -6,7 +6,7 @@ import crowds
 import numpy as np
 import pytest
 
-from service.encode import character
+from service.encode import body, character, moves
 from service.encode.crowd import reach
 from service.motion import quat, skeleton
 from service.motion.crowd import Placement
@@ -30,33 +30,33 @@ def case(seed):
     made = crowds.motions(person, 3, 20, seed)
     # Far away float32 keeps less.
     made.root_position[1] += 500
-    return person, character.rig(person, person.offsets), made
+    return person, character.rig(person), made
 
 
 def reached(person, rig, made):
     """Lowest and highest corner (M, 2, 3) of joints and ends of boxes, without their thickness."""
-    moves = skeleton.translations(made.bone_offsets, made.root_position)
-    places, turns = skeleton.forward(person.parents, made.rotations.astype(float), moves)
-    bones = rig.bones
-    starts = bones.starts - rig.rest[bones.joints]
-    ends = np.stack([starts, starts + bones.arms])[:, None, None]
-    drawn = places[:, :, bones.joints] + quat.rotate(turns[:, :, bones.joints], ends)
+    local = skeleton.translations(made.bone_offsets, made.root_position)
+    places, turns = skeleton.forward(person.parents, made.rotations.astype(float), local)
+    boxes, joints = body.boxes(person, rig.bones, person.offsets), rig.bones.joints
+    starts = boxes.starts - person.at_rest(person.offsets)[joints]
+    ends = np.stack([starts, starts + boxes.arms])[:, None, None]
+    drawn = places[:, :, joints] + quat.rotate(turns[:, :, joints], ends)
     points = np.concatenate([places, *drawn], axis=-2).reshape(len(made), -1, 3)
     return np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
 
 
 def holds(hull, seed):
     person, rig, made = case(seed)
-    found, least = reach.boxes(hull(person, rig), made), reached(person, rig, made)
+    found, least = reach.boxes(hull(rig), moves.of_motions(made)), reached(person, rig, made)
     return np.all(found[:, 0] <= least[:, 0]) and np.all(found[:, 1] >= least[:, 1])
 
 
-def whole(person, rig):
-    return reach.hull(person.parents, rig)
+def whole(rig):
+    return reach.hull(rig)
 
 
-def joints_alone(person, rig):
-    found = whole(person, rig)
+def joints_alone(rig):
+    found = whole(rig)
     return replace(found, ends=0 * found.ends, radii=0 * found.radii, moved=found.moved & False)
 
 

@@ -5,12 +5,12 @@ import zipfile
 import pytest
 from pxr import Usd, UsdSkel
 
-from service.encode import usd, usdz
+from service.encode import ENCODERS, usdz
 
 
 @pytest.fixture(scope="module")
 def archive(walk):
-    return usdz.usdz(walk)
+    return ENCODERS["usdz"].encode(walk)
 
 
 def test_the_archive_holds_the_binary_layer_alone(archive, walk):
@@ -19,11 +19,11 @@ def test_the_archive_holds_the_binary_layer_alone(archive, walk):
         (entry,) = found.infolist()
         assert (entry.filename, entry.compress_type) == ("clip.usdc", zipfile.ZIP_STORED)
         assert entry.date_time == (1980, 1, 1, 0, 0, 0)
-        assert found.read(entry) == usd.usdc(walk)
+        assert found.read(entry) == ENCODERS["usdc"].encode(walk)
 
 
 def test_the_data_are_aligned(archive, walk):
-    assert archive.index(usd.usdc(walk)) % 64 == 0
+    assert archive.index(ENCODERS["usdc"].encode(walk)) % 64 == 0
 
 
 @pytest.mark.parametrize("before", range(64))

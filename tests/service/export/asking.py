@@ -15,11 +15,13 @@ from service.export.query import Fault, Query
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
 TYPES |= {"performer": pa.string(), "extrapolate": pa.string()}
+TYPES |= {"names": pa.string(), "root": pa.string(), "loop": pa.bool_()}
 
 
 def columns(rows):
     """Controls first, then whatever any row says, in the order of messages in JSON Lines."""
-    return [*POINT, *(option for option in OPTIONS if any(option in row for row in rows))]
+    said = dict.fromkeys(key for row in rows for key in row)
+    return [*(key for key in said if key not in OPTIONS), *(key for key in OPTIONS if key in said)]
 
 
 def write_csv(path: Path, rows):

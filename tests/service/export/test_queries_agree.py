@@ -36,6 +36,18 @@ ROWS = st.fixed_dictionaries(
         "end": st.sampled_from([0.3, 0.5, 18.5, 18.6, None]),
         "performer": st.sampled_from([*PERFORMERS, "nobody", None]),
         "extrapolate": st.sampled_from(["warn", "refuse", "no", None]),
+        "names": st.sampled_from(["own", "vrm", None]),
+        "root": st.sampled_from(["travelling", "in_place", None]),
+        "loop": st.sampled_from([False, False, True, None]),
+    },
+)
+CYCLES = st.fixed_dictionaries(
+    {},
+    optional={
+        "start": st.sampled_from([0.0, 0.1, None]),
+        "end": st.sampled_from([0.3, None]),
+        "names": st.sampled_from(["own", "own", "vrm", None]),
+        "loop": st.booleans(),
     },
 )
 
@@ -46,21 +58,27 @@ def model(labelled_path):
 
 
 @pytest.fixture(scope="module")
+def walk(walk_path):
+    """A model of a cycle whose joints have no roles."""
+    return library.load([walk_path]).models["stroll"]
+
+
+@pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("agree")
 
 
-def plainly(model, table):
+def plainly(model, table, usual=USUAL):
     """Names, formats and questions of rows, none for one at fault: one row at a time."""
     seen, found = set(), []
     for index, row in enumerate(table):
         said = {key: value for key, value in row.items() if value is not None}
-        name, form = said.pop("name", f"clip-{index:06d}"), said.pop("format", USUAL.format)
-        controls = {key: said.pop(key) for key in POINT}
+        name, form = said.pop("name", f"clip-{index:06d}"), said.pop("format", usual.format)
+        controls = {c.name: said.pop(c.name) for c in model.session.card.controls}
         found.append(None)
         if form not in ENCODERS or name in (".x", "a b") or said.get("extrapolate") == "no":
             continue
-        question = replace(USUAL.question, controls=controls, **said)
+        question = replace(usual.question, controls=controls, **said)
         try:
             model.check(question)
         except QueryError:
@@ -81,6 +99,17 @@ def test_every_file_gives_what_the_door_lets_in(model, folder, table):
     expected = plainly(model, table)
     for ending, write in WRITERS.items():
         found = rows(model, write(folder / f"q.{ending}", table), USUAL)
+        assert [plain(row) for row in found] == expected, ending
+
+
+@given(options=st.lists(CYCLES, min_size=1, max_size=6))
+@settings(max_examples=60, deadline=None)
+def test_cycles_are_let_in_as_the_door_lets_them(walk, folder, options):
+    middle = {control.name: control.default for control in walk.session.card.controls}
+    table, usual = [middle | said for said in options], Defaults("bvh")
+    expected = plainly(walk, table, usual)
+    for ending, write in WRITERS.items():
+        found = rows(walk, write(folder / f"w.{ending}", table), usual)
         assert [plain(row) for row in found] == expected, ending
 
 

@@ -55,10 +55,10 @@ def test_a_row_asks_for_a_clip(model, tmp_path):
 def test_a_row_may_say_everything(model, tmp_path):
     path = text(
         tmp_path / "q.csv",
-        f"name,format,fps,level,start,end,performer,extrapolate,{HEADING}",
-        f"a.b-C_9,bvh,24,2,0.25,0.5,tall,refuse,{ROW}",
+        f"name,format,fps,level,start,end,performer,extrapolate,names,root,loop,{HEADING}",
+        f"a.b-C_9,bvh,24,2,0.25,0.5,tall,refuse,vrm,in_place,False,{ROW}",
     )
-    question = ClipQuestion(POINT, 24.0, "refuse", 0.25, 0.5, "tall", 2)
+    question = ClipQuestion(POINT, 24.0, "refuse", 0.25, 0.5, "tall", 2, "vrm", "in_place", False)
     assert asked(rows(model, path)) == [("a.b-C_9", "bvh", question)]
 
 
@@ -107,7 +107,7 @@ def test_the_same_table_in_other_words(model, tmp_path, content):
         (
             f"{HEADING},zzz",
             "1: unknown column 'zzz', expected one of stature, hip_height, turn, target_height, "
-            "name, format, fps, level, start, end, performer, extrapolate",
+            "name, format, fps, level, start, end, performer, extrapolate, names, root, loop",
         ),
         (
             "stature [cm],hip_height,turn,target_height",
@@ -185,6 +185,10 @@ def test_a_cell_that_is_no_number_is_named(model, tmp_path, cell):
             "1.7,0.9,99,1,refuse",
             "controls: turn = 99 deg lies outside what was sampled, -59.2188 to 87.5 deg",
         ),
+        (",names", f"{ROW},mine", "names: 'mine', expected one of own, mixamo, "),
+        (",root", f"{ROW},away", "root: 'away', expected one of travelling, in_place"),
+        (",loop", f"{ROW},1", "loop: '1', expected true or false"),
+        (",loop", f"{ROW},TRUE", "loop: true, expected false: this model's last pose does not"),
         (",name", f'{ROW},"a"b', "not CSV: ',' expected after '\"'"),
     ],
 )

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service.motion import bvh, quat
+from service.motion.bvh import writer
 from service.motion.clip import Clip
 from service.motion.errors import BvhError
 from service.motion.skeleton import Skeleton
@@ -186,6 +187,41 @@ def rng():
 
 def test_bytes_are_these():
     assert bvh.dumps(small_clip(), metres_per_unit=0.01) == GOLDEN
+
+
+@pytest.mark.parametrize("decimals", [7, 8, 11])
+def test_numbers_are_written_as_percent_f_writes_them(rng, decimals):
+    # A float holds fifteen digits.
+    values = rng.normal(size=(50, 7)) * 10.0 ** rng.integers(-9, 14 - decimals, (50, 7))
+    values[0] = [0.0, -0.0, 1e-12, -1e-12, 10.0, 999.99999999, -0.5]
+    rounded = np.round(values, decimals) + 0.0
+    expected = "".join(
+        " ".join(f"{number:.{decimals}f}" for number in row) + "\n" for row in rounded
+    )
+    assert writer.written(values, decimals).decode() == expected
+
+
+def test_numbers_of_too_many_digits_are_refused():
+    with pytest.raises(ValueError, match=r"numbers of up to 1e\+12, expected fewer digits"):
+        writer.written(np.array([[1.0, -1e12]]), 7)
+
+
+def nearest_by_hand(angles):
+    """Each frame's nearer triple, one frame after another."""
+    near = [angles[0]]
+    for triple in angles[1:]:
+        both = np.stack([triple, np.array([1.0, -1.0, 1.0]) * triple + np.pi])
+        both += 2.0 * np.pi * np.round((near[-1] - both) / (2.0 * np.pi))
+        near.append(both[np.argmin(np.sum((both - near[-1]) ** 2, axis=-1))])
+    return np.array(near)
+
+
+def test_angles_are_as_near_as_taking_one_frame_after_another(rng):
+    wild = quat.exp(np.cumsum(rng.normal(0.0, 0.3, (2000, 3)), axis=0))
+    angles = quat.to_euler(wild, "ZYX")
+    found = writer.continuous(angles)
+    assert np.abs(found - nearest_by_hand(angles)).max() < 1e-9
+    assert np.abs(found - angles).max() > np.pi
 
 
 def test_bytes_hang_on_the_numbers_and_not_on_their_layout(rng):

@@ -1,5 +1,6 @@
 """Both ways to ask lead to one question."""
 
+import json
 import math
 
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from service.synthesis.question import ClipQuestion
 from service.web import query
 from service.web.problems import RequestFault
-from service.web.query import PoseQuestion
+from service.web.query import FileQuestion, PoseQuestion
 
 
 def test_a_query_and_a_body_are_one_pose_question():
@@ -28,28 +29,39 @@ def test_a_query_and_a_body_are_one_pose_question():
 def test_a_query_and_a_body_are_one_clip_question():
     expected = ClipQuestion({"turn": -2.0}, 60.0, "warn", 0.1, 0.9, "ada")
     pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9"), ("performer", "ada")]
-    assert query.clip_of_pairs(pairs) == expected
+    assert query.file_of_pairs(pairs) == FileQuestion(expected)
     body = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9, "performer": "ada"}'
-    assert query.clip_of_body(body) == expected
+    assert query.file_of_body(body) == FileQuestion(expected)
+
+
+def test_a_query_and_a_body_say_alike_how_a_file_is_made():
+    clip = ClipQuestion({"turn": -2.0}, names="ue5", root="in_place", loop=True)
+    expected = FileQuestion(clip, "cm", "z")
+    said = {"names": "ue5", "root": "in_place", "unit": "cm", "up": "z"}
+    assert query.file_of_pairs([("turn", "-2"), ("loop", "true"), *said.items()]) == expected
+    body = {"controls": {"turn": -2}, "loop": True, **said}
+    assert query.file_of_body(json.dumps(body).encode()) == expected
 
 
 def test_what_is_left_out_has_one_default():
-    expected = ClipQuestion({})
-    assert query.clip_of_pairs([]) == expected
-    assert query.clip_of_body(b'{"controls": {}}') == expected
-    assert query.clip_of_body(b'{"controls": {}, "end": null}') == expected
+    expected = FileQuestion(ClipQuestion({}))
+    assert query.file_of_pairs([]) == expected
+    assert query.file_of_pairs([("loop", "false")]) == expected
+    assert query.file_of_body(b'{"controls": {}}') == expected
+    nothing = b'{"controls": {}, "end": null, "unit": null, "up": null, "loop": false}'
+    assert query.file_of_body(nothing) == expected
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_number_survives_the_query(number):
-    asked = query.clip_of_pairs([("turn", repr(number))])
-    assert asked.controls == {"turn": number}
+    asked = query.file_of_pairs([("turn", repr(number))])
+    assert asked.clip.controls == {"turn": number}
 
 
 @given(st.text())
 def test_any_text_is_a_finite_number_or_refused(text):
     try:
-        value = query.clip_of_pairs([("turn", text)]).controls["turn"]
+        value = query.file_of_pairs([("turn", text)]).clip.controls["turn"]
     except RequestFault as fault:
         assert fault.kind.status == 400
     else:

@@ -1,0 +1,64 @@
+"""A clip in every format that the service writes, in batches as an export makes them."""
+
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from rows import Row, table
+
+from model_export.evaluate import table1_family
+from model_export.evaluate.table1_family import Family
+from model_export.evaluate.table1_timing import in_turn
+from service.encode import ENCODERS
+from service.motion.answer import ClipAnswer
+from service.synthesis import session
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+
+FRAMES, BATCH = 100, 16
+GOALS = {"glb": 5.0, "bvh": 5.0}
+"""ms a clip: 200 clips a second and core."""
+
+
+def rows(made: Family) -> list[Row]:
+    """What a clip of 100 frames takes to synthesise, and what to write in each format."""
+    model = Synthesizer("reaching", session.open_bytes(made.exported.content, "reaching"))
+    question = _question(model)
+    answers = [model.clip(question)] * BATCH
+    taken = in_turn(
+        {"synthesis": partial(_synthesised, model, question), **_writers(answers)},
+        rounds=9,
+        repeats=1,
+    )
+    joints = len(answers[0].clip.skeleton)
+    return [_row(name, seconds / BATCH, joints, answers[0]) for name, seconds in taken.items()]
+
+
+def _question(model: Synthesizer) -> ClipQuestion:
+    """A clip in the middle of the controls, at the rate at which it has so many frames."""
+    middle = {control.name: control.default for control in model.session.card.controls}
+    duration = model.pose(middle, [0.0], "refuse").trust.duration
+    return ClipQuestion(middle, (FRAMES - 1) / duration)
+
+
+def _synthesised(model: Synthesizer, question: ClipQuestion) -> list[ClipAnswer]:
+    return [model.clip(question) for _ in range(BATCH)]
+
+
+def _writers(answers: list[ClipAnswer]) -> dict[str, Callable[[], list[bytes]]]:
+    return {name: partial(e.write, answers, e.usual) for name, e in ENCODERS.items()}
+
+
+def _row(name: str, seconds: float, joints: int, answer: ClipAnswer) -> Row:
+    words = f"{1.0 / seconds:,.0f} clips a second"
+    if name in ENCODERS:
+        words += f" of {len(ENCODERS[name].encode(answer)) / 1e3:.0f} kB"
+    what = f"clip of {FRAMES} frames, {joints} joints, {name}"
+    return Row(what, 1e3 * seconds, "ms", words, None, GOALS.get(name))
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        sys.stdout.write(table(rows(table1_family.make(Path(folder) / "reaching"))) + "\n")

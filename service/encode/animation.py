@@ -1,0 +1,56 @@
+"""Layers of a SkelAnimation alone, for stages in which many clips move one character."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pxr import Sdf
+
+from service.encode import character, facts, layers, specs, takes
+from service.encode.content import Array, Content
+from service.encode.convention import Convention
+from service.encode.press import CRATES
+from service.motion.answer import ClipAnswer
+
+PRIM = "Anim"
+
+
+@dataclass(frozen=True)
+class Animations:
+    """Layers of joints at these paths, of one rate."""
+
+    paths: tuple[str, ...]
+    rate: float
+    convention: Convention
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Those that every layer holds."""
+        return (self.rate, self.convention.metres_per_unit)
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """Arrays that every layer holds."""
+        return ()
+
+    def head(self, content: Content) -> Any:
+        """The layer without its prims."""
+        made = Sdf.Layer.CreateAnonymous("animation.usda")
+        layers.head(made, PRIM, content.frames, self.rate, self.convention)
+        layers.say(made, facts.dictionary(content.facts.whole()))
+        return made
+
+    def layer(self, content: Content) -> Any:
+        """The layer, made by usd-core; the caller must keep it, since its prims do not."""
+        made = self.head(content)
+        with Sdf.ChangeBlock():
+            specs.samples(character.animation(made, PRIM, self.paths), content.samples)
+        return made
+
+
+def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Binary layers of the clips' animations, without a character; the facts are in each."""
+    return [
+        CRATES.write(Animations(take.rig.paths, take.rate, convention), take.content)
+        for take in takes.bare(answers, convention)
+    ]

@@ -1,0 +1,83 @@
+"""Answers as the arrays that files hold: made together, and the same as if each were made alone."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from service.encode import axes, character, facts, moves, reach
+from service.encode.character import Rig
+from service.encode.content import Array, Content, Samples
+from service.encode.convention import Convention
+from service.encode.moves import Moves
+from service.motion.answer import ClipAnswer
+
+TOGETHER = 6400
+"""Frames of clips that are made at a time, or one clip that has more."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """A rig, how fast it moves, and what a file says of it."""
+
+    rig: Rig
+    rate: float
+    content: Content
+
+
+def whole(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take]:
+    """Takes in the order of their answers: samples, the values of a character, and facts."""
+    for rig, some in _alike(answers):
+        made = moves.of_clips([answer.clip for answer in some])
+        rest = character.resting(rig, made.offsets)
+        boxes = reach.boxes(rig.tree, made, character.balls(rest))
+        values = character.numbers(rest, convention)
+        values["extent"] = axes.box(convention, boxes).astype(np.float32)
+        for index, samples in enumerate(_samples(made, convention)):
+            own = {name: array[index] for name, array in values.items()}
+            yield _take(rig, some[index], samples, own)
+
+
+def bare(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take]:
+    """Takes in the order of their answers: samples and facts alone."""
+    for rig, some in _alike(answers):
+        made = moves.of_clips([answer.clip for answer in some])
+        for answer, samples in zip(some, _samples(made, convention), strict=True):
+            yield _take(rig, answer, samples, {})
+
+
+def _alike(answers: Sequence[ClipAnswer]) -> Iterator[tuple[Rig, list[ClipAnswer]]]:
+    """Neighbours of one skeleton, a few at a time."""
+    _keep_freed_memory()
+    for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
+        part: list[ClipAnswer] = []
+        for answer in some:
+            if part and sum(len(one.clip) for one in part) + len(answer.clip) > TOGETHER:
+                yield character.rig(part[0].clip.skeleton), part
+                part = []
+            part.append(answer)
+        yield character.rig(part[0].clip.skeleton), part
+
+
+@cache
+def _keep_freed_memory() -> None:
+    """Let glibc keep up to 64 MB of what is freed: it gives large blocks back, and to ask for their
+    pages again would take as long as all else.
+
+    Its limits grow to the size of what comes and goes (mallopt(3), M_MMAP_THRESHOLD).
+    """
+    np.empty(31 << 20, np.uint8)
+
+
+def _take(rig: Rig, answer: ClipAnswer, samples: Samples, values: Mapping[str, Array]) -> Take:
+    content = Content(samples, values, facts.parted(answer.trust.facts()))
+    return Take(rig, answer.clip.rate, content)
+
+
+def _samples(made: Moves, convention: Convention) -> Iterator[Samples]:
+    translations = axes.places(convention, made.translations)
+    rotations = axes.rotations(convention, made.rotations)
+    for first, last in pairwise(made.starts):
+        yield {"translations": translations[first:last], "rotations": rotations[first:last]}

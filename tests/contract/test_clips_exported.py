@@ -1,0 +1,63 @@
+"""An archive over HTTP holds what `posefield export` writes for the same questions."""
+
+import io
+import json
+import tarfile
+import zipfile
+
+import pytest
+from typer.testing import CliRunner
+
+from service.cli import app as commands
+
+QUESTIONS = [
+    {"name": "first", "fps": 24.0, "start": 0.1},
+    {"performer": "tall", "level": 1},
+    {"end": 0.4, "extrapolate": "refuse"},
+]
+
+
+@pytest.fixture
+def exported(models, controls, tmp_path):
+    """Files by name and lines of the manifest that the command writes."""
+
+    def run(extension):
+        table = tmp_path / "queries.jsonl"
+        table.write_text("".join(json.dumps({**controls, **q}) + "\n" for q in QUESTIONS))
+        target = tmp_path / "target"
+        model = str(models / "reach.onnx")
+        command = ["export", model, str(table), "-o", str(target), "--format", extension]
+        done = CliRunner().invoke(commands, command)
+        assert done.exit_code == 0, done.output
+        files = {path.name: path.read_bytes() for path in target.rglob(f"clips/*/*.{extension}")}
+        return files, (target / "manifest.jsonl").read_bytes()
+
+    return run
+
+
+def unpacked(kind, content):
+    if kind == "tar":
+        with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as found:
+            return {m.name: found.extractfile(m).read() for m in found.getmembers()}
+    with zipfile.ZipFile(io.BytesIO(content)) as found:
+        return {name: found.read(name) for name in found.namelist()}
+
+
+@pytest.mark.parametrize(("kind", "extension"), [("zip", "usdc"), ("tar", "bvh"), ("zip", "json")])
+def test_both_ways_give_the_same_files_and_say_the_same_of_them(
+    kind, extension, ask, exported, controls
+):
+    clips = [{"controls": controls, **question} for question in QUESTIONS]
+    body = {"format": extension, "clips": clips}
+    found = unpacked(kind, ask("POST", f"/v1/models/reach/clips.{kind}", json=body).content)
+    said = found.pop("manifest.jsonl")
+    files, manifest = exported(extension)
+    assert found == files and len(files) == len(QUESTIONS)
+    assert [without_place(line) for line in said.splitlines()] == [
+        without_place(line) for line in manifest.splitlines()
+    ]
+
+
+def without_place(line):
+    entry = json.loads(line)
+    return {key: value for key, value in entry.items() if key != "file"}

@@ -1,0 +1,156 @@
+"""Library stages, by UsdSkel: every clip moves the one character as it moves its own."""
+
+from dataclasses import replace
+
+import conftest
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
+
+from service.check import check
+from service.encode import CENTIMETRES, METRES, animation, crate, library, takes
+from service.encode.convention import Convention
+from service.motion.answer import ClipAnswer
+
+INCHES = Convention(0.0254, "z")
+NAMES = ("walk 1", "walk-1", "ok")
+
+# float32 keeps 1e-7 of a coordinate, and errors add up along the chain of joints.
+NEAR = 1e-5
+
+
+@pytest.fixture(scope="module")
+def answers(walk):
+    """Clips that differ in length, in bones, in where they go, and one in its rate."""
+    slow, moves = conftest.answer(30, 15.0), 1.2 * walk.clip.translations
+    moves[:, 0] += (3.0, 0.0, 0.0)
+    return [walk, ClipAnswer(replace(walk.clip, translations=moves), walk.trust), slow]
+
+
+def build(folder, answers, convention=METRES, rate=30.0):
+    entries = []
+    layers = animation.usdc(answers, convention)
+    for name, answer, layer in zip(NAMES, answers, layers, strict=False):
+        file = f"clips/00@/{name}.usdc"
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_bytes(layer)
+        entries.append(library.entry(name, file, answer))
+    path = folder / "character.usd"
+    path.write_bytes(library.stage(conftest.person(), convention, rate, entries))
+    return path
+
+
+def metres(stage, places):
+    metric = np.asarray(places) * UsdGeom.GetStageMetersPerUnit(stage)
+    x, y, z = np.moveaxis(metric, -1, 0)
+    return metric if UsdGeom.GetStageUpAxis(stage) == "Y" else np.stack([x, z, -y], axis=-1)
+
+
+def posed(stage, name, code):
+    """Joint positions (J, 3) in the clip of that name at a time code, m."""
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skel"))
+    source = f"/Character/Clips/{name}"
+    UsdSkel.BindingAPI(skeleton).GetAnimationSourceRel().SetTargets([source])
+    cache, root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Character"))
+    assert cache.Populate(root, Usd.PrimDefaultPredicate)
+    query = cache.GetSkelQuery(skeleton)
+    return metres(stage, np.array(query.ComputeJointSkelTransforms(code))[:, 3, :3])
+
+
+@pytest.mark.parametrize("convention", [METRES, CENTIMETRES, INCHES], ids=str)
+def test_every_clip_poses_the_character(answers, convention, tmp_path):
+    stage = Usd.Stage.Open(str(build(tmp_path, answers, convention)))
+    for name, answer in zip(("walk_1", "walk_1_2", "ok"), answers, strict=True):
+        for frame in (0, 13, len(answer.clip) - 1):
+            # USD scales time codes between layers of different rates.
+            found = posed(stage, name, frame * 30.0 / answer.clip.rate)
+            np.testing.assert_allclose(found, answer.clip.positions()[frame], atol=2 * NEAR)
+    other = posed(stage, "walk_1", 13) - answers[1].clip.positions()[13]
+    assert np.abs(other).max() > 0.1
+
+
+def test_the_first_clip_is_bound_and_the_longest_gives_the_times(answers, tmp_path):
+    stage = Usd.Stage.Open(str(build(tmp_path, answers)))
+    assert stage.GetDefaultPrim().GetPath() == "/Character"
+    relation = stage.GetRelationshipAtPath("/Character/Skel.skel:animationSource")
+    assert relation.GetTargets() == ["/Character/Clips/walk_1"]
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, 58)
+    assert stage.GetTimeCodesPerSecond() == 30.0
+
+
+@pytest.mark.parametrize("convention", [METRES, INCHES], ids=str)
+def test_our_own_check_has_nothing_to_say(answers, convention, tmp_path):
+    assert check(build(tmp_path, answers[:2], convention, 29.97)) == []
+    # The first clip is shorter than the longest, and then holds its last pose.
+    found = check(build(tmp_path, answers, convention, 29.97))
+    assert {each.code for each in found} == {"missing-frame"}
+
+
+@pytest.mark.parametrize("convention", [METRES, INCHES], ids=str)
+def test_the_extent_holds_the_body_in_every_clip(answers, convention, tmp_path):
+    stage = Usd.Stage.Open(str(build(tmp_path, answers, convention)))
+    low, high = np.array(stage.GetAttributeAtPath("/Character.extent").Get())
+    size = (high - low) * convention.metres_per_unit
+    assert np.all(size < 8.0)
+    for name in ("walk_1", "walk_1_2", "ok"):
+        for code in (0, 20, 44):
+            posed(stage, name, code)
+            points = skinned(stage, code)
+            assert np.all(points >= low) and np.all(points <= high)
+
+
+def skinned(stage, code):
+    cache, root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Character"))
+    cache.Populate(root, Usd.PrimDefaultPredicate)
+    (binding,) = cache.ComputeSkelBindings(root, Usd.PrimDefaultPredicate)
+    (skin,) = binding.GetSkinningTargets()
+    points = UsdGeom.Mesh(skin.GetPrim()).GetPointsAttr().Get()
+    transforms = cache.GetSkelQuery(binding.GetSkeleton()).ComputeSkinningTransforms(code)
+    assert skin.ComputeSkinnedPoints(transforms, points, code)
+    return np.array(points)
+
+
+def test_without_payloads_the_clips_are_listed_and_no_layer_is_opened(answers, tmp_path):
+    path = build(tmp_path, answers)
+    stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+    clips = stage.GetPrimAtPath("/Character/Clips").GetAllChildren()
+    assert [prim.GetName() for prim in clips] == ["walk_1", "walk_1_2", "ok"]
+    assert {prim.GetTypeName() for prim in clips} == {"SkelAnimation"}
+    assert len(stage.GetUsedLayers()) == 2
+    stage.Load()
+    assert len(stage.GetUsedLayers()) == 5
+
+
+def test_the_text_is_what_usd_writes_of_it(answers, tmp_path):
+    path = build(tmp_path, answers)
+    layer = Sdf.Layer.CreateAnonymous("again.usda")
+    assert layer.ImportFromString(path.read_text())
+    assert layer.ExportToString() == path.read_text()
+
+
+def test_a_library_of_no_clips_is_a_character_at_rest(tmp_path):
+    path = tmp_path / "character.usd"
+    path.write_bytes(library.stage(conftest.person(), METRES, 30.0, []))
+    stage = Usd.Stage.Open(str(path))
+    assert stage.GetEndTimeCode() == 0
+    assert not stage.GetPrimAtPath("/Character/Clips").GetAllChildren()
+
+
+def test_layers_say_what_their_clips_are_worth(answers, tmp_path):
+    path = build(tmp_path, answers).parent / "clips/00@/ok.usdc"
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    facts = layer.customLayerData["posefield"]
+    assert facts | {"warnings": list(facts["warnings"])} == answers[2].trust.facts()
+    assert layer.defaultPrim == "Anim"
+    assert len(layer.rootPrims) == 1
+
+
+@pytest.mark.parametrize("convention", [METRES, INCHES], ids=str)
+def test_layers_are_as_usd_writes_them(answers, convention):
+    many = [answers[index] for index in (0, 1, 0, 2, 1)]
+    expected = [
+        crate.ordinary(animation.Animations(take.rig.paths, take.rate, convention), take.content)
+        for take in takes.bare(many, convention)
+    ]
+    assert animation.usdc(many, convention) == expected
+    assert animation.usdc(many[1:2], convention) == expected[1:2]

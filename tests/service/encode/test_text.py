@@ -1,0 +1,79 @@
+"""Spelling of numbers and whole layers against usd-core's own text."""
+
+import re
+
+import numpy as np
+import pytest
+from pxr import Sdf, Vt
+
+from service.encode import spelling
+from service.encode.specs import Type, attribute, prim
+
+
+def usd(values):
+    """Each number as usd-core spells it."""
+    kind, array = (
+        (Type.FloatArray, Vt.FloatArray)
+        if values.dtype == np.float32
+        else (Type.DoubleArray, Vt.DoubleArray)
+    )
+    layer = Sdf.Layer.CreateAnonymous("numbers.usda")
+    attribute(prim(layer, "Numbers", "Scope"), "all", kind, array.FromNumpy(values))
+    return re.search(r"= \[(.*)\]", layer.ExportToString()).group(1).split(", ")
+
+
+def ours(values):
+    (row,) = spelling.vectors(values.reshape(1, -1, 1))
+    return row.decode().split("), (")
+
+
+def numbers(kind, count=100_000):
+    """Plain numbers of every size, from random bits, and those that are odd to spell."""
+    size = np.dtype(kind).itemsize
+    bits = np.random.default_rng(1).integers(0, 2 ** (8 * size), count, f"u{size}").view(kind)
+    powers = 10.0 ** np.arange(-45, 13)
+    odd = [
+        0.0,
+        -0.0,
+        1 / 3,
+        2 / 3,
+        16777216,
+        33554433,
+        123456789,
+        9999999,
+        0.5,
+        1e-45,
+        1.1754942e-38,
+    ]
+    every = np.concatenate([bits, powers, 1.5 * powers, -9.99 * powers / 10, odd, range(2000)])
+    every = every[np.isfinite(every)].astype(kind)
+    return np.array([number for number in every if spelling.plain(number)], kind)
+
+
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast", "ignore:invalid value")
+def test_plain_numbers_are_spelt_as_usd_does(kind):
+    values = numbers(kind)
+    assert len(values) > 1000
+    assert ours(values) == usd(values)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [(2e13, "f4"), (np.nan, "f4"), (-np.inf, "f4"), (3e-6, "f8"), (2e13, "f8"), (np.nan, "f8")],
+)
+def test_other_numbers_would_be_spelt_in_another_way(value, kind):
+    values = np.array([value, 1.5], kind)
+    assert not spelling.plain(values)
+    assert value in (2e13,) * (kind == "f8") or ours(values) != usd(values)
+
+
+def test_rows_of_vectors_are_told_apart():
+    rows = np.arange(12, dtype="f4").reshape(2, 2, 3)
+    assert spelling.vectors(rows) == [b"0, 1, 2), (3, 4, 5", b"6, 7, 8), (9, 10, 11"]
+    assert spelling.moves(rows) == spelling.vectors(rows)
+    rows[1, 1] = rows[0, 1]
+    assert spelling.moves(rows) == spelling.vectors(rows)
+    assert spelling.moves(rows[:, :1]) == spelling.vectors(rows[:, :1])
+    (quaternion,) = spelling.quaternions(np.array([[[1, 2, 3, 4]]], "f4"))
+    assert quaternion == b"4, 1, 2, 3"

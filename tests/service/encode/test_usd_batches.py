@@ -1,0 +1,210 @@
+"""Clips written together against the ordinary way through usd-core, byte for byte."""
+
+import math
+from dataclasses import replace
+
+import conftest
+import numpy as np
+import pytest
+
+from service.encode import ENCODERS, METRES, crate, press, text, usd
+from service.encode.convention import CENTIMETRES, Convention
+from service.motion import clip as clips
+from service.motion import quat
+from service.motion.answer import ClipAnswer, Trust
+from service.motion.skeleton import Skeleton
+
+INCHES = Convention(0.0254, "z")
+CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), INCHES]
+
+
+def answers(count, frames=30, person=None, seed=0, **said):
+    """Clips that differ in all that clips of one model can."""
+    rng, person = np.random.default_rng(seed), person or conftest.person()
+    return [_answer(rng, frames, person, said) for _ in range(count)]
+
+
+def _answer(rng, frames, person, said):
+    joints, t = len(person), np.arange(frames)[:, None, None] / 30
+    turns = quat.exp(np.sin(t * rng.uniform(1, 3, (joints, 3)) + rng.uniform(0, 1, (joints, 3))))
+    path = rng.standard_normal(3) + t[:, 0] * rng.standard_normal(3)
+    offsets = person.offsets * rng.uniform(0.9, 1.1, (joints, 1))
+    controls = {"speed": float(rng.uniform(0, 2)), "turn rate": float(rng.uniform(-1, 1))}
+    sigma, duration = (float(np.float32(number)) for number in rng.uniform(0, 2, 2))
+    trust = Trust("walk@0123abcd", controls, duration, sigma, (), "ada")
+    made = clips.assemble(person, turns, path, offsets, 30.0)
+    return ClipAnswer(made, replace(trust, **said))
+
+
+def ordinary(given, convention=METRES, form=crate):
+    return [form.ordinary(*each) for one in given for each in usd._authored([one], convention)]
+
+
+def written(given, convention=METRES, write=usd.usdc):
+    """All of them twice: templates are made on the way."""
+    first = write(given, convention)
+    assert write(given, convention) == first
+    return first
+
+
+def both(given, convention=METRES):
+    """Whether both forms are written as usd-core does."""
+    return written(given, convention) == ordinary(given, convention) and (
+        written(given, convention, usd.usda) == ordinary(given, convention, text)
+    )
+
+
+def moved(answer, translations=None, rotations=None):
+    clip = answer.clip
+    translations = clip.translations if translations is None else translations
+    rotations = clip.rotations if rotations is None else rotations
+    return replace(answer, clip=replace(clip, translations=translations, rotations=rotations))
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_a_batch_is_written_as_usd_writes_it(convention):
+    assert both(answers(5), convention)
+
+
+def test_other_clips_have_other_bytes():
+    given = answers(3)
+    turned = given[1].clip.rotations.copy()
+    turned[7, 3] = -turned[7, 3, ::-1]
+    assert written([moved(given[1], rotations=turned)]) != written(given[1:2])
+    assert len(set(written(given))) == 3
+
+
+@pytest.mark.parametrize("extension", ["usda", "usdc", "usdz"])
+def test_a_clip_is_the_same_alone_and_among_others(extension):
+    given = [*answers(3, 20), *answers(2, 31, seed=1), *answers(1, 1, seed=2), *answers(2, 20)]
+    write = ENCODERS[extension].write
+    alone = [write([one], METRES)[0] for one in given]
+    assert write(given, METRES) == alone
+    assert write(given[::-1], METRES) == alone[::-1]
+    assert write([], METRES) == []
+
+
+def test_clips_of_several_skeletons_are_written_in_their_order():
+    person = conftest.person()
+    other = replace(person, names=tuple(f"j{joint}" for joint in range(len(person))))
+    first, second = answers(3), answers(3, person=other)
+    mixed = [one for pair in zip(first, second, strict=True) for one in pair]
+    apart = zip(written(first), written(second), strict=True)
+    assert written(mixed) == [one for pair in apart for one in pair]
+
+
+def test_clips_too_long_to_be_made_together_are_written(monkeypatch):
+    given = answers(4)
+    expected = written(given)
+    monkeypatch.setattr("service.encode.takes.TOGETHER", 45)
+    monkeypatch.setattr("service.encode.reach.FRAMES", 7)
+    assert written(given) == expected
+
+
+def closed(answer):
+    turns, moves = answer.clip.rotations.copy(), answer.clip.translations.copy()
+    turns[-1], moves[-1] = turns[0], moves[0]
+    return moved(answer, moves, turns)
+
+
+def in_place(answer):
+    moves = answer.clip.translations.copy()
+    moves[:, 0] = moves[0, 0]
+    return moved(answer, moves)
+
+
+def still(answer):
+    turns = np.broadcast_to(answer.clip.rotations[:1], answer.clip.rotations.shape)
+    return in_place(moved(answer, rotations=turns))
+
+
+def signed(answer):
+    """Signs that jump, and zeros of both signs."""
+    rng = np.random.default_rng(3)
+    turns = answer.clip.rotations * rng.choice([-1.0, 1.0], (len(answer.clip), 20, 1))
+    turns[:, 4] = [1, 0, 0, 0] * rng.choice([-1.0, 1.0], (len(answer.clip), 4))
+    moves = answer.clip.translations.copy()
+    moves[:, 0, 1] = 0.0 * rng.choice([-1.0, 1.0], len(answer.clip))
+    return moved(answer, moves, turns)
+
+
+@pytest.mark.parametrize("change", [closed, in_place, still, signed])
+@pytest.mark.parametrize("convention", [METRES, INCHES])
+def test_equal_samples_are_written_as_usd_does(change, convention):
+    given = [change(one) for one in answers(4)]
+    assert both(given, convention)
+    assert (len(written(given)[0]) < len(written(answers(1))[0])) == (change is not signed)
+
+
+FACTS = [
+    {"warnings": ("speed 3 is beyond 2",)},
+    {"warnings": ("a", "b", "a")},
+    {"performer": None},
+    {"performer": "Body"},
+    {"performer": "speed"},
+    {"performer": 'quo"ted 左腕'},
+    {"level": 2},
+    {"sigma": math.nan},
+    {"sigma": math.inf, "duration": -0.0},
+    {"controls": {}},
+    {"controls": {"a": 0.1, "b": 0.1, "c": 0.0254, "d": 0.3, "e": 0.3}},
+    {"controls": {"a": 1, "b": True, "c": 0.5}},
+]
+
+
+@pytest.mark.parametrize("said", FACTS)
+def test_any_facts_are_written_as_usd_does(said):
+    given = [*answers(2), *answers(3, seed=4, **said)]
+    for convention in (METRES, INCHES):
+        assert both(given, convention)
+
+
+def chain(joints):
+    names = tuple(f"j{joint}" for joint in range(joints))
+    offsets = np.random.default_rng(1).uniform(0.1, 0.5, (joints, 3))
+    return Skeleton(names, tuple(range(-1, joints - 1)), offsets, (), np.empty((0, 3)))
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3, 10, 40])
+def test_skeletons_whose_arrays_are_as_large_as_others_will_do(joints):
+    given = answers(4, person=chain(joints))
+    assert both(given)
+
+
+def test_samples_that_equal_the_tints_are_written_as_usd_does():
+    given = answers(4, person=chain(3))
+    tinted = np.broadcast_to(usd.TINTS.astype(float), given[3].clip.translations.shape)
+    given[3] = moved(given[3], tinted)
+    assert both(given)
+
+
+def test_a_root_that_rests_nowhere_else_than_its_children_will_do():
+    """Bind and rest are the same matrices, which USD writes once."""
+    person = replace(
+        chain(3), parents=(-1, 0, 0), offsets=np.array([(0.0, 0, 0), (0, 1, 0), (1, 0, 0)])
+    )
+    given = answers(4, person=person)
+    assert both(given)
+
+
+def test_awkward_numbers_are_written_as_usd_does():
+    given = answers(6)
+    odd = np.array([1e-7, 3e-6, 1e-5, 1.0, 1e13, 1e16, 2.0**24, -0.0, 5e-324, 1e-40])
+    for one, scale in zip(given, (1, 1, 1e-6, 1e-3, 1e12, 1e15), strict=True):
+        one.clip.translations[:10, 0, 0] = odd
+        one.clip.translations[:, 1:] *= scale
+    assert both(given)
+    assert both(given, INCHES)
+
+
+def test_templates_are_used(monkeypatch):
+    """Else all that is above would hold without them."""
+    given = answers(3, 37)
+    for form, write in ((crate, usd.usdc), (text, usd.usda)):
+        write(given, METRES)
+        with monkeypatch.context() as patch:
+            patch.setattr(form, "ordinary", lambda *each: b"the ordinary way")
+            assert b"the ordinary way" not in write(given, METRES)
+            longer = write(answers(1, 38), METRES)
+        assert longer == [b"the ordinary way"]
+    assert press.TEXTS._taken <= press.TEXTS.limit

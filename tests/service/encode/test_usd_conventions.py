@@ -1,0 +1,126 @@
+"""Units and axes of USD files, by UsdSkel: the same character stands in the same place."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, UsdSkel
+
+from service.check import check
+from service.encode import CENTIMETRES, ENCODERS, METRES
+from service.encode.convention import Convention
+
+CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), Convention(0.0254, "z")]
+FRAMES = (0, 20, 44)
+
+# float32 keeps 1e-7 of a coordinate, and errors add up along the chain of joints.
+NEAR = 1e-5
+
+
+@pytest.fixture(params=CONVENTIONS, ids=str)
+def convention(request):
+    return request.param
+
+
+@pytest.fixture
+def path(convention, walk, tmp_path):
+    return written(convention, walk, tmp_path)
+
+
+def written(convention, walk, folder):
+    path = folder / "clip.usdc"
+    path.write_bytes(ENCODERS["usdc"].encode(walk, convention))
+    return path
+
+
+def metres(stage, places):
+    """Places (..., 3) of a stage by what it says of its units and axes, in metres and Y up."""
+    metric = np.asarray(places) * UsdGeom.GetStageMetersPerUnit(stage)
+    if UsdGeom.GetStageUpAxis(stage) == "Y":
+        return metric
+    x, y, z = np.moveaxis(metric, -1, 0)
+    return np.stack([x, z, -y], axis=-1)
+
+
+def opened(path):
+    stage = Usd.Stage.Open(str(path))
+    cache, root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Character"))
+    cache.Populate(root, Usd.PrimDefaultPredicate)
+    skeleton = cache.GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skel")))
+    (binding,) = cache.ComputeSkelBindings(root, Usd.PrimDefaultPredicate)
+    (skin,) = binding.GetSkinningTargets()
+    return stage, skeleton, skin
+
+
+def joints(path, frame):
+    stage, skeleton, _ = opened(path)
+    return metres(stage, np.array(skeleton.ComputeJointSkelTransforms(frame))[:, 3, :3])
+
+
+def points(path, frame):
+    _stage, skeleton, skin = opened(path)
+    found = UsdGeom.Mesh(skin.GetPrim()).GetPointsAttr().Get()
+    assert skin.ComputeSkinnedPoints(skeleton.ComputeSkinningTransforms(frame), found, frame)
+    return np.array(found)
+
+
+def test_joints_are_where_they_are_in_metres(path, walk):
+    for frame in FRAMES:
+        expected = walk.clip.positions()[frame]
+        np.testing.assert_allclose(joints(path, frame), expected, atol=NEAR)
+
+
+def test_units_or_axes_that_are_stated_but_not_kept_would_be_seen(walk, tmp_path):
+    path = written(METRES, walk, tmp_path)
+    for name, value in (("metersPerUnit", 0.01), ("upAxis", "Z")):
+        stage = Usd.Stage.Open(str(path))
+        stage.SetMetadata(name, value)
+        stage.Save()
+        assert np.abs(joints(path, 20) - walk.clip.positions()[20]).max() > 0.1
+        written(METRES, walk, tmp_path)
+        stage.Reload()
+
+
+def test_the_body_and_its_extent_are_where_they_are_in_metres(path, walk, tmp_path_factory):
+    plain = written(METRES, walk, tmp_path_factory.mktemp("plain"))
+    stage, _, _ = opened(path)
+    low, high = np.array(stage.GetAttributeAtPath("/Character.extent").Get())
+    for frame in FRAMES:
+        found = points(path, frame)
+        np.testing.assert_allclose(metres(stage, found), points(plain, frame), atol=NEAR)
+        assert np.all(found >= low) and np.all(found <= high)
+    other, _, _ = opened(plain)
+    expected = np.array(other.GetAttributeAtPath("/Character.extent").Get())
+    corners = np.sort(metres(stage, [low, high]), axis=0)
+    np.testing.assert_allclose(corners, expected, atol=NEAR)
+
+
+def test_normals_look_outwards(path):
+    stage, _, _ = opened(path)
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Character/Body"))
+    places, normals = np.array(mesh.GetPointsAttr().Get()), np.array(mesh.GetNormalsAttr().Get())
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=1e-6)
+    centres = places.reshape(-1, 10, 3).mean(axis=1, keepdims=True)
+    assert np.all(
+        np.sum((places.reshape(-1, 10, 3) - centres) * normals.reshape(-1, 10, 3), -1) > 0
+    )
+
+
+def test_rest_and_bind_transforms_turn_nothing_and_agree(path, walk, convention):
+    stage, skeleton, _ = opened(path)
+    rest = np.array(skeleton.ComputeJointSkelTransforms(0, atRest=True))
+    bind = np.array(skeleton.GetJointWorldBindTransforms())
+    np.testing.assert_allclose(rest, bind, atol=1e-6 / convention.metres_per_unit)
+    np.testing.assert_array_equal(bind[:, :3, :3], np.tile(np.eye(3), (len(bind), 1, 1)))
+    offsets = walk.clip.translations[0].copy()
+    offsets[0] = walk.clip.skeleton.offsets[0]
+    expected = walk.clip.skeleton.at_rest(offsets)
+    np.testing.assert_allclose(metres(stage, bind[:, 3, :3]), expected, atol=1e-6)
+
+
+def test_files_say_what_they_measure_in(path, convention):
+    stage, _, _ = opened(path)
+    assert UsdGeom.GetStageMetersPerUnit(stage) == convention.metres_per_unit
+    assert UsdGeom.GetStageUpAxis(stage) == convention.up.upper()
+
+
+def test_our_own_check_has_nothing_to_say(path):
+    assert check(path) == []

@@ -1,0 +1,30 @@
+"""Pieces of an answer are gathered until they are worth sending, and none is empty."""
+
+import pytest
+
+from service.web.sending import ENOUGH, gathered
+
+
+@pytest.mark.parametrize(
+    "pieces",
+    [
+        [],
+        [b""],
+        [b"a", b"", b"b"],
+        [b"", b"x" * ENOUGH, b"", b"y"],
+        [b"x" * 1000] * 1000,
+        [b"x" * ENOUGH] * 3,
+    ],
+)
+def test_nothing_is_lost_and_all_but_the_last_are_long_enough(pieces):
+    found = list(gathered(pieces))
+    assert b"".join(found) == b"".join(pieces)
+    assert all(found)
+    assert all(ENOUGH <= len(piece) < 2 * ENOUGH for piece in found[:-1])
+
+
+def test_no_more_is_taken_than_is_sent():
+    taken = []
+    pieces = gathered(taken.append(n) or b"x" * (ENOUGH // 2) for n in range(10))
+    next(pieces)
+    assert taken == [0, 1]
