@@ -100,3 +100,23 @@ def test_another_source_or_version_is_a_difference(tmp_path):
 def test_what_is_missing_is_none():
     found = scheduler.installed(scheduler.Kit(("no_such_package",), ("no-such-distribution",)))
     assert (found["no_such_package"], found["no-such-distribution"]) == ("none", "none")
+
+
+# As where the extra is not installed.
+WITHOUT = """
+import sys
+sys.modules["distributed"] = None
+from service.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("command", [("export", "--sample", "4", "-o", "made"), ("check",)])
+def test_without_the_extra_its_name_is_said(command, model_path, tmp_path):
+    """Only who names a scheduler needs it: `check` does not."""
+    name, *words = command
+    words = [name, str(model_path), *words, *(["--scheduler", "tcp://a:1"] if words else [])]
+    own = [sys.executable, "-c", WITHOUT, *words]
+    done = subprocess.run(own, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert ("install posefield[dask]" in done.stderr) == (name == "export"), done.stderr
+    assert not (tmp_path / "made").exists()

@@ -87,12 +87,14 @@ class _Chunk:
         """Files of the rows that can be answered, in order."""
         made: list[_Made] = []
         poses = 0
-        for one in self._made(stopped):
+        for one in self._made():
             made.append(one)
             poses += len(one.answer.clip)
             if len(made) == CLIPS or poses >= POSES:
                 yield self._files(made)
                 made, poses = [], 0
+                if stopped():
+                    raise Stop
         yield self._files(made)
 
     def _files(self, made: list[_Made]) -> list[File]:
@@ -102,10 +104,8 @@ class _Chunk:
             for one, content in zip(made, contents, strict=True)
         ]
 
-    def _made(self, stopped: Stopped) -> Iterator[_Made]:
+    def _made(self) -> Iterator[_Made]:
         for number, row in enumerate(self.task.rows, self.task.first):
-            if stopped():
-                raise Stop
             if isinstance(row, Fault):
                 self._note(row.place, row.message)
                 continue

@@ -1,0 +1,94 @@
+"""A folder's files are whole or not there, whatever becomes of who writes them."""
+
+import subprocess
+import sys
+
+import pytest
+
+from service.export.folder import Folder
+from service.motion.errors import FileError
+
+# Dies with half a file written; what is written reaches the disk before.
+DIES = """
+import os, signal, sys
+from service.export.folder import Folder
+
+def pieces():
+    yield bytes(1 << 20)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+folder = Folder(sys.argv[1], ".state/writing")
+folder.prepare()
+folder.stream("clips/000/a.usdc", pieces())
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder that is ready to be written to."""
+    made = Folder(str(tmp_path), ".state/writing")
+    made.prepare()
+    return made
+
+
+def files(path):
+    return {str(p.relative_to(path)): p.stat().st_size for p in path.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("before", [None, b"old"])
+def test_a_writer_that_is_killed_leaves_no_part_of_a_file(before, folder, tmp_path):
+    if before:
+        folder.write([("clips/000/a.usdc", before)])
+    subprocess.run([sys.executable, "-c", DIES, tmp_path], check=False)
+    assert folder.read("clips/000/a.usdc") == before
+    (left,) = set(files(tmp_path)) - {"clips/000/a.usdc"}
+    # It was in the middle of it, and that lies where it is taken for no clip.
+    assert left.startswith(".state/writing/")
+    assert files(tmp_path)[left] == 1 << 20
+    folder.remove(".state")
+    assert set(files(tmp_path)) <= {"clips/000/a.usdc"}
+
+
+def test_pieces_that_break_off_leave_nothing(folder, tmp_path):
+    def broken():
+        yield b"half"
+        raise KeyError("no more")
+
+    with pytest.raises(KeyError):
+        folder.stream("a", broken())
+    assert files(tmp_path) == {}
+
+
+def test_two_writers_of_one_file_do_each_other_no_harm(folder, tmp_path):
+    other = Folder(str(tmp_path), ".state/writing")
+
+    def pieces():
+        yield b"sa"
+        other.write([("a", b"same")])
+        yield b"me"
+
+    assert folder.stream("a", pieces()) == 4
+    assert folder.read("a") == b"same"
+    assert files(tmp_path) == {"a": 4}
+
+
+def test_a_file_is_created_once(folder, tmp_path):
+    assert folder.create("a", b"first")
+    assert not folder.create("a", b"second")
+    assert files(tmp_path) == {"a": 5}
+
+
+def test_what_is_there_is_named(folder):
+    folder.write([("clips/a", b"1"), ("clips/b", b"22")])
+    assert folder.names("clips") == {"a", "b"}
+    assert folder.names("none") == set()
+    assert folder.read("none") is None
+    assert folder.holds("clips/b", 2) and not folder.holds("clips/b", 1)
+    assert not folder.holds("none", 0)
+    assert not folder.empty(but=".state") and folder.names("") == {".state", "clips"}
+
+
+def test_a_place_that_cannot_be_written_is_named(folder, tmp_path):
+    (tmp_path / "clips").write_text("in the way")
+    with pytest.raises(FileError, match="clips/a: cannot be written or read: "):
+        folder.write([("clips/a", b"")])
