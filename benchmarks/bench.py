@@ -13,6 +13,7 @@ from pathlib import Path
 
 import crowd
 import crowd_usd
+import export_usd
 import newcomer
 import paper
 import precompute
@@ -35,6 +36,7 @@ def main() -> None:
         *runtime.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),
+        *export_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))
