@@ -16,6 +16,7 @@ import crowd
 import crowd_usd
 import export
 import export_formats
+import export_usd
 import newcomer
 import paper
 import precompute
@@ -43,6 +44,7 @@ def main() -> None:
         *crowd_usd.rows(),
         *export.rows(model),
         *clips_http.rows(made),
+        *export_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))

@@ -115,10 +115,12 @@ def short(pattern: Pattern) -> Pattern:
 
 
 def _repeats(rows: Singles) -> Repeats:
-    """Rows whose first numbers have different sums differ; at others it is looked."""
-    probes = np.add.reduce(rows.reshape(len(rows), -1)[:, :PROBED], axis=1)
-    ordered = np.sort(probes)
-    if not np.count_nonzero(ordered[1:] == ordered[:-1]):
+    """Rows differ whose first numbers do, or the sums of some of them; at others it is looked."""
+    flat = rows.reshape(len(rows), -1)
+    if _distinct(flat[:, 0]):
+        return None
+    probes = np.add.reduce(flat[:, :PROBED], axis=1)
+    if _distinct(probes):
         return None
     first, sums = dict[Any, int](), probes.tolist()
     alike = [first.setdefault(each, index) for index, each in enumerate(sums)]
@@ -126,6 +128,11 @@ def _repeats(rows: Singles) -> Repeats:
         first = {}
         alike = [first.setdefault(row.tobytes(), index) for index, row in enumerate(rows)]
     return tuple(alike) if len(first) < len(rows) else None
+
+
+def _distinct(numbers: Singles) -> bool:
+    ordered = np.sort(numbers)
+    return not np.count_nonzero(ordered[1:] == ordered[:-1])
 
 
 def _equals(numbers: tuple[float, ...], known: tuple[float, ...]) -> tuple[int, ...]:

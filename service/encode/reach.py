@@ -31,13 +31,13 @@ class Generation:
 
     points: their places in the tree's order. turns: the places of those of them, the first, on
     which others hang, among the turning joints. holders: of each the place of the joint that it
-    hangs on, and turners: the same among the turning joints.
+    hangs on, and turners: the same among the turning joints; slices where they are neighbours.
     """
 
     points: slice
     turns: slice
-    holders: Places
-    turners: Places
+    holders: Places | slice
+    turners: Places | slice
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,13 @@ def _grown(above: Places, depths: Places, order: Places, turning: Places) -> Ite
         turns = slice(*np.searchsorted(depths[turning], [depth, depth + 1]))
         holders = above[order[points]]
         turners = np.array([turner[joint] for joint in holders.tolist()])
-        yield Generation(points, turns, place[holders], turners)
+        yield Generation(points, turns, _neighbours(place[holders]), _neighbours(turners))
+
+
+def _neighbours(places: Places) -> Places | slice:
+    """A slice where it will do: of an array that is a view, and no copy."""
+    first, count = int(places[0]), len(places)
+    return slice(first, first + count) if np.all(np.diff(places) == 1) else places
 
 
 def _boxes(tree: Tree, moves: Moves) -> Singles:
@@ -126,14 +132,18 @@ def _places(tree: Tree, moves: Moves) -> Singles:
     places = np.empty((3, *arms.shape[1:]), np.float32)
     places[:, 0] = moves.path.T
     for each in tree.generations:
-        held = turns.take(each.turners, 1)
+        held = _rows(turns, each.turners)
         here = places[:, each.points]
         _rotate(held, arms[:, each.points], here)
-        here += places.take(each.holders, 1)
+        here += _rows(places, each.holders)
         # In place: nothing reads a joint's local turn once its parent's is known.
         own = turns[:, each.turns]
         _turn(held[:, : own.shape[1]], own)
     return places
+
+
+def _rows(components: Singles, chosen: Places | slice) -> Singles:
+    return components[:, chosen] if isinstance(chosen, slice) else components.take(chosen, 1)
 
 
 def _turns(tree: Tree, moves: Moves) -> Singles:

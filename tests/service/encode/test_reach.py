@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from service.encode import body, character, moves
+from service.encode import reach as exact
 from service.encode.crowd import reach
+from service.motion import clip as clips
 from service.motion import quat, skeleton
 from service.motion.crowd import Placement
 from service.motion.skeleton import Skeleton
@@ -79,3 +81,58 @@ def test_placed_boxes_hold_their_corners_wherever_they_stand():
         moved = quat.rotate(turn, inside) + at
         assert np.all(moved >= low) and np.all(moved <= high)
     assert np.all(high - low < 18 + 2 * np.sqrt(2))
+
+
+def ragged(seed):
+    """Clips of a random skeleton, of several lengths; one is a single pose."""
+    person, rng = tree(seed), np.random.default_rng(seed)
+    made = []
+    for frames in (7, 1, 20, 13):
+        turns = quat.normalize(rng.standard_normal((frames, len(person), 4)))
+        path = rng.standard_normal((frames, 3)) + 3
+        offsets = person.offsets * rng.uniform(0.8, 1.2, (len(person), 1))
+        made.append(clips.assemble(person, turns, path, offsets, 30.0))
+    return person, made
+
+
+def places(person, clip):
+    """Joints and tips (F, P, 3), in float64."""
+    found, turns = skeleton.forward(person.parents, clip.rotations, clip.translations)
+    holders = list(person.tip_joints)
+    return np.concatenate(
+        [found, found[:, holders] + quat.rotate(turns[:, holders], person.tip_offsets)], 1
+    )
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_boxes_of_clips_are_exact(seed):
+    person, made = ragged(seed)
+    rig = character.rig(person)
+    none = np.zeros((len(made), len(person) + len(person.tip_joints)))
+    found = exact.boxes(rig.tree, moves.of_clips(made), none)
+    for clip, (low, high) in zip(made, found, strict=True):
+        every = places(person, clip).reshape(-1, 3)
+        for ours, theirs in ((low, every.min(axis=0)), (-high, -every.max(axis=0))):
+            assert np.all(ours <= theirs) and np.all(theirs - ours < 1e-4)
+
+
+def test_a_turn_in_the_wrong_order_would_be_seen():
+    person, made = ragged(3)
+    rig = character.rig(person)
+    none = np.zeros((len(made), len(person) + len(person.tip_joints)))
+    swapped = [replace(clip, rotations=np.roll(clip.rotations, 1, axis=-1)) for clip in made]
+    found = exact.boxes(rig.tree, moves.of_clips(swapped), none)
+    assert np.abs(found - exact.boxes(rig.tree, moves.of_clips(made), none)).max() > 0.05
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_body_in_any_pose_stays_in_the_box_of_anywhere(seed):
+    person, made = ragged(seed)
+    rig = character.rig(person)
+    whole = moves.of_clips(made)
+    own = exact.boxes(rig.tree, whole, character.balls(character.resting(rig, whole.offsets)))
+    for clip, (low, high) in zip(made, own, strict=True):
+        lowest, highest = exact.anywhere(person, clip.translations[0], clip.root_path)
+        # A stub's ball holds its corners with some room.
+        assert np.all(lowest <= low + 0.02) and np.all(highest >= high - 0.02)
+        assert np.all(highest - lowest < 20)

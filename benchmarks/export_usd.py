@@ -1,0 +1,279 @@
+"""Clips to the bytes of USD files, against the UsdSkel schema API and against plain layers.
+
+OPENBLAS_NUM_THREADS=1 .venv/bin/python benchmarks/export_usd.py
+
+Every file has skeleton, animation, body, extent and facts. Where body and extent are given, all are
+timed from the same arrays; where they are made, so is all that a file holds, 32 clips at a time.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
+from rows import Row, table
+
+from model_export.evaluate.table1_timing import in_turn
+from service.encode import (
+    METRES,
+    animation,
+    body,
+    character,
+    crate,
+    library,
+    names,
+    press,
+    text,
+    usd,
+    usdz,
+)
+from service.encode.character import Rig
+from service.encode.content import Content
+from service.motion import clip as clips
+from service.motion import quat
+from service.motion.answer import ClipAnswer, Trust
+from service.motion.clip import Clip
+from service.motion.skeleton import Skeleton
+
+CLIPS, FRAMES, JOINTS, ENTRIES = 32, 100, 30, 100_000
+SIZE = f"{JOINTS} joints × {FRAMES} frames"
+FOLDER = Path("/dev/shm") if Path("/dev/shm").is_dir() else None
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of USD: how clips are written in it, by which press, and how usd-core does."""
+
+    name: str
+    write: Callable[..., list[bytes]]
+    press: press.Press
+    ordinary: Callable[..., bytes]
+    goals: tuple[float | None, float | None]
+
+
+FORMS = (
+    Form("usdc", usd.usdc, press.CRATES, crate.ordinary, (200.0, 20.0)),
+    Form("usda", usd.usda, press.TEXTS, text.ordinary, (None, None)),
+)
+
+
+def rows() -> list[Row]:
+    """Milliseconds a clip as usdc, usda and usdz, and the ratios to the rivals'."""
+    answers = _answers(CLIPS)
+    found = [row for form in FORMS for row in _form(answers, form)]
+    return [*found, *_package(answers), *_others(answers)]
+
+
+def _form(answers: list[ClipAnswer], form: Form) -> list[Row]:
+    one, made = answers[0], list(usd._authored(answers, METRES))
+    expected = [form.ordinary(*each) for each in made]
+    if any(form.write(answers, METRES) != expected for _ in range(2)):
+        raise AssertionError(f"{form.name} differs from what usd-core writes")
+    with TemporaryDirectory(dir=FOLDER) as folder:
+        path, (author, content) = Path(folder, f"clip.{form.name}"), made[0]
+        taken = in_turn(
+            {
+                "filled": lambda: [form.press.write(*each) for each in made],
+                "ours": lambda: form.write(answers, METRES),
+                "alone": lambda: form.write([one], METRES),
+                "sdf": lambda: form.ordinary(*_first([one])),
+                "layer": lambda: form.ordinary(author, content),
+                "arrays": lambda: _schemas(one.clip, content, _arrays, path),
+                "lists": lambda: _schemas(one.clip, content, _lists, path),
+            },
+            rounds=15,
+            repeats=2,
+        )
+    filled, ours, (first, second) = taken["filled"] / CLIPS, taken["ours"] / CLIPS, form.goals
+    given, whole = f"{form.name}, body and extent given", f"{form.name}, body and extent made"
+    return [
+        _row(given, filled, f"UsdSkel schema API, {LISTS}", taken["lists"], first),
+        _row(given, filled, f"UsdSkel schema API, {ARRAYS}", taken["arrays"], None),
+        _row(given, filled, "Sdf layer, the same", taken["layer"], second),
+        _row(
+            whole, ours, f"UsdSkel schema API, {LISTS}, body and extent given", taken["lists"], None
+        ),
+        _row(whole, ours, "Sdf layer, the same one clip at a time", taken["sdf"], None),
+        _row(whole, ours, "ours, one clip at a time", taken["alone"], None),
+    ]
+
+
+LISTS, ARRAYS = "a Gf value a joint, frame by frame", "arrays from NumPy, frame by frame"
+
+
+def _row(name: str, ours: float, words: str, theirs: float, goal: float | None) -> Row:
+    against = f"{words}: {1e3 * theirs:.3g} ms"
+    return Row(f"clip to {name}, {SIZE}", 1e3 * ours, "ms", against, theirs / ours, goal)
+
+
+def _package(answers: list[ClipAnswer]) -> list[Row]:
+    one = answers[0]
+    taken = in_turn(
+        {
+            "usdz": lambda: usdz.usdz(answers, METRES),
+            "sdf": lambda: usdz.package(crate.ordinary(*_first([one]))),
+        },
+        rounds=15,
+        repeats=2,
+    )
+    words = "Sdf layer and the same zip, one clip at a time"
+    ours = taken["usdz"] / CLIPS
+    return [_row("usdz, body and extent made", ours, words, taken["sdf"], None)]
+
+
+def _others(answers: list[ClipAnswer]) -> list[Row]:
+    """What an animation alone takes, a clip that warns, the first clips of a length, a library."""
+    taken = in_turn(
+        {
+            "whole": lambda: usd.usdc(answers, METRES),
+            "bare": lambda: animation.usdc(answers, METRES),
+            "warned": lambda: usd.usdc(_warned(answers), METRES),
+            "new": lambda: _new(answers[:3]),
+        },
+        rounds=9,
+        repeats=1,
+    )
+    each = {name: 1e3 * seconds / CLIPS for name, seconds in taken.items()}
+    warned = each["warned"] / each["whole"]
+    entries = [library.entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)]
+    some = list(itertools.islice(itertools.cycle(entries), ENTRIES))
+    stage = in_turn({"stage": lambda: _stage(answers[0], some)}, rounds=1, repeats=1)["stage"]
+    return [
+        Row("animation alone as usdc", each["bare"], "ms", SIZE, None, None),
+        Row(
+            "clip as usdc, against", each["warned"], "ms", "with warnings of its own", warned, None
+        ),
+        Row("template of a new length", 1e3 * taken["new"], "ms", "and three clips", None, None),
+        Row(f"library stage of {ENTRIES} clips", stage, "s", "", None, None),
+    ]
+
+
+def _warned(answers: list[ClipAnswer]) -> list[ClipAnswer]:
+    """The same with a warning that no other clip has had."""
+    return [
+        replace(answer, trust=replace(answer.trust, warnings=(f"control = {next(SERIAL)}",)))
+        for answer in answers
+    ]
+
+
+SERIAL = itertools.count()
+
+
+def _new(answers: list[ClipAnswer]) -> None:
+    before = press.CRATES._kept.copy()
+    press.CRATES._kept.clear()
+    usd.usdc(answers, METRES)
+    press.CRATES._kept.update(before)
+
+
+def _stage(answer: ClipAnswer, entries: list[library.Entry]) -> bytes:
+    return library.stage(answer.clip.skeleton, METRES, 30.0, entries)
+
+
+def _first(answers: list[ClipAnswer]) -> tuple[usd.Clips, Content]:
+    return next(usd._authored(answers, METRES))
+
+
+def _answers(count: int) -> list[ClipAnswer]:
+    """Clips that differ in all that clips of one model can."""
+    person, rng = _person(), np.random.default_rng(3)
+    t = np.arange(FRAMES)[:, None, None] / 30
+    made = []
+    for _ in range(count):
+        pace, phase = rng.uniform(0.5, 1.5, (2, JOINTS, 3))
+        path = rng.uniform(-1, 1, 3) * (1, 0.05, 1) * t[:, 0] + (0, 0.9, 0)
+        offsets = rng.uniform(0.9, 1.1, (JOINTS, 1)) * person.offsets
+        clip = clips.assemble(person, quat.exp(np.sin(pace * t + phase)), path, offsets, 30.0)
+        controls = {f"control {index}": float(rng.uniform()) for index in range(6)}
+        duration, sigma = (float(np.float32(number)) for number in rng.uniform(0, 2, 2))
+        made.append(ClipAnswer(clip, Trust("walk@0123abcd", controls, duration, sigma, ())))
+    return made
+
+
+def _person() -> Skeleton:
+    """A spine of six joints and four limbs of six, of which each has a tip."""
+    limbs = [(hold, *range(at, at + 5)) for hold, at in ((0, 6), (0, 12), (4, 18), (4, 24))]
+    parents = [-1, *range(5), *itertools.chain.from_iterable(limbs)]
+    offsets = np.random.default_rng(2).uniform((-0.1, 0, -0.1), (0.1, 0.2, 0.1), (JOINTS, 3))
+    labels = tuple(f"joint{index}" for index in range(JOINTS))
+    return Skeleton(labels, tuple(parents), offsets, (11, 17, 23, 29), np.full((4, 3), 0.05))
+
+
+Convert = Callable[[Clip, int], tuple[Any, Any]]
+
+
+def _arrays(clip: Clip, frame: int) -> tuple[Any, Any]:
+    turns = np.roll(clip.rotations[frame], -1, axis=-1)
+    return Vt.Vec3fArray.FromNumpy(clip.translations[frame]), Vt.QuatfArray.FromNumpy(turns)
+
+
+def _lists(clip: Clip, frame: int) -> tuple[Any, Any]:
+    moves, turns = clip.translations[frame], clip.rotations[frame]
+    return [Gf.Vec3f(*move) for move in moves], [Gf.Quatf(*turn) for turn in turns]
+
+
+def _schemas(clip: Clip, content: Content, convert: Convert, path: Path) -> bytes:
+    """A clip as the schema API's own examples write it."""
+    stage, rig = Usd.Stage.CreateInMemory(), character.rig(clip.skeleton)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetTimeCodesPerSecond(30)
+    stage.SetFramesPerSecond(30)
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(FRAMES - 1)
+    stage.SetMetadata("customLayerData", {"posefield": content.facts.whole()["controls"]})
+    root = UsdSkel.Root.Define(stage, "/Character")
+    stage.SetDefaultPrim(root.GetPrim())
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    extent = Vt.Vec3fArray.FromNumpy(content.values["extent"])
+    root.CreateExtentAttr(extent)
+    skeleton = _skeleton(stage, rig, content)
+    for prim in (root.GetPrim(), _mesh(stage, rig, content, extent)):
+        UsdSkel.BindingAPI.Apply(prim).CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    moving = UsdSkel.Animation.Define(stage, "/Character/Anim")
+    moving.CreateJointsAttr(rig.paths)
+    moves, turns = moving.CreateTranslationsAttr(), moving.CreateRotationsAttr()
+    moving.CreateScalesAttr(Vt.Vec3hArray(JOINTS, Gf.Vec3h(1, 1, 1)))
+    binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
+    binding.CreateAnimationSourceRel().SetTargets([moving.GetPath()])
+    for frame in range(FRAMES):
+        for attribute, value in zip((moves, turns), convert(clip, frame), strict=True):
+            attribute.Set(value, frame)
+    stage.GetRootLayer().Export(str(path))
+    return path.read_bytes()
+
+
+def _skeleton(stage: Any, rig: Rig, content: Content) -> Any:
+    made = UsdSkel.Skeleton.Define(stage, "/Character/Skel")
+    made.CreateJointsAttr(rig.paths)
+    made.CreateJointNamesAttr(names.legal(rig.names))
+    made.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["bind"]))
+    made.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["rest"]))
+    return made
+
+
+def _mesh(stage: Any, rig: Rig, content: Content, extent: Any) -> Any:
+    made = UsdGeom.Mesh.Define(stage, "/Character/Body")
+    made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(content.values["points"]))
+    made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(content.values["normals"]))
+    made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    counts, corners = map(Vt.IntArray.FromNumpy, body.faces(rig.bones))
+    made.CreateFaceVertexCountsAttr(counts)
+    made.CreateFaceVertexIndicesAttr(corners)
+    made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    made.CreateExtentAttr(extent)
+    made.CreateDisplayColorAttr([Gf.Vec3f(0.75)])
+    binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
+    joints = np.repeat(rig.bones.joints, body.POINTS)
+    binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray.FromNumpy(joints))
+    binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(len(joints), 1.0))
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
+    return made.GetPrim()
+
+
+if __name__ == "__main__":
+    print(table(rows()))
