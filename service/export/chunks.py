@@ -19,7 +19,7 @@ from service.motion.answer import ClipAnswer
 from service.motion.errors import InvalidField, QueryError
 from service.synthesis.synthesizer import Synthesizer
 
-CLIPS, POSES = 64, 8192
+CLIPS, POSES = 128, 8192
 """Clips and poses that are held at once, but for a clip that alone has more: enough to share what
 their files have in common."""
 
