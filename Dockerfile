@@ -1,18 +1,22 @@
-# The service alone: nothing of the training job, nothing that builds.
+# The service and its commands: nothing of the training job, nothing that builds.
 FROM python:3.11-slim-bookworm AS build
 ENV UV_COMPILE_BYTECODE=1 \
     UV_LINK_MODE=copy \
     UV_PROJECT_ENVIRONMENT=/opt/posefield \
     UV_PYTHON_DOWNLOADS=never
 RUN pip install --no-cache-dir uv==0.13.8
+# Object stores are 16 MB, Dask another 18: --build-arg EXTRAS="--extra store --extra dask". Parquet is 170.
+ARG EXTRAS="--extra store"
 WORKDIR /src
 # Dependencies change seldom, the service often: they get a layer of their own.
 COPY pyproject.toml uv.lock README.md LICENSE ./
-RUN uv sync --frozen --no-dev --no-install-project
+# hadolint ignore=SC2086
+RUN uv sync --frozen --no-dev --no-install-project ${EXTRAS}
 # service/web/openapi.yaml is a link into api/.
 COPY api api
 COPY service service
-RUN uv sync --frozen --no-dev --no-editable
+# hadolint ignore=SC2086
+RUN uv sync --frozen --no-dev --no-editable ${EXTRAS}
 
 FROM python:3.11-slim-bookworm
 # Bytecode is compiled above; the root may be read-only. onnxruntime reports to its vendor unless told not to.

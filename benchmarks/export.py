@@ -95,7 +95,7 @@ class Watch:
 def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     """Rates, ratios and shares, with what one process takes of memory."""
     bench = Bench.of(model, clips, form)
-    taken = _in_turn({name: partial(bench.seconds, name, crew.alone) for name in layouts.LAYOUTS})
+    taken = in_turn({name: partial(bench.seconds, name, crew.alone) for name in layouts.LAYOUTS})
     return [
         *_rates(clips, form, taken),
         *_shares(bench, form, taken["folder"] / clips),
@@ -104,7 +104,7 @@ def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     ]
 
 
-def _in_turn(runs: dict[str, Callable[[], float]]) -> dict[str, float]:
+def in_turn(runs: dict[str, Callable[[], float]]) -> dict[str, float]:
     """Median seconds of each."""
     taken: dict[str, list[float]] = {name: [] for name in runs}
     for _ in range(ROUNDS):
@@ -127,7 +127,7 @@ def _rates(clips: int, form: str, taken: dict[str, float]) -> list[Row]:
 
 
 def _processes(bench: Bench, clips: int, form: str) -> Row:
-    taken = _in_turn(
+    taken = in_turn(
         {
             "one": partial(bench.seconds, "folder", crew.alone),
             "two": partial(bench.seconds, "folder", crew.of(2)),

@@ -2,8 +2,9 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
@@ -14,12 +15,20 @@ import typer
 from service.cli import Controls, Json, as_json, encoder, numbers, wrote
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
-from service.motion.errors import InvalidField
+from service.motion.errors import InvalidField, TrainingError
 
 if TYPE_CHECKING:
     from model_export.export import Exported
     from model_export.recipe import Recipe
     from model_export.train import Trained
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        help="run on the workers of a Dask scheduler, which must have posefield installed too",
+        metavar="tcp://HOST:PORT",
+    ),
+]
 
 
 def commands(app: typer.Typer) -> None:
@@ -58,8 +67,11 @@ def sample(
 
 
 def train_command(
-    recipe_file: Annotated[Path, typer.Argument(help="a TOML file", metavar="RECIPE")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="the .onnx file to write")],
+    recipe_files: Annotated[list[Path], typer.Argument(help="TOML files", metavar="RECIPE...")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="the .onnx file to write; of several recipes a folder"),
+    ],
     data: Annotated[
         Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
     ] = None,
@@ -67,15 +79,28 @@ def train_command(
         Path | None,
         typer.Option(help="the .html file to write on the training, with a .json beside it"),
     ] = None,
+    jobs: Annotated[int | None, typer.Option(help="of several recipes: processes")] = None,
+    scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
-    """Train a recipe's model and write it as one .onnx file."""
+    """Train a recipe's model and write it as one .onnx file; several recipes at once."""
+    _expect_html(report)
+    if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):
+        _train(recipe_files[0], data, output, report, json)
+    elif report:
+        raise InvalidField("report", "of several recipes or on a cluster, expected none")
+    else:
+        _sweep(recipe_files, data, output, _Place(jobs, scheduler), json)
+
+
+def _train(
+    recipe_file: Path, data: Path | None, output: Path, report: Path | None, json: bool
+) -> None:
     # SciPy and onnx take a second to import, which every other command would wait for.
     from model_export import export, ingest, recipe, train
 
     if output.suffix != ".onnx":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
-    _expect_html(report)
     progress = _Progress()
     progress(f"reading {recipe_file}")
     own = recipe.read(recipe_file)
@@ -88,6 +113,42 @@ def train_command(
         _write_report(own, trained, exported, progress, report)
     progress("done")
     typer.echo(as_json(_facts(exported, output)) if json else _summary(exported, output))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where several are trained: in so many processes here, or on a cluster."""
+
+    jobs: int | None
+    scheduler: str | None
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
+
+
+def _sweep(
+    recipe_files: list[Path], data: Path | None, folder: Path, place: _Place, json: bool
+) -> None:
+    from model_export import sweep
+
+    if folder.suffix == ".onnx":
+        raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
+    found, failed = [], []
+    with _jobs(place.scheduler):
+        for made in sweep.models(recipe_files, data, place.jobs):
+            if isinstance(made.found, TrainingError):
+                failed.append(made.name)
+                typer.echo(f"{made.name}: {made.found}", err=True)
+                continue
+            path = folder / f"{made.name}.onnx"
+            files.write(made.found.content, path)
+            found.append(_facts(made.found, path))
+            typer.echo(_summary(made.found, path), err=json)
+    if json:
+        typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
+    if failed:
+        raise TrainingError(f"{', '.join(sorted(failed))} of {len(recipe_files)} made no model")
 
 
 def _expect_html(report: Path | None) -> None:
@@ -119,19 +180,23 @@ def evaluate(
         Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
     ] = None,
     table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
+    scheduler: Scheduler = None,
 ) -> None:
     """Measure how far a recipe's models lie from motions they have not seen, beside other methods.
 
     Everything is fitted anew without what is held out.
     """
     _expect_html(report)
+    if table1 and scheduler:
+        raise InvalidField("scheduler", "Table 1 is timed on one machine, expected none")
     if table1:
         _table1(json_file)
     elif recipe_file is None:
         raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
     else:
         asked = [one.value for one in protocol or []]
-        _evaluate(recipe_file, data or recipe_file.parent, asked, report, json_file)
+        wanted = _Wanted(asked, report, json_file, scheduler)
+        _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
 def _table1(json_file: Path | None) -> None:
@@ -143,31 +208,49 @@ def _table1(json_file: Path | None) -> None:
     typer.echo(table1.text(found))
 
 
-def _evaluate(
-    recipe_file: Path, data: Path, asked: list[str], report: Path | None, json_file: Path | None
-) -> None:
+@dataclass(frozen=True)
+class _Wanted:
+    """Protocols, all that can for none, what to write, and where to work."""
+
+    protocols: list[str]
+    report: Path | None
+    json_file: Path | None
+    scheduler: str | None
+
+
+def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
     from model_export.evaluate import protocol, summary
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
     can = protocol.protocols(own, examples)
-    for name in asked:
+    for name in wanted.protocols:
         if name not in can:
             raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
     results = []
-    for name in asked or can:
-        with _bar(name) as progress:
-            results.append(protocol.run(own, examples, name, progress))
-        typer.echo(f"{summary.table(results[-1])}\n")
+    with _jobs(wanted.scheduler, [examples]):
+        for name in wanted.protocols or can:
+            with _bar(name) as progress:
+                results.append(protocol.run(own, examples, name, progress))
+            typer.echo(f"{summary.table(results[-1])}\n")
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
     first, *others = map(summary.facts, results)
-    if json_file:
-        files.write(as_json({**first, "others": others}).encode(), json_file)
-    if report:
+    if wanted.json_file:
+        files.write(as_json({**first, "others": others}).encode(), wanted.json_file)
+    if wanted.report:
         from model_export.evaluate import render
 
-        files.write(render.html(own.description, results), report)
+        files.write(render.html(own.description, results), wanted.report)
+
+
+def _jobs(scheduler: str | None, shared: Sequence[Any] = ()) -> AbstractContextManager[None]:
+    """Inside, jobs run on a cluster, or here where none is named."""
+    if scheduler is None:
+        return nullcontext()
+    from model_export import cluster
+
+    return cluster.jobs(scheduler, shared)
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost, levels, phase, samples, strangers
+from model_export import cost, levels, phase, samples, strangers, threads
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -43,6 +43,7 @@ class Exported:
     parity: float
 
 
+@threads.one()
 def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     """File of a trained model; the same data give the same bytes.
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from model_export import (
     align,
@@ -18,6 +17,7 @@ from model_export import (
     samples,
     strangers,
     tensor,
+    threads,
     travel,
 )
 from model_export.align import Aligned
@@ -99,9 +99,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Traine
 
     Raises TrainingError where the samples cannot carry a field.
     """
-    # Matrices this small gain nothing from more threads, and a sum's order would hang on how many
-    # the machine has: one thread makes the same bytes everywhere.
-    with threadpool_limits(1):
+    with threads.one():
         return _train(recipe, examples, report)
 
 

@@ -63,6 +63,7 @@ Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard o
 # Whose extra a missing module is; everything else that can be missing is training's.
 EXTRAS = {
     **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate"),
+    "distributed": "dask",
     "obstore": "store",
 }
 

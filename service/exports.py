@@ -1,6 +1,7 @@
 """`posefield export`: many clips at once, to a folder or an object store."""
 
 import hashlib
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +9,7 @@ import orjson
 import typer
 
 from service.encode.convention import Unit, Up
-from service.export import crew, layouts, queries, run
+from service.export import crew, layouts, queries, run, target
 from service.export.job import Job, Work
 from service.export.layouts import LAYOUTS
 from service.export.look import Look
@@ -56,6 +57,13 @@ def export(
         int | None, typer.Option(help="rows done together, and clips of an archive")
     ] = None,
     workers: Annotated[int | None, typer.Option(help="processes; one a core if not said")] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="instead of processes here: workers of a Dask scheduler, posefield on each",
+            metavar="tcp://HOST:PORT",
+        ),
+    ] = None,
     shard: Annotated[
         str, typer.Option(help="part I of N alone, from 0/N to N-1/N", metavar="I/N")
     ] = "0/1",
@@ -93,16 +101,29 @@ def export(
         up,
         names,
     )
-    with Look() as look:
-        work = Work(job, content, output, skip_errors)
-        outcome = run.run(work, source, look, _crew(workers), Shard.of(shard))
+    part = Shard.of(shard)
+    with _crew(workers, scheduler) as by, Look() as look:
+        work = Work(job, content, _wherever(output) if scheduler else output, skip_errors)
+        outcome = run.run(work, source, look, by, part)
     _end(output, outcome, look, json)
 
 
-def _crew(workers: int | None) -> crew.Crew:
+def _crew(workers: int | None, scheduler: str | None) -> AbstractContextManager[crew.Crew]:
+    if workers is not None and scheduler is not None:
+        raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
     if workers is not None and workers < 1:
         raise InvalidField("workers", f"{workers}, expected 1 or more")
-    return crew.of(workers or crew.usable_cores())
+    if scheduler is None:
+        return nullcontext(crew.of(workers or crew.usable_cores()))
+    # An extra: most exports are done on one machine.
+    from service.export import cluster
+
+    return cluster.crew(scheduler)
+
+
+def _wherever(output: str) -> str:
+    """The target as it is called from any folder."""
+    return output if target.URL.match(output) else str(Path(output).absolute())
 
 
 def _end(place: str, outcome: Outcome, look: Look, json: bool) -> None:

@@ -5,9 +5,13 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
+
+from service import __version__
 
 ROOT = Path(__file__).parents[1]
 PACKAGING = {"pyproject.toml", "uv.lock", "README.md", "LICENSE"}
@@ -56,11 +60,25 @@ def test_only_the_service_and_its_packaging_are_copied(stages):
     assert not values(build, "ADD") + values(final, "ADD")
 
 
-def test_the_build_takes_the_lock_and_no_extras(stages):
+def test_the_build_takes_the_lock_and_what_exports_to_stores_need(stages):
     syncs = [line for line in values(stages[0], "RUN") if "uv sync" in line]
     assert all("--frozen" in line and "--no-dev" in line for line in syncs)
     assert "--no-editable" in syncs[-1]
-    assert not any("extra" in line for line in syncs)
+    assert values(stages[0], "ARG") == ['EXTRAS="--extra store"']
+    assert all(line.endswith(" ${EXTRAS}") and "--extra" not in line for line in syncs)
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert "store" in known["optional-dependencies"]
+
+
+def test_pods_run_what_the_image_has(stages):
+    """The export's manifest names the image's version, user and command."""
+    job = yaml.safe_load((ROOT / "service/deploy/export-job.yaml").read_text())
+    pod = job["spec"]["template"]["spec"]
+    (own,) = pod["containers"]
+    assert own["image"] == f"posefield:{__version__}"
+    user = pod["securityContext"]
+    assert values(stages[1], "USER") == [f"{user['runAsUser']}:{user['runAsGroup']}"]
+    assert own["command"][0] == json.loads(values(stages[1], "ENTRYPOINT")[0])[0]
 
 
 def test_uv_is_the_one_of_the_makefile(stages):

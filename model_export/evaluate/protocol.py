@@ -1,11 +1,13 @@
 """The three ways to ask how good a model is, and what came out."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from joblib import Parallel, cpu_count, delayed
+from joblib import Parallel, cpu_count, delayed, parallel_config
 
+from model_export import threads
 from model_export.evaluate import errors, folds, methods, motion, truth
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.folds import Fold
@@ -89,6 +91,14 @@ def _done(jobs: Sequence[object], report: Report) -> Iterator[_Part]:
         yield part
 
 
+@contextmanager
+def _alone() -> Iterator[None]:
+    """A job asks for no others: on a cluster scikit-learn's own would leave its place there."""
+    with parallel_config(backend="sequential"), threads.one():
+        yield
+
+
+@_alone()
 def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
     rest, held = fold.split(examples)
     try:
@@ -104,6 +114,7 @@ def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
     return _compared(recipe, trained, fold.held, found, captured)
 
 
+@_alone()
 def _true(recipe: Recipe, trained: Trained, points: Floats, start: int) -> _Part:
     event = methods.captured_event(recipe, trained, ())
     captured = [motion.of_clip(truths.clip(list(p), RATE), event) for p in points]

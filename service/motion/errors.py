@@ -11,6 +11,7 @@ MotionError
 │   ├── UnknownFormat
 │   ├── InvalidField     missing, unknown, of a wrong type, or outside the allowed range
 │   └── OutsideSamples   controls outside what was sampled, when the client asked to refuse them
+├── ClusterError         a Dask cluster that cannot be reached or worked on
 ├── WorkerDied           a process that did a part of the work has gone
 └── TrainingError        samples from which no model can be made
     └── ExportRefused    the graph does not answer what the reference answers
@@ -86,6 +87,18 @@ class InvalidField(QueryError):
 
 class OutsideSamples(QueryError):
     """Controls outside what was sampled, when the client asked for them to be refused."""
+
+
+class ClusterError(MotionError):
+    """A Dask cluster that cannot be reached, or whose workers cannot do the work; names it."""
+
+    def __init__(self, address: str, message: str) -> None:
+        super().__init__(f"{address}: {message}")
+        self.address = address
+        self.message = message
+
+    def __reduce__(self) -> tuple[type["ClusterError"], tuple[str, str]]:
+        return type(self), (self.address, self.message)
 
 
 class WorkerDied(MotionError):

@@ -1,0 +1,72 @@
+"""How an export scales over Dask workers, and what Dask costs against processes of our own.
+
+    python benchmarks/export_cluster.py MODEL [--clips 8192] [--format usdc]
+
+Workers are processes of one thread on this machine, begun before anything is timed; the scheduler
+and the client take a part of its cores too. The same clips in the same chunks by all, in turn.
+"""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pathlib import Path
+
+import export
+from distributed import LocalCluster
+from export import Bench
+from rows import Row, table
+
+from service.export import cluster, crew
+from service.export.crew import Crew
+
+CLIPS, FORM, LAYOUT = export.LONGER * export.CLIPS, "usdc", "folder"
+GOAL = 1.6
+
+
+def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
+    """Two workers against one, and each number of them against as many processes."""
+    bench = Bench.of(model, clips, form)
+    with ExitStack() as stack:
+        crews = {
+            "one process": crew.alone,
+            "two processes": crew.of(2),
+            "one worker": stack.enter_context(_workers(1)),
+            "two workers": stack.enter_context(_workers(2)),
+        }
+        taken = export.in_turn(
+            {name: partial(bench.seconds, LAYOUT, by) for name, by in crews.items()}
+        )
+    what = f"export of {clips} clips as {form} by"
+
+    def row(name: str, baseline: str, goal: float | None) -> Row:
+        ratio = taken[baseline] / taken[name]
+        return Row(f"{what} {name} of Dask", clips / taken[name], "clips/s", baseline, ratio, goal)
+
+    return [
+        row("two workers", "one worker", GOAL),
+        row("one worker", "one process", None),
+        row("two workers", "two processes", None),
+    ]
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[Crew]:
+    """Crew of so many workers of one thread."""
+    own = LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=":0")
+    with own, cluster.crew(own.scheduler_address) as by:
+        yield by
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("model", type=Path)
+    parser.add_argument("--clips", type=int, default=CLIPS)
+    parser.add_argument("--format", default=FORM)
+    given = parser.parse_args()
+    print(table(rows(given.model, given.clips, given.format)))
+
+
+if __name__ == "__main__":
+    main()
