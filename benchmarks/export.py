@@ -23,7 +23,7 @@ from pathlib import Path
 from rows import Row, table
 
 from service.encode import ENCODERS
-from service.export import crew, layouts, manifest, queries, run
+from service.export import chunks, crew, layouts, manifest, queries, run
 from service.export.crew import Crew
 from service.export.job import Job, Work
 from service.export.ledger import Part
@@ -34,12 +34,12 @@ from service.export.target import open_target
 from service.synthesis import library
 
 ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
-LONGER = 4
+LONGER = 8
 """Times as many clips where processes are begun, which takes them a second."""
 FAST, TWICE, MEMORY = 2000.0, 1.7, 600.0
 """Goals: clips a second and core, two processes against one, MB of a process."""
-STAGED = 256
-"""Clips that the stages are measured with, each over all of them."""
+STAGED = chunks.CLIPS
+"""Clips that the stages are measured with: as many as are held at once."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:
 
 def _median(stage: Callable[[], object]) -> float:
     taken = []
-    for _ in range(5):
+    for _ in range(9):
         start = time.perf_counter()
         stage()
         taken.append(time.perf_counter() - start)

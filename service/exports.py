@@ -8,7 +8,7 @@ from typing import Annotated
 import orjson
 import typer
 
-from service.encode.convention import CENTIMETRES, METRES, Up
+from service.encode.convention import Unit, Up
 from service.export import crew, layouts, queries, run, target
 from service.export.job import Job, Work
 from service.export.layouts import LAYOUTS
@@ -20,8 +20,6 @@ from service.motion.errors import InvalidField
 from service.motion.roles import Names
 from service.synthesis import library, session
 from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
-
-UNITS = {"m": METRES.metres_per_unit, "cm": CENTIMETRES.metres_per_unit}
 
 
 def export(
@@ -52,7 +50,7 @@ def export(
         bool, typer.Option("--loop", help="cycles that end with the frame they begin with")
     ] = False,
     unit: Annotated[
-        str | None, typer.Option(help="of length, m or cm; what is usual in the format if not said")
+        Unit | None, typer.Option(help="of length; what is usual in the format if not said")
     ] = None,
     up: Annotated[Up | None, typer.Option(help="axis; what is usual if not said")] = None,
     chunk: Annotated[
@@ -79,6 +77,7 @@ def export(
     What was broken off is gone on with by the same command, and ends with the same files.
     """
     content = session.read(model)
+    usual = layouts.find(layout).chunk
     asked = Asked(table, tuple(grid or ()), sample, method, seed)
     question = ClipQuestion(
         {},
@@ -97,21 +96,16 @@ def export(
         hashlib.sha256(content).hexdigest(),
         source.digest,
         layout,
-        layouts.find(layout).chunk if chunk is None else chunk,
-        _metres(unit),
+        usual if chunk is None else chunk,
+        unit,
         up,
+        names,
     )
     part = Shard.of(shard)
     with _crew(workers, scheduler) as by, Look() as look:
         work = Work(job, content, _wherever(output) if scheduler else output, skip_errors)
         outcome = run.run(work, source, look, by, part)
     _end(output, outcome, look, json)
-
-
-def _metres(unit: str | None) -> float | None:
-    if unit is not None and unit not in UNITS:
-        raise InvalidField("unit", f"{unit!r}, expected one of {', '.join(UNITS)}")
-    return None if unit is None else UNITS[unit]
 
 
 def _crew(workers: int | None, scheduler: str | None) -> AbstractContextManager[crew.Crew]:

@@ -74,7 +74,8 @@ def bones(skeleton: Skeleton) -> Bones:
     owners = np.array([*skeleton.parents[1:], *skeleton.tip_joints], dtype=np.int32)
     ends = np.arange(1, len(owners) + 1, dtype=np.int32)
     every = boxes(skeleton, Bones(owners, ends, owners), skeleton.offsets)
-    drawn = np.linalg.norm(every.arms, axis=-1) > SHORTEST * _size(skeleton, skeleton.offsets)
+    size = _size(skeleton.at_rest(skeleton.offsets))
+    drawn = np.linalg.norm(every.arms, axis=-1) > SHORTEST * size
     followed = {*skeleton.parents[1:], *owners[count - 1 :][drawn[count - 1 :]].tolist()}
     bare = np.array([j for j in range(count) if j not in followed], dtype=np.int32)
     found = Bones(np.concatenate([owners[drawn], bare]), ends[drawn], owners)
@@ -85,11 +86,12 @@ def boxes(skeleton: Skeleton, bones: Bones, offsets: Floats) -> Boxes:
     """Where the boxes are if the joints rest at offsets (..., J, 3) from their parents, m."""
     lead, stubs = offsets.shape[:-2], len(bones.joints) - len(bones.ends)
     tips = np.broadcast_to(skeleton.tip_offsets, (*lead, *skeleton.tip_offsets.shape))
-    size = _size(skeleton, offsets)[..., None]
+    rest = skeleton.at_rest(offsets)
+    size = _size(rest)[..., None]
     up = np.zeros((*lead, stubs, 3))
     up[..., 1] = 2 * STUB * size
     arms = np.concatenate([np.concatenate([offsets, tips], axis=-2)[..., bones.ends, :], up], -2)
-    starts = skeleton.at_rest(offsets)[..., bones.joints, :]
+    starts = rest[..., bones.joints, :]
     starts[..., len(bones.ends) :, :] -= up / 2
     radii = np.clip(THICKNESS * _lengths(arms), THINNEST * size, THICKEST * size)
     radii[..., len(bones.ends) :] = STUB * size
@@ -119,8 +121,8 @@ def faces(bones: Bones) -> tuple[Integers, Integers]:
     return np.tile(counts, len(starts)), (starts + corners).reshape(-1)
 
 
-def _size(skeleton: Skeleton, offsets: Floats) -> Floats:
-    size = np.max(np.ptp(skeleton.at_rest(offsets), axis=-2), axis=-1)
+def _size(rest: Floats) -> Floats:
+    size = np.max(np.ptp(rest, axis=-2), axis=-1)
     return np.where(size > 0, size, 1.0)
 
 

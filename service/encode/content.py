@@ -6,8 +6,8 @@ bytes hang on which of them are equal, and for the rest the values are just copi
 
 from collections.abc import Hashable, Mapping
 from ctypes import c_float
-from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -66,8 +66,7 @@ class Author(Protocol):
     def __hash__(self) -> int: ...
 
 
-@dataclass(frozen=True)
-class Pattern:
+class Pattern(NamedTuple):
     """How arrays are shaped and which samples are equal, by name, which numbers are, and the
     facts' shape.
 
@@ -109,8 +108,7 @@ def marks(pattern: Pattern, known: tuple[float, ...], texts: int, seed: int) -> 
 
 def short(pattern: Pattern) -> Pattern:
     """Pattern of a layer of a single frame, with numbers that float32 holds."""
-    return replace(
-        pattern,
+    return pattern._replace(
         samples=tuple((name, (1, *shape[1:]), None) for name, shape, _ in pattern.samples),
         numbers=(INLINE,) * len(pattern.numbers),
     )
@@ -118,10 +116,11 @@ def short(pattern: Pattern) -> Pattern:
 
 def _repeats(rows: Singles) -> Repeats:
     """Rows whose first numbers have different sums differ; at others it is looked."""
-    sums = np.add.reduce(rows.reshape(len(rows), -1)[:, :PROBED], axis=1).tolist()
-    if len(set(sums)) == len(sums):
+    probes = np.add.reduce(rows.reshape(len(rows), -1)[:, :PROBED], axis=1)
+    ordered = np.sort(probes)
+    if not np.count_nonzero(ordered[1:] == ordered[:-1]):
         return None
-    first: dict[Any, int] = {}
+    first, sums = dict[Any, int](), probes.tolist()
     alike = [first.setdefault(each, index) for index, each in enumerate(sums)]
     if not np.array_equal(rows, rows[alike]):
         first = {}
@@ -137,5 +136,5 @@ def _equals(numbers: tuple[float, ...], known: tuple[float, ...]) -> tuple[int, 
 def alike(a: Array, b: Array) -> bool:
     """Whether two arrays are, or a sample (F, ...) is, equal to another array."""
     if a.ndim == b.ndim:
-        return np.array_equal(a, b)
+        return bool(a.item(-2) == b.item(-2)) and np.array_equal(a, b)
     return bool(np.any(np.all(a == b, axis=tuple(range(1, a.ndim)))))

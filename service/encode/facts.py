@@ -3,7 +3,7 @@
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pxr import Vt
@@ -12,8 +12,7 @@ LARGEST = 2**63 - 1
 """Of the integers that every reader of a layer can take."""
 
 
-@dataclass(frozen=True)
-class Facts:
+class Facts(NamedTuple):
     """Facts in parts: a shape that many answers share, and the numbers and texts that fill it."""
 
     shape: Hashable
@@ -26,25 +25,14 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Number:
-    """Place of a finite number."""
-
-
-@dataclass(frozen=True)
-class Text:
-    """Place of a text."""
-
-
-@dataclass(frozen=True)
 class Texts:
-    """Place of a list of texts."""
+    """Place of so many texts in a list."""
 
     count: int
 
 
-@dataclass(frozen=True)
-class Group:
-    """Facts by name."""
+class Group(NamedTuple):
+    """Facts by name, and the shape of each."""
 
     names: tuple[str, ...]
     shapes: tuple[Hashable, ...]
@@ -58,7 +46,9 @@ class Same:
     fact: Any = field(compare=False)
 
 
-NUMBER, TEXT = Number(), Text()
+NUMBER, TEXT = "number", "text"
+"""Places of a finite number, and of a text."""
+
 NONE = Facts(Group((), ()), (), ())
 
 
@@ -76,19 +66,18 @@ def dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _shape(fact: Any, numbers: list[float], texts: list[str]) -> Hashable:
-    match fact:
-        case dict():
-            shapes = tuple(_shape(each, numbers, texts) for each in fact.values())
-            return Group(tuple(fact), shapes)
-        case float() if math.isfinite(fact):
-            numbers.append(float(fact))
-            return NUMBER
-        case str():
-            texts.append(fact)
-            return TEXT
-        case list() if all(isinstance(each, str) for each in fact):
-            texts.extend(fact)
-            return Texts(len(fact))
+    kind = type(fact)
+    if kind is float and math.isfinite(fact):
+        numbers.append(fact)
+        return NUMBER
+    if kind is str:
+        texts.append(fact)
+        return TEXT
+    if kind is dict:
+        return Group(tuple(fact), tuple([_shape(each, numbers, texts) for each in fact.values()]))
+    if kind is list and all(type(each) is str for each in fact):
+        texts.extend(fact)
+        return Texts(len(fact))
     return Same(repr(fact), fact)
 
 
@@ -97,9 +86,9 @@ def _joined(shape: Hashable, numbers: Iterator[float], texts: Iterator[str]) -> 
         case Group(names, shapes):
             values = (_joined(each, numbers, texts) for each in shapes)
             return dict(zip(names, values, strict=True))
-        case Number():
+        case "number":
             return next(numbers)
-        case Text():
+        case "text":
             return next(texts)
         case Texts(count):
             return [next(texts) for _ in range(count)]

@@ -1,9 +1,9 @@
 """Answers as the arrays that files hold: made together, and the same as if each were made alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import groupby, pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,11 @@ from service.encode.convention import Convention
 from service.encode.moves import Moves
 from service.motion.answer import ClipAnswer
 
-TOGETHER = 6400
+TOGETHER = 3200
 """Frames of clips that are made at a time, or one clip that has more."""
 
 
-@dataclass(frozen=True)
-class Take:
+class Take(NamedTuple):
     """A rig, how fast it moves, and what a file says of it."""
 
     rig: Rig
@@ -53,10 +52,12 @@ def _alike(answers: Sequence[ClipAnswer]) -> Iterator[tuple[Rig, list[ClipAnswer
     _keep_freed_memory()
     for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
         part: list[ClipAnswer] = []
+        frames = 0
         for answer in some:
-            if part and sum(len(one.clip) for one in part) + len(answer.clip) > TOGETHER:
+            frames += len(answer.clip)
+            if part and frames > TOGETHER:
                 yield character.rig(part[0].clip.skeleton), part
-                part = []
+                part, frames = [], len(answer.clip)
             part.append(answer)
         yield character.rig(part[0].clip.skeleton), part
 

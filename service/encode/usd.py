@@ -6,6 +6,7 @@ The names of prims never vary, because USD keeps every name that it has ever see
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from service.encode.convention import Convention
 from service.encode.press import CRATES, TEXTS
 from service.motion.answer import ClipAnswer
 
+ROOT = Sdf.Path("/Character")
+ANIMATION = ROOT.AppendChild("Anim")
 TINTS = body.TINTS.astype(np.float32)
 
 
@@ -42,20 +45,32 @@ class Clips:
     def head(self, content: Content) -> Any:
         """The layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
-        layers.head(made, "Character", content.frames, self.rate, self.convention)
-        layers.say(made, facts.dictionary(content.facts.whole()))
+        self._state(made, content)
         return made
 
     def layer(self, content: Content) -> Any:
         """The layer, made by usd-core; the caller must keep it, since its prims do not."""
-        made = self.head(content)
+        made = Sdf.Layer.CreateAnonymous("clip.usda")
+        made.TransferContent(_prims(self.rig))
         with Sdf.ChangeBlock():
-            root = character.root(made, "Character", self.rig)
-            character.fill(root, content.values)
-            animation = character.animation(root, "Anim", self.rig.paths)
-            character.bind(root, animation.path)
-            specs.samples(animation, content.samples)
+            self._state(made, content)
+            character.fill(made.GetPrimAtPath(ROOT), content.values)
+            specs.samples(made.GetPrimAtPath(ANIMATION), content.samples)
         return made
+
+    def _state(self, made: Any, content: Content) -> None:
+        layers.head(made, ROOT.name, content.frames, self.rate, self.convention)
+        layers.say(made, facts.dictionary(content.facts.whole()))
+
+
+@lru_cache(maxsize=16)
+def _prims(rig: Rig) -> Any:
+    """Layer of a character and its animation without numbers; kept, for it takes as long to make
+    as to export."""
+    made = Sdf.Layer.CreateAnonymous("prims.usda")
+    root = character.root(made, ROOT.name, rig)
+    character.bind(root, character.animation(root, ANIMATION.name, rig.paths).path)
+    return made
 
 
 def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:

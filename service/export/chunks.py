@@ -7,21 +7,19 @@ the manifest with the others.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 from service.encode import ENCODERS
-from service.export import ledger, manifest
-from service.export.job import Job, Work
-from service.export.layouts import LAYOUTS, File, path
+from service.export import layouts, ledger, manifest
+from service.export.job import Job, Work, opened
+from service.export.layouts import Entry, File, Layout, path
 from service.export.ledger import Part
 from service.export.query import KEPT, Fault, Query
 from service.export.target import open_target
 from service.motion.answer import ClipAnswer
 from service.motion.errors import InvalidField, QueryError
-from service.synthesis import session
 from service.synthesis.synthesizer import Synthesizer
 
-CLIPS, POSES = 64, 8192
+CLIPS, POSES = 128, 8192
 """Clips and poses that are held at once, but for a clip that alone has more: enough to share what
 their files have in common."""
 
@@ -49,8 +47,9 @@ def make(work: Work, task: Task, stopped: Stopped = lambda: False) -> Part:
     target cannot be written, Stop where it should stop; none of these leaves a part.
     """
     target = open_target(work.target)
-    chunk = _Chunk(work.job, _synthesizer(work.job.model, work.model), task, [])
-    entries, size = LAYOUTS[work.job.layout].put(target, task.number, chunk.batches(stopped))
+    layout = layouts.find(work.job.layout)
+    chunk = _Chunk(work.job, layout, opened(work), task, [])
+    entries, size = layout.put(target, task.number, chunk.batches(stopped))
     if chunk.faults and not work.skip:
         raise refusal(len(chunk.faults), chunk.faults)
     warned = sum(bool(entry["warnings"]) for entry in entries)
@@ -79,6 +78,7 @@ class _Chunk:
     """A chunk while it is made. faults: those found so far."""
 
     job: Job
+    layout: Layout
     synthesizer: Synthesizer
     task: Task
     faults: list[Fault]
@@ -100,9 +100,13 @@ class _Chunk:
     def _files(self, made: list[_Made]) -> list[File]:
         contents = self._contents(made)
         return [
-            File(one.path, content, manifest.entry(one.query.name, one.path, content, one.answer))
+            File(one.path, content, self._entry(one, content))
             for one, content in zip(made, contents, strict=True)
         ]
+
+    def _entry(self, one: _Made, content: bytes) -> Entry:
+        said = manifest.entry(one.query.name, one.path, content, one.answer)
+        return said | self.layout.describe(one.query.name, one.path, one.answer)
 
     def _made(self) -> Iterator[_Made]:
         for number, row in enumerate(self.task.rows, self.task.first):
@@ -125,14 +129,8 @@ class _Chunk:
         contents: dict[int, bytes] = {}
         for extension in dict.fromkeys(one.query.format for one in made):
             own = [index for index, one in enumerate(made) if one.query.format == extension]
-            encoder = ENCODERS[extension]
+            convention = ENCODERS[extension].convention(self.job.unit, self.job.up)
             answers = [made[index].answer for index in own]
-            files = encoder.write(answers, self.job.convention(encoder.usual))
+            files = self.layout.encode(extension)(answers, convention)
             contents |= zip(own, files, strict=True)
         return [contents[index] for index in range(len(made))]
-
-
-# A process does many chunks of one job.
-@lru_cache(maxsize=1)
-def _synthesizer(identity: str, content: bytes) -> Synthesizer:
-    return Synthesizer(identity.partition("@")[0], session.open_bytes(content, identity))

@@ -2,16 +2,19 @@
 
 import hashlib
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib.metadata import version
 from typing import Any
 
 import orjson
 
 from service import __version__
-from service.encode.convention import Convention, Up
-from service.export import layouts
+from service.encode.convention import Unit, Up
 from service.motion.errors import InvalidField
+from service.motion.roles import Names
+from service.synthesis import session
+from service.synthesis.question import NAMES
+from service.synthesis.synthesizer import Synthesizer
 
 MAKERS = ("numpy", "onnxruntime", "usd-core")
 """Whose versions the bytes may hang on."""
@@ -22,8 +25,8 @@ class Job:
     """One export, whoever does it and in however many goes.
 
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
-    chunk: rows that are done together. unit: metres per unit of length; unit and up are none for
-    what readers of each format expect.
+    chunk: rows that are done together. unit, up: none for what readers of each format expect.
+    names: what joints are called where a row does not say.
     """
 
     model: str
@@ -31,17 +34,13 @@ class Job:
     queries: str
     layout: str
     chunk: int
-    unit: float | None = None
+    unit: Unit | None = None
     up: Up | None = None
+    names: Names = NAMES
 
     def __post_init__(self) -> None:
-        layouts.find(self.layout)
         if self.chunk < 1:
             raise InvalidField("chunk", f"{self.chunk}, expected 1 or more rows")
-
-    def convention(self, usual: Convention) -> Convention:
-        """What files of a format measure in, of which this is usual."""
-        return Convention(self.unit or usual.metres_per_unit, self.up or usual.up)
 
     def facts(self) -> dict[str, Any]:
         """The same as plain values, with the versions of what makes the files."""
@@ -67,3 +66,13 @@ class Work:
     model: bytes
     target: str
     skip: bool = False
+
+
+def opened(work: Work) -> Synthesizer:
+    """The model of a job; a process opens it once for many chunks."""
+    return _opened(work.job.model, work.model)
+
+
+@lru_cache(maxsize=1)
+def _opened(identity: str, content: bytes) -> Synthesizer:
+    return Synthesizer(identity.partition("@")[0], session.open_bytes(content, identity))

@@ -1,16 +1,22 @@
 """How the files of many clips are laid out: as they are in folders, or packed into archives.
 
 An archive holds the files under the paths that they have in folders: unpacked, all archives of an
-export give what the folders would have been.
+export give what the folders would have been. A library is a stage of one character beside layers of
+nothing but motion.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from service.encode import ENCODERS, animation
+from service.encode.convention import Convention
 from service.encode.packs import PACKS, Pack
-from service.export import manifest
+from service.export import library, manifest
+from service.export.job import Job, Work
+from service.export.query import Query
 from service.export.target import Target
+from service.motion.answer import ClipAnswer
 from service.motion.errors import InvalidField
 
 CROWDED = 1000
@@ -33,12 +39,26 @@ Put = Callable[[Target, int, Iterable[list[File]]], tuple[list[Entry], int]]
 written."""
 
 
+Write = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+
+
 @dataclass(frozen=True)
 class Layout:
-    """Where files lie. chunk: rows that are usually done together."""
+    """Where files lie, and what is in them.
+
+    chunk: rows that are usually done together. encode: what writes files of a format. misfit: why
+    a query has no place here; none where all have. describe: what else an entry says of a clip of
+    some name and path. complete: files about the whole export, from all its entries.
+    """
 
     chunk: int
     put: Put
+    encode: Callable[[str], Write] = lambda extension: ENCODERS[extension].write
+    misfit: Callable[[Job, Query], str | None] | None = None
+    describe: Callable[[str, str, ClipAnswer], Entry] = lambda name, path, answer: {}
+    complete: Callable[[Work, Iterable[Entry]], Iterable[tuple[str, bytes]]] = (
+        lambda work, entries: ()
+    )
 
 
 def path(row: int, name: str, extension: str) -> str:
@@ -80,6 +100,14 @@ def _members(
 
 LAYOUTS = {
     "folder": Layout(256, loose),
+    "library": Layout(
+        256,
+        loose,
+        lambda extension: animation.usdc,
+        library.misfit,
+        library.describe,
+        library.complete,
+    ),
     **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
 }
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import orjson
 
-from service.export import manifest
-from service.export.job import Job
+from service.export import layouts, manifest
+from service.export.job import Job, Work
 from service.export.query import Fault
 from service.export.target import STATE, Target
 from service.motion.errors import FileError
@@ -94,32 +94,39 @@ def names(target: Target) -> set[str]:
     return target.names(PARTS)
 
 
-def finish(target: Target, place: str, job: Job, chunks: int) -> dict[str, Any] | None:
+def finish(target: Target, work: Work, chunks: int) -> dict[str, Any] | None:
     """Complete an export all of whose chunks are done; None where some are not.
 
     Returns the facts of it, also where another did this first.
     """
     try:
         if len(names(target)) == chunks:
-            return _finish(target, job, chunks)
+            return _finish(target, work, chunks)
     except FileError:
         # Another may have completed it and taken the parts away.
-        if (found := complete(target, place, job)) is None:
+        if (found := complete(target, work.target, work.job)) is None:
             raise
         return found
-    return complete(target, place, job)
+    return complete(target, work.target, work.job)
 
 
-def _finish(target: Target, job: Job, chunks: int) -> dict[str, Any]:
-    total = _total(target, chunks)
+def _finish(target: Target, work: Work, chunks: int) -> dict[str, Any]:
+    total, job = _total(target, chunks), work.job
     target.stream(MANIFEST, (lines for _, lines in _parts(target, chunks)))
     if total.skipped:
         lines = map(manifest.line, map(asdict, total.skipped))
         target.write([(SKIPPED, b"".join(lines))])
+    if total.clips:
+        target.write(layouts.find(job.layout).complete(work, _entries(target, chunks)))
     facts = {"job": job.digest, **job.facts(), **asdict(total), "skipped": len(total.skipped)}
     target.write([(EXPORT, _json(facts))])
     target.remove(STATE)
     return facts
+
+
+def _entries(target: Target, chunks: int) -> Iterator[dict[str, Any]]:
+    for _, lines in _parts(target, chunks):
+        yield from map(orjson.loads, lines.splitlines())
 
 
 def _total(target: Target, chunks: int) -> Part:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Protocol
 
-from service.export import chunks, crew, ledger
+from service.export import chunks, crew, fitting, ledger
 from service.export.chunks import Task
 from service.export.crew import Crew
 from service.export.job import Work
@@ -84,6 +84,7 @@ def run(
         target.remove(STATE)
         rows = facts["clips"] + facts["skipped"]
         return Outcome(rows, rows, facts, before=True)
+    source = fitting.to(work.job, source)
     total = _survey(source, work.skip)
     ledger.begin(target, work.target, work.job)
     return _go_on(_Run(work, source, target, shard, total), watch, by)
@@ -120,7 +121,7 @@ class _Run:
                 yield Task(number, number * self.size, chunk)
 
     def finish(self) -> dict[str, Any] | None:
-        return ledger.finish(self.target, self.work.target, self.work.job, self.chunks)
+        return ledger.finish(self.target, self.work, self.chunks)
 
 
 def _go_on(run: _Run, watch: Watch, by: Crew) -> Outcome:

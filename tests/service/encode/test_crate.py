@@ -223,8 +223,6 @@ def test_what_cannot_be_trusted_is_written_the_ordinary_way(author):
 
 
 def counting(monkeypatch):
-    crate._words.cache_clear()
-    crate._usual.cache_clear()
     write, made = crate.ordinary, []
     monkeypatch.setattr(crate, "ordinary", lambda *one: made.append(one) or write(*one))
     return made

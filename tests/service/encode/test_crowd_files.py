@@ -237,15 +237,13 @@ def test_without_templates_the_same_is_written(clip, made, tmp_path, monkeypatch
 
 def test_motions_are_written_by_template(clip, made, tmp_path, monkeypatch):
     monkeypatch.setattr(motions, "CRATES", Press(crate, limit=10**6))
-    crate._words.cache_clear()
-    crate._usual.cache_clear()
     write, ordinary = crate.ordinary, []
     monkeypatch.setattr(crate, "ordinary", lambda *one: ordinary.append(one) or write(*one))
     crowd.write(clip, tmp_path / "crowd.usd")
-    # The first, what a template takes to make, and two for the words of a layer.
-    assert len(ordinary) == 1 + 3 + 2
+    # The first, and what a template takes to make.
+    assert len(ordinary) == 1 + 3
     crowd.write(replace(clip, batches=crowds.cut(made, 3)), tmp_path / "crowd.usd")
-    assert len(ordinary) == 1 + 3 + 2
+    assert len(ordinary) == 1 + 3
 
 
 PRINT_DIGESTS = """

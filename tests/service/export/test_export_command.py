@@ -85,7 +85,7 @@ def test_units_and_axes_are_what_was_said(export, table, tmp_path):
     kinds = {n: json.loads((tmp_path / n / "export.json").read_text()) for n in ("m", "cm", "z")}
     assert [(kind["unit"], kind["up"]) for kind in kinds.values()] == [
         (None, None),
-        (0.01, None),
+        ("cm", None),
         (None, "z"),
     ]
 
@@ -125,12 +125,12 @@ def test_a_part_says_that_others_are_missing(export, table, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--unit", "ft"), "unit: 'ft', expected one of m, cm"),
         (("--layout", "heap"), "layout: 'heap', expected one of folder"),
         (("--chunk", "0"), "chunk: 0, expected 1 or more"),
         (("--shard", "2/2"), "shard: 2/2, expected 0/N to N-1/N"),
         (("--shard", "one"), "shard: 'one', expected I/N"),
         (("--format", "fbx"), "format: 'fbx', expected one of"),
+        (("--layout", "library"), "queries: rows that cannot be answered: 1 "),
         (("--fps", "0"), "fps: 0 frames a second, expected"),
         (("--sample", "3"), "queries: a file and --sample, expected one of"),
     ],

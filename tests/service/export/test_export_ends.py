@@ -6,6 +6,7 @@ Each runs as a process of its own, by the command that a user types.
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from typer.testing import CliRunner
 
 from service import cli
 
-CLIPS, CHUNK = 480, 4
+CLIPS, CHUNK = 600, 4
 POSEFIELD = Path(sys.executable).parent / "posefield"
 PARTS = ".posefield/parts"
 
@@ -54,11 +55,16 @@ def parts(target):
     return len(list(folder.iterdir())) if folder.exists() else 0
 
 
-def wait_for_parts(target, number, process):
-    """Wait until so many chunks are done; the process must still be at work then."""
+def reached(target, number, process):
+    """Wait until so many chunks are done; whether the process is still at work then."""
     while parts(target) < number and process.poll() is None:
         time.sleep(0.001)
-    assert process.poll() is None, process.communicate()
+    return process.poll() is None
+
+
+def wait_for_parts(target, number, process):
+    """Wait until so many chunks are done; the process must still be at work then."""
+    assert reached(target, number, process), process.communicate()
 
 
 def workers_of(process):
@@ -81,18 +87,21 @@ def go_on(words):
 
 
 def test_killed_ten_times_it_ends_with_the_same_bytes(command, undisturbed, tmp_path):
-    chance = random.Random(5)
-    for attempt in range(10):
-        process = begun(command(tmp_path, "--workers", 1 + attempt % 2))
-        wait_for_parts(tmp_path, parts(tmp_path) + chance.randrange(1, 5), process)
-        time.sleep(chance.uniform(0.0, 0.01))
-        # The parent alone, whose workers must end by themselves, or all at once.
-        kill = os.kill if attempt % 4 == 1 else os.killpg
-        kill(process.pid, signal.SIGKILL)
+    chance, killed = random.Random(5), 0
+    while killed < 10:
+        process = begun(command(tmp_path, "--workers", 1 + killed % 2))
+        if reached(tmp_path, parts(tmp_path) + chance.randrange(1, 5), process):
+            time.sleep(chance.uniform(0.0, 0.01))
+            # The parent alone, whose workers must end by themselves, or all at once.
+            kill = os.kill if killed % 4 == 1 else os.killpg
+            kill(process.pid, signal.SIGKILL)
         process.communicate()
-        assert process.returncode == -signal.SIGKILL
+        killed += process.returncode == -signal.SIGKILL
         whole(tmp_path, undisturbed)
-    assert 0 < parts(tmp_path) < CLIPS // CHUNK
+        if process.returncode == 0:
+            # A busy machine looked too late: what went on to the end is seen to, and begun again.
+            assert exporting.content(tmp_path) == undisturbed
+            shutil.rmtree(tmp_path)
     assert not (tmp_path / "manifest.jsonl").exists()
     go_on(command(tmp_path))
     assert exporting.content(tmp_path) == undisturbed

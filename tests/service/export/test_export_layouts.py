@@ -4,14 +4,18 @@ import hashlib
 import subprocess
 import tarfile
 import zipfile
+from dataclasses import replace
 
 import exporting
+import numpy as np
 import orjson
 import pytest
+from pxr import Usd, UsdSkel
 
 from service import check
 from service.export import run
-from service.motion.errors import UsdError
+from service.motion.errors import InvalidField, UsdError
+from service.synthesis import library as synthesis
 
 ROWS, CHUNK = 20, 8
 
@@ -31,7 +35,7 @@ def made(source, model_path, tmp_path_factory):
         run.run(work, source, exporting.Watching())
         return folder
 
-    return {layout: of(layout) for layout in ("folder", "tar", "zip")}
+    return {layout: of(layout) for layout in ("folder", "tar", "zip", "library")}
 
 
 def unpacked(folder, layout):
@@ -115,3 +119,51 @@ def test_a_file_that_is_none_would_not_pass(made, tmp_path):
     bad.write_bytes(good[: len(good) // 2])
     with pytest.raises(UsdError):
         check.check(bad)
+
+
+def test_a_library_is_one_character_that_can_play_every_clip(made, source, model_path):
+    synthesizer = synthesis.load([model_path]).models["reaching"]
+    stage = Usd.Stage.Open(str(made["library"] / "character.usd"))
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skel"))
+    source_of = UsdSkel.BindingAPI(skeleton).GetAnimationSourceRel()
+    for row, query in enumerate(source.rows()):
+        clip = synthesizer.clip(query.question).clip
+        source_of.SetTargets([f"/Character/Clips/{query.name.replace('-', '_')}"])
+        cache, root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Character"))
+        cache.Populate(root, Usd.PrimDefaultPredicate)
+        transforms = cache.GetSkelQuery(skeleton).ComputeJointSkelTransforms(len(clip) - 1)
+        found = np.array(transforms)[:, 3, :3]
+        # float32 keeps 1e-7 of a coordinate, and errors add up along the chain of joints.
+        assert found == pytest.approx(clip.positions()[-1], abs=1e-5)
+        # Negative control: its neighbour ends elsewhere.
+        other = synthesizer.clip(list(source.rows())[row - 1].question).clip
+        assert np.abs(found - other.positions()[-1]).max() > 1e-4
+
+
+def test_a_library_is_smaller_than_its_clips_and_tells_of_them(made):
+    sizes = {
+        layout: sum(p.stat().st_size for p in made[layout].glob("clips/*/*.usdc"))
+        for layout in ("folder", "library")
+    }
+    assert sizes["library"] < sizes["folder"]
+    loose = exporting.lines(made["folder"] / "manifest.jsonl")
+    for line, other in zip(exporting.lines(made["library"] / "manifest.jsonl"), loose, strict=True):
+        assert (line["file"], line["controls"]) == (other["file"], other["controls"])
+        assert np.all(np.array(line["low"]) < line["high"])
+
+
+def test_what_has_no_place_in_a_library_is_found_before_anything_is_written(
+    source, model_path, tmp_path
+):
+    rows = list(source.rows())
+    rows[3] = replace(rows[3], format="bvh")
+    rows[5] = replace(rows[5], question=replace(rows[5].question, names="vrm"))
+    bad = exporting.Listed(rows)
+    work = exporting.work(model_path, bad, tmp_path / "made", layout="library")
+    with pytest.raises(InvalidField, match="answered: 2") as refused:
+        run.run(work, bad, exporting.Watching())
+    assert "line 5: format: 'bvh', expected 'usdc' in a library" in str(refused.value)
+    assert "line 7: names: 'vrm', expected 'own'" in str(refused.value)
+    assert not (tmp_path / "made").exists()
+    outcome = run.run(replace(work, skip=True), bad, exporting.Watching())
+    assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 2)

@@ -103,6 +103,26 @@ def test_what_is_complete_is_left_as_it_is(undisturbed, source, model_path):
     assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")} == before
 
 
+def test_what_was_killed_as_it_ended_is_tidied(undisturbed, source, model_path, tmp_path):
+    shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
+    (tmp_path / ".posefield/parts").mkdir(parents=True)
+    (tmp_path / ".posefield/parts/000001.jsonl").write_bytes(b"{}")
+    work = exporting.work(model_path, source, tmp_path)
+    assert run.run(work, source, exporting.Watching()).before
+    assert exporting.content(tmp_path) == exporting.content(undisturbed)
+
+
+def test_what_was_killed_as_its_manifest_was_written_is_ended(
+    undisturbed, source, model_path, tmp_path
+):
+    work = exporting.work(model_path, source, tmp_path)
+    run.run(work, source, exporting.Watching(3))
+    # As far as it gets before the file that makes an export complete.
+    (tmp_path / "manifest.jsonl").write_bytes(b"the first line")
+    assert run.run(work, source, exporting.Watching()).facts is not None
+    assert exporting.content(tmp_path) == exporting.content(undisturbed)
+
+
 @pytest.mark.parametrize("stop", [1, 2, 3])
 def test_what_was_stopped_goes_on(stop, undisturbed, source, model_path, tmp_path):
     work = exporting.work(model_path, source, tmp_path)
