@@ -6,11 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pxr import Tf
+from pxr import Sdf, Tf
 
 from service.encode.convention import METRES, Convention
 
 MEMORY = Path("/dev/shm")
+
+# The first layer of a process makes usd-core load its formats, and of two threads that do so at
+# once each can wait for the other for ever. Modules are imported by one.
+Sdf.Layer.CreateAnonymous("first.usda")
 
 
 def head(

@@ -1,0 +1,32 @@
+"""The first layers of a process may be made by several threads at once."""
+
+import subprocess
+import sys
+
+import pytest
+
+# Half of such processes hung for ever where nothing had made a layer before.
+FIRST = """
+import sys, threading
+from pxr import Sdf
+import service.encode.{module}
+ready = threading.Barrier(6)
+def make():
+    ready.wait()
+    for _ in range(5):
+        Sdf.Layer.CreateAnonymous("clip.usda").ExportToString()
+threads = [threading.Thread(target=make, daemon=True) for _ in range(6)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join(20.0)
+    if thread.is_alive():
+        sys.exit("hangs")
+"""
+
+
+@pytest.mark.parametrize("module", ["usd", "usdz", "animation", "library", "crowd.scene"])
+def test_threads_do_not_wait_for_each_other(module):
+    words = [sys.executable, "-c", FIRST.format(module=module)]
+    for _ in range(4):
+        subprocess.run(words, check=True)
