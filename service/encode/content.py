@@ -25,6 +25,9 @@ Repeats = tuple[int, ...] | None
 PROBED = 8
 """Numbers of a sample by which most are told apart."""
 
+BARE, REPEAT = 1500, 36
+"""Bytes that a pattern takes, and each row of its repeats, about."""
+
 INLINE = -1
 """Mark of a number that float32 holds: USD keeps it beside its type, and never looks for others."""
 
@@ -87,6 +90,11 @@ def pattern(content: Content, known: tuple[float, ...]) -> Pattern:
         _equals(content.facts.numbers, known),
         content.facts.shape,
     )
+
+
+def size(pattern: Pattern) -> int:
+    """Bytes that it takes, about."""
+    return BARE + REPEAT * sum(len(repeats) for _, _, repeats in pattern.samples if repeats)
 
 
 def marks(pattern: Pattern, known: tuple[float, ...], texts: int, seed: int) -> Content:

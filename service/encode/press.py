@@ -1,16 +1,15 @@
 """Templates that were made, kept for the layers that come."""
 
 from collections import OrderedDict
-from collections.abc import Hashable
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import Any, Protocol
+from typing import Protocol
 
+from service.encode import content as contents
 from service.encode import crate, text
-from service.encode.content import Author, Content
+from service.encode.content import Author, Content, Pattern
 
-ENTRY = 1000
-"""Bytes that are counted for what is known of a pattern without a template."""
+Key = tuple[Author, Pattern]
 
 
 class Template(Protocol):
@@ -26,13 +25,13 @@ class Template(Protocol):
 class Form(Protocol):
     """A way to write layers: `crate` or `text`."""
 
-    def pattern(self, author: Author, content: Content) -> Any:
-        """What a template hangs on; it can be hashed."""
+    def pattern(self, author: Author, content: Content) -> Pattern:
+        """What a template hangs on."""
 
     def ordinary(self, author: Author, content: Content) -> bytes:
         """The layer as usd-core writes it."""
 
-    def template(self, author: Author, content: Content, pattern: Any) -> Template | None:
+    def template(self, author: Author, content: Content, pattern: Pattern) -> Template | None:
         """Template of an author's layers of one pattern, or None where it cannot be trusted."""
 
 
@@ -57,13 +56,14 @@ class Seen(Refused):
 class Press:
     """Writes layers in one form, by a template from the second of a pattern on.
 
-    limit: bytes that templates take together at most; those that were not used for longest go.
+    limit: bytes that templates and patterns take together at most, about; those that were not used
+    for longest go.
     Any thread may write.
     """
 
     form: Form
     limit: int
-    _kept: OrderedDict[Hashable, Template] = field(default_factory=OrderedDict)
+    _kept: OrderedDict[Key, Template] = field(default_factory=OrderedDict)
     _taken: int = 0
     _lock: Lock = field(default_factory=Lock)
 
@@ -79,21 +79,24 @@ class Press:
             self._keep((author, pattern), known)
         return known.write(author, content) or self.form.ordinary(author, content)
 
-    def _look(self, key: Hashable) -> Template | None:
+    def _look(self, key: Key) -> Template | None:
         with self._lock:
             known = self._kept.get(key)
             if known is not None:
                 self._kept.move_to_end(key)
             return known
 
-    def _keep(self, key: Hashable, known: Template) -> None:
+    def _keep(self, key: Key, known: Template) -> None:
         with self._lock:
             before = self._kept.pop(key, None)
             self._kept[key] = known
-            self._taken += ENTRY + len(known) - (0 if before is None else ENTRY + len(before))
+            self._taken += _size(key, known) - (0 if before is None else _size(key, before))
             while self._taken > self.limit:
-                _, gone = self._kept.popitem(last=False)
-                self._taken -= ENTRY + len(gone)
+                self._taken -= _size(*self._kept.popitem(last=False))
+
+
+def _size(key: Key, known: Template) -> int:
+    return contents.size(key[1]) + len(known)
 
 
 CRATES, TEXTS = Press(crate, 64_000_000), Press(text, 8_000_000)

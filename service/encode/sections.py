@@ -40,15 +40,24 @@ class Pieces:
 
 def pieces(data: bytes) -> Pieces | None:
     """Pieces of a binary layer; None where it is laid out in another way."""
-    (table,) = TABLE.unpack_from(data, TABLE_AT)
-    (count,) = TABLE.unpack_from(data, table)
-    listed = [ENTRY.unpack_from(data, table + TABLE.size + i * ENTRY.size) for i in range(count)]
+    try:
+        listed = _listed(data)
+    except struct.error:
+        return None
     sections = tuple(
         Section(name.rstrip(b"\0"), data[start : start + size]) for name, start, size in listed
     )
+    if not sections or sections[0].name != WORDS or listed[0][1] < TABLE_AT + TABLE.size:
+        return None
     found = Pieces(placed(bytearray(data[: listed[0][1]]), 0), sections)
-    whole = sections[0].name == WORDS and joined(found.values, found.sections) == data
-    return found if whole else None
+    return found if joined(found.values, found.sections) == data else None
+
+
+def _listed(data: bytes) -> list[tuple[bytes, int, int]]:
+    """Name, start and size of each section that the table of a binary layer lists."""
+    (table,) = TABLE.unpack_from(data, TABLE_AT)
+    (count,) = TABLE.unpack_from(data, table)
+    return [ENTRY.unpack_from(data, table + TABLE.size + i * ENTRY.size) for i in range(count)]
 
 
 def joined(values: bytes | bytearray, sections: tuple[Section, ...]) -> bytes:

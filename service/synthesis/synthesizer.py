@@ -26,8 +26,9 @@ ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 @dataclass(frozen=True)
 class _Question:
-    """What has passed the door: controls and performer as they were given, and as the graph takes
-    them, point (1, d) and labels (1, p); a warning for each control outside its sampled range."""
+    """What has passed the door: controls, in the card's order, and performer as they were given,
+    and as the graph takes them, point (1, d) and labels (1, p); a warning for each control outside
+    its sampled range."""
 
     controls: dict[str, float]
     performer: str | None
@@ -123,7 +124,7 @@ class Synthesizer:
         if asked.loop or asked.root == "in_place":
             answer = self._routed(question, answer, asked)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-        return ClipAnswer(assemble(joints, turns, path, offsets, asked.fps), answer.trust)
+        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
 
     def check(self, asked: ClipQuestion) -> None:
         """Raise what `clip` would, as far as it can be said before anything is synthesised: how
@@ -158,7 +159,8 @@ class Synthesizer:
         said = tuple(filter(None, warnings))
         if said and extrapolate == "refuse":
             raise OutsideSamples("controls", "; ".join(said))
-        given = {name: float(value) for name, value in controls.items()}
+        # However they are put: the same question has the same bytes.
+        given = {control.name: float(controls[control.name]) for control in card.controls}
         return _Question(given, performer, level, point, labels, said)
 
     def _duration(self, question: _Question) -> float:

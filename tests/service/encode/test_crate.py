@@ -1,5 +1,6 @@
 """Filled templates against what usd-core writes of the same content, byte for byte."""
 
+import tracemalloc
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -253,3 +254,18 @@ def test_templates_are_kept_within_a_limit():
     nothing = Press(crate, limit=0)
     assert nothing.write(Plain(), content(1)) == crate.ordinary(Plain(), content(1))
     assert nothing._taken == 0
+
+
+def test_patterns_are_kept_within_the_limit_too():
+    """Those in which samples repeat are as large as some templates."""
+    made = [looped(content(1, frames)) for frames in range(1000, 1006)]
+    tracemalloc.start()
+    first = pattern(made[0])
+    taken, size = tracemalloc.get_traced_memory()[0], contents.size(first)
+    tracemalloc.stop()
+    assert taken / 1.5 < size < 1.5 * taken
+    assert contents.size(pattern(content(1, 1000))) < size / 10
+    press = Press(crate, limit=int(3.5 * size))
+    for each in made:
+        press.write(Plain(), each)
+    assert len(press._kept) == 3

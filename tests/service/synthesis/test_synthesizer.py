@@ -284,9 +284,15 @@ def test_the_same_question_has_the_same_answer(model):
 
 def test_controls_may_come_in_any_order(model):
     backwards = dict(reversed(POINT.items()))
-    assert (
-        poses_differ(model.pose(backwards, [0.5], "warn"), model.pose(POINT, [0.5], "warn")) == 0.0
-    )
+    found, other = (model.pose(each, [0.5], "warn") for each in (backwards, POINT))
+    assert poses_differ(found, other) == 0.0
+    assert [*found.trust.controls.items()] == [*other.trust.controls.items()] == [*POINT.items()]
+
+
+def test_a_whole_rate_is_a_number_like_any_other(model):
+    """Else text formats would write 30 or 30.0 of the same question."""
+    rate = model.clip(ClipQuestion(POINT, 30, end=0.0)).clip.rate
+    assert repr(rate) == repr(30.0) != repr(30)
 
 
 def test_answers_are_float64_whatever_the_graph_speaks(model):
