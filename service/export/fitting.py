@@ -1,23 +1,35 @@
-"""Rows that are sound but have no place in the layout asked for."""
+"""Rows that are sound but cannot be written in the layout, or the unit, asked for."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import islice
 
+from service.encode import ENCODERS
 from service.export import layouts
 from service.export.job import Job
 from service.export.query import KEPT, Fault, Query, Source, Survey
+from service.motion.errors import InvalidField
 
 
 def to(job: Job, source: Source) -> Source:
-    """The source, with faults instead of queries that have no place in the job's layout."""
+    """The source, with faults instead of queries that the job cannot write."""
     misfit = layouts.find(job.layout).misfit
+    if misfit is None and (job.unit or job.up):
+        misfit = _unlawful
     return source if misfit is None else Fitting(source, job, misfit)
+
+
+def _unlawful(job: Job, query: Query) -> str | None:
+    """Why a query's format cannot be in the job's unit and up axis; none if it can."""
+    try:
+        ENCODERS[query.format].convention(job.unit, job.up)
+    except InvalidField as fault:
+        return str(fault)
+    return None
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """Rows of a source, of which some have no place for a reason that `misfit` gives."""
+    """Rows of a source, of which some cannot be written for a reason that `misfit` gives."""
 
     source: Source
     job: Job
@@ -25,7 +37,7 @@ class Fitting:
 
     @property
     def digest(self) -> str:
-        """Of the source: the layout is the job's."""
+        """Of the source: why rows do not fit is the job's."""
         return self.source.digest
 
     @property
@@ -40,8 +52,11 @@ class Fitting:
             yield row if why is None else Fault(row.place, why)
 
     def survey(self) -> Survey:
-        """What the source finds, and all that has no place."""
-        found = self.source.survey()
-        faulty = sum(isinstance(row, Fault) for row in self.rows())
-        faults = (row for row in self.rows() if isinstance(row, Fault))
-        return Survey(found.total, faulty, tuple(islice(faults, KEPT)) if faulty else ())
+        """Every row looked at, and none kept but the first faults."""
+        total, faulty, faults = 0, 0, []
+        for row in self.rows():
+            total += 1
+            if isinstance(row, Fault):
+                faulty += 1
+                faults += [row] if faulty <= KEPT else []
+        return Survey(total, faulty, tuple(faults))

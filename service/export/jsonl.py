@@ -35,11 +35,14 @@ class JsonLines:
 
     def blocks(self) -> Iterator[Block | Broken]:
         """Rows in columns that are the same for all of them."""
+        return self.original.unchanged(self._blocks())
+
+    def _blocks(self) -> Iterator[Block | Broken]:
         all_columns = self.columns.all
         gathering = Gathering(all_columns, [column.kind.values for column in all_columns])
         row = _Rows(self.columns)
         path = self.original.path
-        with self.original.unchanged(), path.open("rb") as file:
+        with path.open("rb") as file:
             for number, line in enumerate(lines(path, file.readline), start=1):
                 text = line.removeprefix(BOM) if number == 1 else line
                 if not text.strip():

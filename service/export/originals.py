@@ -1,14 +1,15 @@
 """Files that are read more than once and must stay what they were."""
 
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import AnyStr
+from typing import AnyStr, TypeVar
 
 from service.motion.errors import FileError
+
+Read = TypeVar("Read")
 
 LONGEST_LINE = 1 << 20
 """Of a line, characters: a file without line ends is no table, and would not fit into memory."""
@@ -22,11 +23,12 @@ class Original:
     digest: str
     stamp: tuple[int, int]
 
-    @contextmanager
-    def unchanged(self) -> Iterator[None]:
-        """Raises FileError where the file is another before or after."""
+    def unchanged(self, read: Iterable[Read]) -> Iterator[Read]:
+        """What is read of the file; FileError before the first that may be of another."""
         self._compare()
-        yield
+        for each in read:
+            self._compare()
+            yield each
         self._compare()
 
     def _compare(self) -> None:

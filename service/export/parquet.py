@@ -29,9 +29,12 @@ class ParquetFile:
 
     def blocks(self) -> Iterator[Block]:
         """Rows from the first on."""
+        return self.original.unchanged(self._blocks())
+
+    def _blocks(self) -> Iterator[Block]:
         readers = [column.kind.values for column in self.heading]
         first = 0
-        with self.original.unchanged(), _opened(self.original) as file:
+        with _opened(self.original) as file:
             for batch in file.iter_batches(SIZE):
                 size = len(batch)
                 cells = [column.to_pylist() for column in batch.columns]

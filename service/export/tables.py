@@ -29,8 +29,11 @@ class CsvFile:
 
     def blocks(self) -> Iterator[Block | Broken]:
         """Rows below the heading."""
+        return self.original.unchanged(self._blocks())
+
+    def _blocks(self) -> Iterator[Block | Broken]:
         gathering = Gathering(self.heading, [column.kind.text for column in self.heading])
-        with self.original.unchanged(), _open(self.original.path) as file:
+        with _open(self.original.path) as file:
             rows = _rows(self.original.path, file)
             next(rows)
             for row in rows:

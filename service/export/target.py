@@ -6,11 +6,12 @@ from typing import Protocol
 from urllib.parse import unquote, urlsplit
 
 from service.export.folder import Folder
+from service.motion.errors import InvalidField
 
 STATE = ".posefield"
 """Folder of what a target holds only until its export is done."""
 ASIDE = f"{STATE}/writing"
-URL = re.compile(r"[a-z][a-z0-9+.-]*://")
+URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.IGNORECASE)
 
 
 class Target(Protocol):
@@ -48,11 +49,19 @@ class Target(Protocol):
 
 
 def open_target(place: str) -> Target:
-    """Target of a path, of a file:// URL or, through obstore, of an object store's URL."""
+    """Target of a path, of a file:/// URL or, through obstore, of an object store's URL.
+
+    Raises InvalidField for what is none of these, FileError for a store that cannot be used.
+    """
+    if not place:
+        raise InvalidField("output", "empty, expected a folder or an object store's URL")
     if not URL.match(place):
         return Folder(place.rstrip("/") or "/", ASIDE)
-    if place.startswith("file://"):
-        return open_target(unquote(urlsplit(place).path))
+    url = urlsplit(place)
+    if url.scheme == "file":
+        if url.netloc not in ("", "localhost"):
+            raise InvalidField("output", f"{place!r}, expected file:///FOLDER: no host's files")
+        return open_target(unquote(url.path))
     # An extra: most exports go to a disk.
     from service.export.store import Store
 

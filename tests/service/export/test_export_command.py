@@ -111,6 +111,18 @@ def test_rows_at_fault_are_skipped_if_asked_to(export, table, tmp_path):
     assert exporting.lines(tmp_path / "made/skipped.jsonl")[0]["place"] == "queries.csv:5"
 
 
+def test_rows_whose_format_has_another_law_are_at_fault(export, table, tmp_path):
+    """glTF is in metres whatever is asked for; the others of the table are written."""
+    words = (table, "-o", tmp_path / "made", "--format", "glb")
+    said = "queries.csv:4: unit: 0.01 m, expected 1 m: the law of glb"
+    code, _, err = export(*words, "--unit", "cm")
+    assert code == 2 and said in err
+    assert not (tmp_path / "made").exists()
+    code, out, err = export(*words, "--unit", "cm", "--skip-errors")
+    assert code == 0 and said in err and "2 clips, " in out
+    assert export(table, "-o", tmp_path / "law", "--format", "glb", "--unit", "m")[0] == 0
+
+
 def test_a_part_says_that_others_are_missing(export, table, tmp_path):
     words = (table, "-o", tmp_path / "made", "--chunk", "1", "--shard")
     code, out, _ = export(*words, "1/2")
@@ -140,6 +152,20 @@ def test_what_makes_no_sense_is_refused(words, said, export, table, tmp_path):
     assert (code, out) == (2, "")
     assert err.startswith(f"posefield: {said}")
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("place", ["", "file://", "file://clips/made"])
+def test_a_target_that_names_no_place_is_refused(place, export, table):
+    """Else the root of the file system would be taken."""
+    code, out, err = export(table, "-o", place)
+    assert (code, out) == (2, "")
+    assert err.startswith("posefield: output: ") and "expected " in err
+
+
+def test_the_scheme_of_a_url_may_be_in_capitals(export, table, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert export(table, "-o", f"FILE://{tmp_path}/made")[0] == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"queries.csv", "made"}
 
 
 def test_a_target_of_something_else_is_a_file_that_cannot_be_used(export, table, tmp_path):

@@ -1,10 +1,12 @@
 """CSV as it is found in the wild is read, and what is wrong with it is said with its line."""
 
 import codecs
+import contextlib
 
 import pytest
 from asking import POINT, asked, faults, rows, source, text, write_csv
 
+from service.export.blocks import SIZE
 from service.export.queries import Defaults
 from service.motion.errors import FileError
 from service.synthesis import library
@@ -280,6 +282,20 @@ def test_a_file_that_changes_while_it_is_read_is_refused(model, tmp_path):
         list(under_way)
     with pytest.raises(FileError, match="changed while it was used"):
         opened.survey()
+
+
+@pytest.mark.parametrize("grown", [0, 1])
+def test_no_row_is_given_of_a_file_that_has_changed(grown, model, tmp_path):
+    """Of a block that was read before; whoever exports the next would keep its clips."""
+    path = write_csv(tmp_path / "q.csv", [POINT] * 3 * SIZE)
+    under_way = source(model, path).rows()
+    next(under_way)
+    with path.open("ab") as file:
+        file.write(b"\n" * grown)
+    given = [None]
+    with contextlib.suppress(FileError):
+        given.extend(under_way)
+    assert len(given) == (SIZE if grown else 3 * SIZE)
 
 
 def test_a_file_that_does_not_change_may_be_read_again(model, tmp_path):
