@@ -35,7 +35,7 @@ from service.web.query import FileQuestion, PoseQuestion
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
 
-# 200 poses of 33 joints take 1 ms as JSON and 7 ms as USD text, but 30 ms where it makes a template;
+# 200 poses of 33 joints take 1 ms as JSON and 7 ms as USD text, or 30 ms where a template is made:
 # more would hold up other requests.
 INLINE_POSES = 200
 
