@@ -27,7 +27,8 @@ class Encoder:
 
     write: files of several answers, as long as they and in their order; those of one model and
     length are made together. usual: the convention that readers of the format expect; law: whether
-    it allows no other.
+    it allows no other. at_once: frames up to which a file is written in so little time (a
+    millisecond or two) that others may wait for it.
     """
 
     extension: str
@@ -35,6 +36,7 @@ class Encoder:
     write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
     usual: Convention = METRES
     law: bool = False
+    at_once: int = 200
 
     def convention(self, unit: Unit | None, up: Up | None) -> Convention:
         """What is asked for, and as usual where nothing is; InvalidField where the format's law is
@@ -59,10 +61,11 @@ def one_by_one(
 ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        Encoder("usda", "model/vnd.usda", usd.usda),
+        # A template takes 30 ms to make, and every number of frames has one of its own.
+        Encoder("usda", "model/vnd.usda", usd.usda, at_once=0),
         # The binary form has no registered media type.
-        Encoder("usdc", "application/octet-stream", usd.usdc),
-        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz),
+        Encoder("usdc", "application/octet-stream", usd.usdc, at_once=0),
+        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz, at_once=0),
         Encoder("json", "application/json", one_by_one(keyframes.json)),
         Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
         Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), law=True),

@@ -4,7 +4,6 @@ import os
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import ParamSpec, TypeVar
 
 from anyio import CapacityLimiter, to_thread
 from starlette.concurrency import run_in_threadpool
@@ -35,8 +34,7 @@ from service.web.query import FileQuestion, PoseQuestion
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
 
-# 200 poses of 33 joints take 1 ms as JSON and 7 ms as USD text, 30 where it makes a template; more
-# would hold up other requests.
+# 200 poses of 33 joints take 1 ms as JSON; more would hold up other requests.
 INLINE_POSES = 200
 
 
@@ -54,8 +52,6 @@ CROWDS = CapacityLimiter(os.cpu_count() or 1)
 CLIPS = CapacityLimiter(os.cpu_count() or 1)
 
 Handler = Callable[[Service, Request], Awaitable[Response]]
-Given = ParamSpec("Given")
-Made = TypeVar("Made")
 
 
 async def list_models(service: Service, request: Request) -> Response:
@@ -192,21 +188,18 @@ async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
         question.performer,
         question.level,
     )
-    content = await _made(len(answer.times), poses.json, answer)
+    if len(answer.times) <= INLINE_POSES:
+        content = poses.json(answer)
+    else:
+        content = await run_in_threadpool(poses.json, answer)
     return Response(content, media_type="application/json")
 
 
 async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) -> Response:
     convention = encoder.convention(question.unit, question.up)
     answer = model.clip(question.clip)
-    content = await _made(len(answer.clip), encoder.encode, answer, convention)
+    if len(answer.clip) <= encoder.at_once:
+        content = encoder.encode(answer, convention)
+    else:
+        content = await run_in_threadpool(encoder.encode, answer, convention)
     return answers.file(content, encoder, answer.trust)
-
-
-async def _made(
-    poses: int, make: Callable[Given, Made], *args: Given.args, **kwargs: Given.kwargs
-) -> Made:
-    """What `make` returns: at once for few poses, in a thread for many."""
-    if poses <= INLINE_POSES:
-        return make(*args, **kwargs)
-    return await run_in_threadpool(make, *args, **kwargs)

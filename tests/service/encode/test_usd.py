@@ -218,7 +218,8 @@ def test_no_temporary_file_is_left(walk, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_machine_without_a_folder_in_memory_will_do(walk, tmp_path, monkeypatch):
+@pytest.mark.parametrize("place", ["none", "/proc"])
+def test_a_machine_without_a_folder_in_memory_will_do(walk, place, tmp_path, monkeypatch):
     expected = ENCODERS["usdc"].encode(walk)
-    monkeypatch.setattr(layers, "MEMORY", tmp_path / "none")
+    monkeypatch.setattr(layers, "MEMORY", tmp_path / place)
     assert ENCODERS["usdc"].encode(walk) == expected
