@@ -37,7 +37,15 @@ def say(made: Any, facts: Mapping[str, Any]) -> None:
 
 def crate(made: Any) -> bytes:
     """The layer in its binary form, which pxr can only write to a file."""
-    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
+    try:
+        return _written(made, MEMORY)
+    except OSError:
+        # It may be missing, full or not ours: containers have 64 MB.
+        return _written(made, None)
+
+
+def _written(made: Any, place: Path | None) -> bytes:
+    with tempfile.TemporaryDirectory(dir=place) as folder:
         path = Path(folder, "layer.usdc")
         export(made, path)
         return path.read_bytes()
