@@ -5,6 +5,7 @@ nothing but such a name, and two who write the same file do each other no harm.
 """
 
 import contextlib
+import errno
 import os
 import shutil
 import time
@@ -17,6 +18,9 @@ from service.motion.errors import FileError
 
 TRIES, PAUSE = 40, 0.05
 """To take away a folder that another process may still be writing to; the pause in seconds."""
+
+LINKLESS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
+"""What file systems say that have no second names for a file: exFAT, and some over a network."""
 
 
 class Folder:
@@ -50,12 +54,10 @@ class Folder:
         whole = self._path(path)
         with self._set_aside(whole, (content,)):
             try:
-                os.link(self._aside, whole)
-            except FileExistsError:
-                return False
+                return _place(self._aside, whole)
             finally:
-                os.unlink(self._aside)
-        return True
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(self._aside)
 
     def read(self, path: str) -> bytes | None:
         """Content of a file; None where there is none."""
@@ -114,6 +116,22 @@ class Folder:
         if folder not in self._made:
             Path(folder).mkdir(parents=True, exist_ok=True)
             self._made.add(folder)
+
+
+def _place(aside: str, whole: str) -> bool:
+    """Put a file where there is none; whether there was none."""
+    try:
+        os.link(aside, whole)
+    except FileExistsError:
+        return False
+    except OSError as fault:
+        if fault.errno not in LINKLESS:
+            raise
+        # Two who begin at once may both be told that there was none; the later one's file stays.
+        if os.path.exists(whole):
+            return False
+        os.rename(aside, whole)
+    return True
 
 
 @contextmanager
