@@ -86,7 +86,6 @@ def run(
         return Outcome(rows, rows, facts, before=True)
     source = fitting.to(work.job, source)
     total = _survey(source, work.skip)
-    ledger.begin(target, work.target, work.job)
     return _go_on(_Run(work, source, target, shard, total), watch, by)
 
 
@@ -125,17 +124,19 @@ class _Run:
 
 
 def _go_on(run: _Run, watch: Watch, by: Crew) -> Outcome:
-    own, names = run.own, ledger.names(run.target)
-    left = {number for number in own if ledger.done(run.target, number, names) is None}
+    own = run.own
     rows = sum(own.values())
-    done = rows - sum(own[number] for number in left)
-    watch.begin(rows, done)
     try:
+        ledger.begin(run.target, run.work.target, run.work.job)
+        names = ledger.names(run.target)
+        left = {number for number in own if ledger.done(run.target, number, names) is None}
+        done = rows - sum(own[number] for number in left)
+        watch.begin(rows, done)
         for part in by(run.work, run.tasks(left), watch.stopped):
             done += part.clips + len(part.skipped)
             watch.advance(part)
     except FileError:
-        # Another run of the same export may have completed it meanwhile.
+        # Another run of the same export may have completed it meanwhile, or during the survey.
         if (facts := ledger.complete(run.target, run.work.target, run.work.job)) is None:
             raise
         return Outcome(rows, rows, facts)

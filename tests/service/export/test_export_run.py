@@ -245,3 +245,19 @@ def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_p
 def test_a_shard_that_there_is_not_is_refused(index, count):
     with pytest.raises(InvalidField, match="shard"):
         Shard(index, count)
+
+
+def test_it_may_be_completed_by_another_while_its_queries_are_looked_at(
+    undisturbed, source, model_path, tmp_path
+):
+    work = exporting.work(model_path, source, tmp_path / "made")
+
+    class Slow(exporting.Listed):
+        def survey(self):
+            run.run(work, source, exporting.Watching())
+            return super().survey()
+
+    outcome = run.run(work, Slow(source.rows()), exporting.Watching())
+    assert (outcome.rows, outcome.done) == (ROWS, ROWS)
+    assert outcome.facts["clips"] == ROWS
+    assert exporting.content(tmp_path / "made") == exporting.content(undisturbed)
