@@ -15,6 +15,7 @@ import clips_http
 import crowd
 import crowd_usd
 import export
+import export_cluster
 import export_formats
 import export_usd
 import newcomer
@@ -43,6 +44,7 @@ def main() -> None:
         *crowd.rows(made),
         *crowd_usd.rows(),
         *export.rows(model),
+        *export_cluster.rows(model),
         *clips_http.rows(made),
         *export_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),

@@ -60,6 +60,9 @@ LengthUnit = Annotated[
 UpAxis = Annotated[Up | None, typer.Option(help="in the file; the format's own if not said")]
 Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
 
+INTERRUPTED = 130
+"""What a shell expects of a command that was told to stop."""
+
 # Whose extra a missing module is; everything else that can be missing is training's.
 EXTRAS = {
     **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate"),
@@ -80,6 +83,8 @@ def main() -> None:
         extra = EXTRAS.get(fault.name or "", "train")
         typer.echo(f"posefield: needs {fault.name}: install posefield[{extra}]", err=True)
         sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)
         sys.exit(_code(fault))

@@ -86,6 +86,11 @@ class Folder:
         """Whether nothing is here but one folder."""
         return self.names("") <= {but}
 
+    def drop(self, path: str) -> None:
+        """Take away a file, if it is there."""
+        with _said(self._path(path)):
+            Path(self._path(path)).unlink(missing_ok=True)
+
     def remove(self, folder: str) -> None:
         """Take away a folder and all that is in it."""
         for _ in range(TRIES):

@@ -9,6 +9,7 @@ bytes are the same.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
+from io import BytesIO
 from typing import Any
 
 import orjson
@@ -52,6 +53,27 @@ def complete(target: Target, place: str, job: Job) -> dict[str, Any] | None:
     """Facts of the export where it is complete; FileError where it is another job's."""
     content = target.read(EXPORT)
     return None if content is None else _expect(place, job, content)
+
+
+def whole(target: Target) -> bool:
+    """Whether the files that a complete export tells of are still there, as long as they were.
+
+    Archives are believed: nothing says how long they are.
+    """
+    content = target.read(MANIFEST)
+    if content is None:
+        return False
+    entries = (orjson.loads(line) for line in BytesIO(content))
+    loose = (entry for entry in entries if "archive" not in entry)
+    return all(target.holds(entry["file"], entry["bytes"]) for entry in loose)
+
+
+def reopen(target: Target, job: Job) -> None:
+    """Make a complete export one of which nothing is done; its files stay until they are made
+    again, the same as they were."""
+    target.prepare()
+    target.create(JOB, _json({"job": job.digest, **job.facts()}))
+    target.drop(EXPORT)
 
 
 def _expect(place: str, job: Job, content: bytes | None) -> dict[str, Any]:

@@ -82,8 +82,10 @@ def run(
     if (facts := ledger.complete(target, work.target, work.job)) is not None:
         # Whoever completed it may have been killed before this.
         target.remove(STATE)
-        rows = facts["clips"] + facts["skipped"]
-        return Outcome(rows, rows, facts, before=True)
+        if ledger.whole(target):
+            rows = facts["clips"] + facts["skipped"]
+            return Outcome(rows, rows, facts, before=True)
+        ledger.reopen(target, work.job)
     source = fitting.to(work.job, source)
     total = _survey(source, work.skip)
     return _go_on(_Run(work, source, target, shard, total), watch, by)

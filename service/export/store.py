@@ -99,6 +99,11 @@ class Store:
             found = obstore.list_with_delimiter(self._store)
         return not found["objects"] and set(found["common_prefixes"]) <= {but}
 
+    def drop(self, path: str) -> None:
+        """Take away a file, if it is there."""
+        with _said(self._url(path)):
+            obstore.delete(self._store, path)
+
     def remove(self, folder: str) -> None:
         """Take away a folder and all that is in it."""
         with _said(self._url(folder)):

@@ -44,6 +44,9 @@ class Target(Protocol):
     def prepare(self) -> None:
         """Make ready to write."""
 
+    def drop(self, path: str) -> None:
+        """Take away a file, if it is there."""
+
     def remove(self, folder: str) -> None:
         """Take away a folder and all that is in it."""
 

@@ -103,6 +103,22 @@ def test_what_is_complete_is_left_as_it_is(undisturbed, source, model_path):
     assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")} == before
 
 
+@pytest.mark.parametrize("lost", ["manifest.jsonl", "a clip", "emptied"])
+def test_what_was_complete_and_lost_a_file_is_made_again(
+    lost, undisturbed, source, model_path, tmp_path
+):
+    target = shutil.copytree(undisturbed, tmp_path / "target")
+    clip = next(target.glob("clips/*/*"))
+    if lost == "emptied":
+        clip.write_bytes(b"")
+    else:
+        (clip if lost == "a clip" else target / lost).unlink()
+    work = exporting.work(model_path, source, target)
+    outcome = run.run(work, source, exporting.Watching())
+    assert (outcome.before, outcome.done) == (False, ROWS)
+    assert exporting.content(target) == exporting.content(undisturbed)
+
+
 def test_what_was_killed_as_it_ended_is_tidied(undisturbed, source, model_path, tmp_path):
     shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
     (tmp_path / ".posefield/parts").mkdir(parents=True)

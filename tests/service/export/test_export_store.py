@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 import urllib.request
 
 import exporting
@@ -19,18 +20,26 @@ ROWS = 30
 
 
 @pytest.fixture(scope="module")
-def server():
+def server(tmp_path_factory):
     """Address of a store's server, and what tells of it in the environment."""
     words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    # It says a line a request: a pipe that nobody reads would fill and stop it.
+    said = tmp_path_factory.mktemp("server") / "said"
+    with said.open("w") as file:
+        process = subprocess.Popen(words, stdout=file, stderr=subprocess.STDOUT)
     try:
-        address = next(
-            filter(None, (re.search(r"http://[\d.:]+", line) for line in process.stdout))
-        )
-        yield address.group()
+        yield _address(process, said)
     finally:
         process.kill()
-        process.communicate()
+        process.wait()
+
+
+def _address(process, said):
+    while process.poll() is None:
+        if found := re.search(r"http://[\d.:]+\d", said.read_text()):
+            return found.group()
+        time.sleep(0.05)
+    raise AssertionError(said.read_text())
 
 
 @pytest.fixture(autouse=True)
@@ -117,6 +126,20 @@ def test_a_bucket_that_there_is_not_is_named(source, model_path):
     work = exporting.work(model_path, source, "s3://nowhere/at/all")
     with pytest.raises(FileError, match=r"^s3://nowhere/at/all: cannot be written or read"):
         run.run(work, source, exporting.Watching())
+
+
+def test_what_was_complete_and_lost_its_manifest_is_made_again_in_a_store(
+    source, model_path, bucket, local
+):
+    work = exporting.work(model_path, source, bucket)
+    run.run(work, source, exporting.Watching())
+    whole = content(bucket)
+    target = open_target(bucket)
+    target.drop("manifest.jsonl")
+    target.drop("manifest.jsonl")
+    assert content(bucket) != whole
+    assert not run.run(work, source, exporting.Watching()).before
+    assert content(bucket) == whole
 
 
 def test_a_file_is_created_once(bucket):

@@ -5,9 +5,9 @@ from dataclasses import replace
 from itertools import product
 
 import pytest
-from asking import POINT, faults, rows, source, write_csv, write_jsonl, write_parquet
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rowing import POINT, faults, rows, source, write_csv, write_jsonl, write_parquet
 
 from service.encode import ENCODERS
 from service.export.queries import Defaults

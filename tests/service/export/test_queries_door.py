@@ -1,7 +1,7 @@
 """One of a file, a grid and a sampling is asked for; what cannot be is refused before a row is."""
 
 import pytest
-from asking import POINT, rows, source, write_csv
+from rowing import POINT, rows, source, write_csv
 
 from service.export.columns import OPTIONS
 from service.export.queries import Defaults

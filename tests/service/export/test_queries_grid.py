@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from asking import asked, rows, source
+from rowing import asked, rows, source
 
 from service.export.queries import Defaults
 from service.export.query import Fault

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from asking import POINT, asked, faults, rows, source
+from rowing import POINT, asked, faults, rows, source
 
 from service.motion.errors import FileError
 from service.synthesis import library

@@ -3,7 +3,7 @@
 import tracemalloc
 
 import pytest
-from asking import POINT, source, text, write_csv
+from rowing import POINT, source, text, write_csv
 
 from service.export.queries import Defaults
 from service.synthesis import library

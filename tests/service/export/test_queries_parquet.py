@@ -6,7 +6,7 @@ import sys
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from asking import POINT, asked, faults, rows, source, write_parquet
+from rowing import POINT, asked, faults, rows, source, write_parquet
 
 from service.motion.errors import FileError
 from service.synthesis import library

@@ -8,9 +8,9 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from asking import rows, source
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rowing import rows, source
 from scipy.optimize import linprog
 from scipy.stats import chisquare, qmc
 

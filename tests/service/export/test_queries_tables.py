@@ -4,7 +4,7 @@ import codecs
 import contextlib
 
 import pytest
-from asking import POINT, asked, faults, rows, source, text, write_csv
+from rowing import POINT, asked, faults, rows, source, text, write_csv
 
 from service.export.blocks import SIZE
 from service.export.queries import Defaults
