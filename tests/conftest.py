@@ -1,6 +1,7 @@
 """What many tests need: random numbers from one seed, and a small model really trained."""
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from model_export.ingest import Example
 from model_export.recipe import Recipe
 from model_export.sample import stroll, write
 from model_export.train import Trained
+from service import cli
 
 
 @pytest.fixture
@@ -114,3 +116,21 @@ def real_data() -> Path:
     if not (folder / "hdm05_reach.zip").exists() and not (folder / "hdm05_reach").exists():
         pytest.skip(f"no motion capture in {folder}: set POSEFIELD_DATA")
     return folder
+
+
+@pytest.fixture
+def posefield(monkeypatch, capsys):
+    """Function that runs the command in this process; gives exit code, output and errors."""
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["posefield", *map(str, words)])
+        capsys.readouterr()
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as ending:
+            code = ending.code or 0
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run

@@ -12,7 +12,7 @@ import pytest
 from pxr import Usd, UsdSkel
 
 from model_export.sample import truth
-from service import __version__, cli
+from service import __version__
 from service.encode import ENCODERS
 from service.encode.convention import Convention
 from service.motion import bvh
@@ -23,24 +23,6 @@ POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
 TALL = ("--performer", "tall")
 FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz")
-
-
-@pytest.fixture
-def posefield(monkeypatch, capsys):
-    """Function that runs the command in this process; gives exit code, output and errors."""
-
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["posefield", *map(str, words)])
-        capsys.readouterr()
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as ending:
-            code = ending.code or 0
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return run
 
 
 @pytest.fixture

@@ -6,9 +6,10 @@ from typing import Any
 
 from pxr import Sdf
 
-from service.encode import character, facts, layers, specs, takes
+from service.encode import character, specs, takes
 from service.encode.content import Array, Content
 from service.encode.convention import Convention
+from service.encode.layers import Kind
 from service.encode.press import CRATES
 from service.motion.answer import ClipAnswer
 
@@ -16,17 +17,10 @@ PRIM = "Anim"
 
 
 @dataclass(frozen=True)
-class Animations:
-    """Layers of joints at these paths, of one rate."""
+class Animations(Kind):
+    """Layers of joints at these paths."""
 
     paths: tuple[str, ...]
-    rate: float
-    convention: Convention
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Those that every layer holds."""
-        return (self.rate, self.convention.metres_per_unit)
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -36,8 +30,7 @@ class Animations:
     def head(self, content: Content) -> Any:
         """The layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("animation.usda")
-        layers.head(made, PRIM, content.frames, self.rate, self.convention)
-        layers.say(made, facts.dictionary(content.facts.whole()))
+        self.state(made, PRIM, content)
         return made
 
     def layer(self, content: Content) -> Any:
@@ -51,6 +44,6 @@ class Animations:
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Binary layers of the clips' animations, without a character; the facts are in each."""
     return [
-        CRATES.write(Animations(take.rig.paths, take.rate, convention), take.content)
+        CRATES.write(Animations(take.rate, convention, take.rig.paths), take.content)
         for take in takes.bare(answers, convention)
     ]

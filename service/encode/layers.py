@@ -3,11 +3,14 @@
 import errno
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pxr import Sdf, Tf
 
+from service.encode import facts
+from service.encode.content import Content
 from service.encode.convention import METRES, Convention
 
 MEMORY = Path("/dev/shm")
@@ -29,10 +32,28 @@ def head(
     made.pseudoRoot.SetInfo("upAxis", convention.up.upper())
 
 
-def say(made: Any, facts: Mapping[str, Any]) -> None:
+def say(made: Any, said: Mapping[str, Any]) -> None:
     """State facts where there are any."""
-    if facts:
-        made.customLayerData = {"posefield": dict(facts)}
+    if said:
+        made.customLayerData = {"posefield": dict(said)}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Layers of one rate and convention."""
+
+    rate: float
+    convention: Convention
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Those that every layer holds."""
+        return (self.rate, self.convention.metres_per_unit)
+
+    def state(self, made: Any, default: str, content: Content) -> None:
+        """Give a layer its head, with this default prim, and the facts of its content."""
+        head(made, default, content.frames, self.rate, self.convention)
+        say(made, facts.dictionary(content.facts.whole()))
 
 
 def crate(made: Any) -> bytes:

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from pxr import Sdf
 
-from service.encode import body, character, facts, layers, specs, takes
+from service.encode import body, character, specs, takes
 from service.encode.character import Rig
 from service.encode.content import Array, Content
 from service.encode.convention import Convention
+from service.encode.layers import Kind
 from service.encode.press import CRATES, TEXTS
 from service.motion.answer import ClipAnswer
 
@@ -25,17 +26,10 @@ TINTS = body.TINTS.astype(np.float32)
 
 
 @dataclass(frozen=True)
-class Clips:
-    """Layers of clips of one skeleton and rate."""
+class Clips(Kind):
+    """Layers of clips of one skeleton."""
 
     rig: Rig
-    rate: float
-    convention: Convention
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Those that every layer holds."""
-        return (self.rate, self.convention.metres_per_unit)
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -45,7 +39,7 @@ class Clips:
     def head(self, content: Content) -> Any:
         """The layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
-        self._state(made, content)
+        self.state(made, ROOT.name, content)
         return made
 
     def layer(self, content: Content) -> Any:
@@ -53,14 +47,10 @@ class Clips:
         made = Sdf.Layer.CreateAnonymous("clip.usda")
         made.TransferContent(_prims(self.rig))
         with Sdf.ChangeBlock():
-            self._state(made, content)
+            self.state(made, ROOT.name, content)
             character.fill(made.GetPrimAtPath(ROOT), content.values)
             specs.samples(made.GetPrimAtPath(ANIMATION), content.samples)
         return made
-
-    def _state(self, made: Any, content: Content) -> None:
-        layers.head(made, ROOT.name, content.frames, self.rate, self.convention)
-        layers.say(made, facts.dictionary(content.facts.whole()))
 
 
 @lru_cache(maxsize=16)
@@ -87,4 +77,4 @@ def _authored(
     answers: Sequence[ClipAnswer], convention: Convention
 ) -> Iterator[tuple[Clips, Content]]:
     for take in takes.whole(answers, convention):
-        yield Clips(take.rig, take.rate, convention), take.content
+        yield Clips(take.rate, convention, take.rig), take.content

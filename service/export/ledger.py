@@ -43,10 +43,15 @@ def begin(target: Target, place: str, job: Job) -> None:
     if target.read(JOB) is None:
         if not target.empty(but=STATE):
             raise FileError(place, "holds files that are no export's, expected an empty place")
-        target.prepare()
-        target.create(JOB, _json({"job": job.digest, **job.facts()}))
+        _claim(target, job)
     _expect(place, job, target.read(JOB))
     target.prepare()
+
+
+def _claim(target: Target, job: Job) -> None:
+    """Say whose the target is, where nobody has."""
+    target.prepare()
+    target.create(JOB, _json({"job": job.digest, **job.facts()}))
 
 
 def complete(target: Target, place: str, job: Job) -> dict[str, Any] | None:
@@ -71,8 +76,7 @@ def whole(target: Target) -> bool:
 def reopen(target: Target, job: Job) -> None:
     """Make a complete export one of which nothing is done; its files stay until they are made
     again, the same as they were."""
-    target.prepare()
-    target.create(JOB, _json({"job": job.digest, **job.facts()}))
+    _claim(target, job)
     target.drop(EXPORT)
 
 

@@ -188,18 +188,18 @@ async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
         question.performer,
         question.level,
     )
-    if len(answer.times) <= INLINE_POSES:
-        content = poses.json(answer)
-    else:
-        content = await run_in_threadpool(poses.json, answer)
+    content = await _made(len(answer.times) <= INLINE_POSES, partial(poses.json, answer))
     return Response(content, media_type="application/json")
 
 
 async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) -> Response:
     convention = encoder.convention(question.unit, question.up)
     answer = model.clip(question.clip)
-    if len(answer.clip) <= encoder.at_once:
-        content = encoder.encode(answer, convention)
-    else:
-        content = await run_in_threadpool(encoder.encode, answer, convention)
+    quick = len(answer.clip) <= encoder.at_once
+    content = await _made(quick, partial(encoder.encode, answer, convention))
     return answers.file(content, encoder, answer.trust)
+
+
+async def _made(quick: bool, make: Callable[[], bytes]) -> bytes:
+    """What `make` returns: at once if that is quick, else in a thread."""
+    return make() if quick else await run_in_threadpool(make)

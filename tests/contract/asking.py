@@ -1,8 +1,11 @@
-"""Requests to an app in this process."""
+"""Requests to an app in this process, and archives that it answers with."""
 
 import asyncio
+import io
+import tarfile
 import threading
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -37,3 +40,12 @@ def listening(app: Starlette) -> Iterator[str]:
     finally:
         server.should_exit = True
         thread.join()
+
+
+def unpacked(kind: str, content: bytes) -> dict[str, bytes]:
+    """Names and contents in their order."""
+    if kind == "tar":
+        with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as found:
+            return {m.name: found.extractfile(m).read() for m in found.getmembers()}
+    with zipfile.ZipFile(io.BytesIO(content)) as found:
+        return {name: found.read(name) for name in found.namelist()}

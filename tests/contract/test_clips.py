@@ -1,14 +1,11 @@
 """Many clips over HTTP: archives of the files of single clips, and refusals that tell."""
 
 import hashlib
-import io
 import json
-import tarfile
-import zipfile
 
 import jsonschema
 import pytest
-from asking import asker
+from asking import asker, unpacked
 
 from service.encode import ENCODERS
 from service.encode.packs import PACKS
@@ -17,15 +14,6 @@ from service.web.settings import Settings
 
 CLIPS = "/v1/models/reach/clips"
 JSON = {"content-type": "application/json"}
-
-
-def unpacked(kind, content):
-    """Names and contents in their order."""
-    if kind == "tar":
-        with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as found:
-            return {m.name: found.extractfile(m).read() for m in found.getmembers()}
-    with zipfile.ZipFile(io.BytesIO(content)) as found:
-        return {name: found.read(name) for name in found.namelist()}
 
 
 @pytest.fixture

@@ -1,11 +1,9 @@
 """An archive over HTTP holds what `posefield export` writes for the same questions."""
 
-import io
 import json
-import tarfile
-import zipfile
 
 import pytest
+from asking import unpacked
 from typer.testing import CliRunner
 
 from service.cli import app as commands
@@ -33,14 +31,6 @@ def exported(models, controls, tmp_path):
         return files, (target / "manifest.jsonl").read_bytes()
 
     return run
-
-
-def unpacked(kind, content):
-    if kind == "tar":
-        with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as found:
-            return {m.name: found.extractfile(m).read() for m in found.getmembers()}
-    with zipfile.ZipFile(io.BytesIO(content)) as found:
-        return {name: found.read(name) for name in found.namelist()}
 
 
 @pytest.mark.parametrize(("kind", "extension"), [("zip", "usdc"), ("tar", "bvh"), ("zip", "json")])

@@ -57,7 +57,7 @@ def each(crowd: CrowdClip, rig: Rig) -> Iterator[Motion]:
 
 def layer(rig: Rig, rate: float, samples: Samples) -> bytes:
     """Binary layer of one motion."""
-    return CRATES.write(Animations(rig.paths, rate, METRES), Content(samples, {}, facts.NONE))
+    return CRATES.write(Animations(rate, METRES, rig.paths), Content(samples, {}, facts.NONE))
 
 
 def _of(crowd: CrowdClip, hull: Hull, batch: Motions) -> Iterator[Motion]:

@@ -149,7 +149,7 @@ def test_layers_say_what_their_clips_are_worth(answers, tmp_path):
 def test_layers_are_as_usd_writes_them(answers, convention):
     many = [answers[index] for index in (0, 1, 0, 2, 1)]
     expected = [
-        crate.ordinary(animation.Animations(take.rig.paths, take.rate, convention), take.content)
+        crate.ordinary(animation.Animations(take.rate, convention, take.rig.paths), take.content)
         for take in takes.bare(many, convention)
     ]
     assert animation.usdc(many, convention) == expected

@@ -10,8 +10,6 @@ from pathlib import Path
 import exporting
 import pytest
 
-from service import cli
-
 POSEFIELD = Path(sys.executable).parent / "posefield"
 HEADING = "name,stature,hip_height,turn,target_height,format,fps\n"
 TABLE = f"{HEADING}low,1.7,0.9,10,0.6,usdc,30\nhigh,1.7,0.9,10,1.4,bvh,60\nusual,1.7,0.9,10,1.0,,\n"
@@ -26,19 +24,11 @@ def table(tmp_path):
 
 
 @pytest.fixture
-def export(model_path, monkeypatch, capsys):
-    """Function that runs the command in this process; gives exit code, output and errors."""
+def export(model_path, posefield):
+    """Function that exports in this process; gives exit code, output and errors."""
 
     def run(*words):
-        argv = ["posefield", "export", str(model_path), *map(str, words), "--workers", "1"]
-        monkeypatch.setattr(sys, "argv", argv)
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as ending:
-            code = ending.code or 0
-        said = capsys.readouterr()
-        return code, said.out, said.err
+        return posefield("export", model_path, *words, "--workers", "1")
 
     return run
 
