@@ -52,6 +52,16 @@ class Net:
         """A list of whole numbers: a shape, axes, starts or ends."""
         return self.weights("indices_" + "_".join(map(str, values)), np.array(values))
 
+    def row_sums(self, terms: str, pairs: str) -> str:
+        """Sums (..., 1) over the last axis of terms (..., n), the same for a row wherever it stands
+        among others; pairs (n, 2): ones.
+
+        ReduceSum adds from where memory is aligned, which differs from row to row, and a product
+        with one column takes rows by fours. A second column leaves each row to itself.
+        """
+        sums = self("MatMul", terms, pairs)
+        return self("Slice", sums, self.indices(0), self.indices(1), self.indices(-1))
+
     def _kind(self, name: str) -> int:
         constant = self._constants.get(name)
         return constant.data_type if constant else TensorProto.FLOAT
