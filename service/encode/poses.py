@@ -6,10 +6,10 @@ import numpy as np
 import orjson
 
 from service.motion.answer import PoseAnswer
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles
 
 
-def json(answer: PoseAnswer) -> bytes:
+def json(answer: PoseAnswer[Any]) -> bytes:
     """One JSON object: schema PoseAnswer of the contract."""
     content = {
         "trust": answer.trust.facts(),
@@ -21,6 +21,6 @@ def json(answer: PoseAnswer) -> bytes:
     return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _short(values: Floats) -> Any:
+def _short(values: Floats | Singles) -> Any:
     """The same as float32, which is what the model answers and takes half the digits."""
     return np.ascontiguousarray(values, dtype=np.float32)

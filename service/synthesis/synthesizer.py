@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from service.motion import roles
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
 from service.motion.card import Control
 from service.motion.clip import assemble
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles
 from service.motion.errors import InvalidField, OutsideSamples
 from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
@@ -39,6 +40,26 @@ class _Question:
 
 
 @dataclass(frozen=True)
+class Moments:
+    """A question for poses that has passed the door, and its times (S,), s."""
+
+    question: _Question
+    when: Floats
+
+    @property
+    def level(self) -> int:
+        """Level of detail."""
+        return self.question.level
+
+
+SAMPLE = 17
+"""Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
+
+Row = tuple[Singles, ...]
+"""ANSWERED of one question: (S, J, 4), (S, 3), (J, 3), and two numbers."""
+
+
+@dataclass(frozen=True)
 class Synthesizer:
     """A named model that answers with poses and clips."""
 
@@ -49,6 +70,16 @@ class Synthesizer:
     def identity(self) -> str:
         """name@contenthash: what an answer under this name will always be."""
         return f"{self.name}@{self.session.digest}"
+
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """Digest of the model's file and of what it answers here in the middle of its controls:
+        machines that round otherwise differ in it."""
+        controls = {control.name: control.default for control in self.session.card.controls}
+        answer = self.pose(controls, [0.0], "warn")
+        arrays = answer.rotations, answer.root_position, answer.bone_offsets
+        parts = self.identity.encode(), *(a.tobytes() for a in arrays)
+        return blake2b(b"".join(parts), digest_size=16).digest()
 
     @cached_property
     def ladder(self) -> Ladder:
@@ -96,21 +127,77 @@ class Synthesizer:
         extrapolate: Policy,
         performer: str | None = None,
         level: int = 0,
-    ) -> PoseAnswer:
+    ) -> PoseAnswer[np.float32]:
         """Poses at times (S,), s from the start of the clip, as a performer of the card moves, or
         somebody who was never seen, at a level of detail.
 
         Raises InvalidField for a control, time, performer or level that cannot be used,
         OutsideSamples where `extrapolate` is "refuse" and a control lies outside its sampled range.
         """
+        asked = self.moments(controls, times, extrapolate, performer, level)
+        return self.posed(asked, self.poses([asked])[0])
+
+    def moments(
+        self,
+        controls: Mapping[str, float],
+        times: Sequence[float],
+        extrapolate: Policy,
+        performer: str | None = None,
+        level: int = 0,
+    ) -> Moments:
+        """The question of `pose` as far as it can be checked before the model is asked."""
         question = self._door(controls, extrapolate, performer, level)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
         when = np.array([limits.number(f"times/{i}", value) for i, value in enumerate(times)])
-        duration = self._duration(question)
-        for index, value in enumerate(when):
-            limits.within(f"times/{index}", value, 0.0, duration, "s")
-        return self._answer(question, when)
+        return Moments(question, when)
+
+    def poses(self, asked: Sequence[Moments]) -> list[Row]:
+        """What the graph says to questions of as many times and of one level, in one call.
+
+        Where `session.exact`, a question gets the same bytes whatever it is asked with.
+        """
+        first = asked[0].question
+        # A product with one row is summed in another order: nobody is asked for alone.
+        alone = len(asked) == 1 and len(asked[0].when) == 1
+        together = [*asked, *asked] if alone else asked
+        points = np.concatenate([each.question.point for each in together])
+        labels = np.concatenate([each.question.labels for each in together])
+        when = np.stack([each.when for each in together])
+        answers = self.session.run(points, when, *ANSWERED, labels=labels, level=first.level)
+        return [tuple(answer[row] for answer in answers) for row in range(len(asked))]
+
+    def exact(self, level: int) -> bool:
+        """Whether `poses` gives each of many questions the bytes that it gets alone, as a sample of
+        questions says; files of old versions sum by where a question stands among others."""
+        if level not in self._exact:
+            asked = [self._sample(share, level) for share in np.linspace(0.0, 1.0, SAMPLE)]
+            alone = (self.poses([each])[0] for each in asked)
+            both = zip(self.poses(asked), alone, strict=True)
+            self._exact[level] = all(
+                np.array_equal(a, b) for row, own in both for a, b in zip(row, own, strict=True)
+            )
+        return self._exact[level]
+
+    @cached_property
+    def _exact(self) -> dict[int, bool]:
+        return {}
+
+    def _sample(self, share: float, level: int) -> Moments:
+        """A question at a share of each control's range, and of the shortest clip."""
+        card = self.session.card
+        controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
+        return self.moments(controls, [share * card.durations[0]], "warn", None, level)
+
+    def posed(self, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
+        """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
+        rotations, root, offsets, length, sigma = row
+        duration = self._sensible(float(length))
+        if not (asked.when.min() >= 0.0 and asked.when.max() <= duration):
+            for index, value in enumerate(asked.when):
+                limits.within(f"times/{index}", value, 0.0, duration, "s")
+        trust = self._trust(asked.question, duration, float(sigma))
+        return PoseAnswer(asked.when, rotations, root, offsets, trust)
 
     def clip(self, asked: ClipQuestion) -> ClipAnswer:
         """Clip of the question; frame i is the pose at start + i / fps.
@@ -166,13 +253,17 @@ class Synthesizer:
     def _duration(self, question: _Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
         durations = self.session.durations(question.point, question.labels, question.level)
-        duration = float(durations[0])
+        return self._sensible(float(durations[0]))
+
+    def _sensible(self, duration: float) -> float:
         low, high = limits.durations(self.session.card)
         if not low <= duration <= high:
             raise OutsideSamples("controls", limits.senseless(self.session.card, duration))
         return duration
 
-    def _routed(self, question: _Question, answer: PoseAnswer, asked: ClipQuestion) -> PoseAnswer:
+    def _routed(
+        self, question: _Question, answer: PoseAnswer[np.float64], asked: ClipQuestion
+    ) -> PoseAnswer[np.float64]:
         """The answer in place, or closed, as asked for."""
         card = self.session.card
         measure = stride.strides if card.cyclic else stride.straight
@@ -181,19 +272,16 @@ class Synthesizer:
         answer = course.in_place(answer, way) if stays else answer
         return course.closed(answer, None if stays else way) if asked.loop else answer
 
-    def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
+    def _answer(self, question: _Question, when: Floats) -> PoseAnswer[np.float64]:
         answers = self._run(question, when[None], *ANSWERED)
         rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
-        trust = Trust(
-            self.identity,
-            question.controls,
-            float(duration),
-            float(sigma),
-            question.warnings,
-            question.performer,
-            question.level,
-        )
+        trust = self._trust(question, float(duration), float(sigma))
         return PoseAnswer(when, rotations, root, offsets, trust)
+
+    def _trust(self, question: _Question, duration: float, sigma: float) -> Trust:
+        controls, warnings = question.controls, question.warnings
+        who, level = question.performer, question.level
+        return Trust(self.identity, controls, duration, sigma, warnings, who, level)
 
     def _run(self, question: _Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Awaitable, Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from anyio import CapacityLimiter, to_thread
@@ -14,22 +14,25 @@ from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, pose
 from service.encode import crowd as crowd_usd
 from service.encode.packs import PACKS, Pack
 from service.export import pack as packing
-from service.motion.answer import PoseAnswer
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.library import Library
-from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.synthesizer import Moments, Row, Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
     answers,
     body,
+    caching,
     clips_query,
     contract,
     crowd_query,
+    metrics,
     query,
     sending,
     walk_query,
 )
+from service.web.batching import Batcher
+from service.web.log import Lines
 from service.web.query import FileQuestion, PoseQuestion
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
@@ -45,6 +48,13 @@ class Service:
     library: Library
     settings: Settings
     source: bytes
+    lines: Lines | None = None
+    code: bytes = field(default_factory=caching.code)
+    batcher: Batcher = field(default_factory=Batcher)
+
+    def lifetime(self, model: str) -> bytes:
+        """How long an answer may be used unasked, by the model's name in its path."""
+        return caching.lifetime(model, self.settings.alias_seconds)
 
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
@@ -68,14 +78,14 @@ async def get_pose(service: Service, request: Request) -> Response:
     """Poses asked for by query parameters."""
     model = _model(service, request)
     question = query.pose_of_pairs(request.query_params.multi_items())
-    return await _pose(model, question)
+    return await _pose(service, model, question)
 
 
 async def query_pose(service: Service, request: Request) -> Response:
     """Poses asked for by a body."""
     model = _model(service, request)
     content = await body.read(request, service.settings.body_limit)
-    return await _pose(model, query.pose_of_body(content))
+    return await _pose(service, model, query.pose_of_body(content))
 
 
 async def get_clip(encoder: Encoder, service: Service, request: Request) -> Response:
@@ -154,6 +164,11 @@ async def ready(service: Service, request: Request) -> Response:
     return answers.document({"status": "ready", "models": identities})
 
 
+async def get_metrics(service: Service, request: Request) -> Response:
+    """What is counted, for Prometheus."""
+    return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
+
+
 async def get_contract(service: Service, request: Request) -> Response:
     """The contract, byte for byte."""
     return Response(service.source, media_type=contract.MEDIA_TYPE)
@@ -169,6 +184,7 @@ OPERATIONS: dict[str, Handler] = {
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
     **{f"getCrowd{n.capitalize()}": partial(get_crowd, n) for n in crowd_usd.STREAMS},
     **{f"queryClips{n.capitalize()}": partial(query_clips, ENCODERS, p) for n, p in PACKS.items()},
+    "getMetrics": get_metrics,
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,
@@ -177,19 +193,23 @@ OPERATIONS: dict[str, Handler] = {
 
 
 def _model(service: Service, request: Request) -> Synthesizer:
-    return service.library.find(request.path_params["model"])
+    """The model of the request's path, which was found before the operation began."""
+    found: Synthesizer = request.scope["model"]
+    return found
 
 
-async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
-    answer: PoseAnswer = model.pose(
-        question.controls,
-        question.times,
-        question.extrapolate,
-        question.performer,
-        question.level,
-    )
-    content = await _made(len(answer.times) <= INLINE_POSES, partial(poses.json, answer))
+async def _pose(service: Service, model: Synthesizer, question: PoseQuestion) -> Response:
+    controls, times, policy = question.controls, question.times, question.extrapolate
+    asked = model.moments(controls, times, policy, question.performer, question.level)
+    if len(times) > INLINE_POSES:
+        content = await run_in_threadpool(_posed, model, asked, None)
+    else:
+        content = _posed(model, asked, await service.batcher.row(model, asked))
     return Response(content, media_type="application/json")
+
+
+def _posed(model: Synthesizer, asked: Moments, row: Row | None) -> bytes:
+    return poses.json(model.posed(asked, row or model.poses([asked])[0]))
 
 
 async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) -> Response:

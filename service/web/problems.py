@@ -37,9 +37,12 @@ NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
+OVERLOADED = Kind(503, "overloaded", "The service has too much to do; ask again soon")
+LATE = Kind(503, "late", "The answer took too long")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
 OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)
+OF_LOAD = (OVERLOADED, LATE)
 
 TABLE: dict[type[QueryError], Kind] = {
     UnknownModel: Kind(404, "unknown-model", "No model of that name"),
@@ -71,16 +74,14 @@ class RequestFault(Exception):
         self.headers = headers
 
 
-async def of_fault(request: Request, fault: Exception) -> Response:
+def of_fault(request: Request, fault: RequestFault) -> Response:
     """Answer to a request that breaks the contract."""
-    assert isinstance(fault, RequestFault)
     errors = [{**fault.place, "detail": fault.detail}] if fault.place else []
     return _answer(request, fault.kind, fault.detail, errors, fault.headers)
 
 
-async def of_query_error(request: Request, error: Exception) -> Response:
+def of_query_error(request: Request, error: QueryError) -> Response:
     """Answer to a question that has none."""
-    assert isinstance(error, QueryError)
     place = _place(error, in_body=request.method == "POST")
     errors = [{**place, "detail": error.message}]
     return _answer(request, TABLE[type(error)], str(error), errors)

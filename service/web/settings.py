@@ -17,7 +17,9 @@ class Settings:
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
-    seconds that open requests get to finish after SIGTERM.
+    seconds that open requests get to finish after SIGTERM. concurrency: requests that a process
+    answers at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long
+    caches may use an answer under a model's plain name without asking whether it is the newest's.
     """
 
     host: str = "127.0.0.1"
@@ -33,6 +35,10 @@ class Settings:
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
     grace: int = 10
+    # A pose takes a tenth of a millisecond, a thousand in flight a tenth of a second.
+    concurrency: int = 1000
+    deadline: int = 30
+    alias_seconds: int = 0
 
     def __post_init__(self) -> None:
         _within("port", self.port, 0, 65535)
@@ -44,6 +50,9 @@ class Settings:
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
         _within("grace", self.grace, 0, 600)
+        _within("concurrency", self.concurrency, 1, 1_000_000)
+        _within("deadline", self.deadline, 1, 3600)
+        _within("alias_seconds", self.alias_seconds, 0, 31_536_000)
 
 
 def read(

@@ -12,12 +12,12 @@ from typing import Any
 
 import httpx
 import uvicorn
-from starlette.applications import Starlette
+from starlette.types import ASGIApp
 
 Ask = Callable[..., httpx.Response]
 
 
-def asker(app: Starlette) -> Ask:
+def asker(app: ASGIApp) -> Ask:
     async def send(method: str, url: str, **content: Any) -> httpx.Response:
         transport = httpx.ASGITransport(app)
         async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
@@ -27,7 +27,7 @@ def asker(app: Starlette) -> Ask:
 
 
 @contextmanager
-def listening(app: Starlette) -> Iterator[str]:
+def listening(app: ASGIApp) -> Iterator[str]:
     """Address of the app, which listens on a socket in a thread of this process."""
     config = uvicorn.Config(app, port=0, lifespan="off", log_config=None)
     server = uvicorn.Server(config)
