@@ -13,6 +13,7 @@ from service.synthesis.library import Library
 from service.web import contract, problems
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
+from service.web.log import Lines
 from service.web.operations import OPERATIONS, Handler, Service
 from service.web.problems import RequestFault
 from service.web.routing import Map, Route
@@ -26,20 +27,24 @@ FORMATS = {
 }
 
 
-def create_app(library: Library, settings: Settings) -> ASGIApp:
-    """Application that answers for the models of a library."""
-    return build(contract.load(), OPERATIONS, library, settings)
+def create_app(library: Library, settings: Settings, lines: Lines | None = None) -> ASGIApp:
+    """Application that answers for the models of a library, and tells of requests in lines."""
+    return build(contract.load(), OPERATIONS, library, settings, lines)
 
 
 def build(
-    agreed: Contract, handlers: Mapping[str, Handler], library: Library, settings: Settings
+    agreed: Contract,
+    handlers: Mapping[str, Handler],
+    library: Library,
+    settings: Settings,
+    lines: Lines | None = None,
 ) -> "App":
     """Application of a contract and the handlers of its operations.
 
     Raises ValueError for an operation without a handler and a handler without an operation.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
-    service = Service(library, settings, agreed.source)
+    service = Service(library, settings, agreed.source, lines)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

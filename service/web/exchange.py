@@ -5,7 +5,7 @@ import os
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
@@ -16,6 +16,7 @@ from starlette.types import Message, Receive, Scope, Send
 from service.motion.errors import QueryError
 from service.web import caching, compression, deadline, log, metrics, problems
 from service.web.contract import Operation
+from service.web.deadline import Watch
 from service.web.operations import Service
 from service.web.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
 from service.web.routing import Map, Place, Route
@@ -37,6 +38,7 @@ class Site:
     service: Service
     missing: Callable[[str], Exception]
     open: int = 0
+    watch: Watch = field(default_factory=Watch)
 
 
 class Exchange:
@@ -99,7 +101,7 @@ class Exchange:
         self._route = route
         self._prepare(route)
         limit = deadline.seconds(self._headers.get(b"prefer"), site.service.settings.deadline)
-        return await deadline.within(limit, route.endpoint(self._request))
+        return await site.watch.within(limit, route.endpoint(self._request))
 
     def _prepare(self, route: Route) -> None:
         """Refuse what needs no model, find the model, and see whether the client has the answer."""

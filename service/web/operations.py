@@ -77,7 +77,7 @@ async def get_model(service: Service, request: Request) -> Response:
 async def get_pose(service: Service, request: Request) -> Response:
     """Poses asked for by query parameters."""
     model = _model(service, request)
-    question = query.pose_of_pairs(request.query_params.multi_items())
+    question = query.pose_of_pairs(query.pairs(request.scope["query_string"]))
     return await _pose(service, model, question)
 
 
@@ -91,7 +91,7 @@ async def query_pose(service: Service, request: Request) -> Response:
 async def get_clip(encoder: Encoder, service: Service, request: Request) -> Response:
     """A clip in the encoder's format, asked for by query parameters."""
     model = _model(service, request)
-    question = query.file_of_pairs(request.query_params.multi_items())
+    question = query.file_of_pairs(query.pairs(request.scope["query_string"]))
     return await _clip(model, question, encoder)
 
 
@@ -117,7 +117,7 @@ def _crowd(model: Synthesizer, encoder: CrowdEncoder, content: bytes, most: floa
 
 async def get_crowd(ending: str, service: Service, request: Request) -> Response:
     """A crowd that walks, as USD that is sent while it is made."""
-    model, pairs = _model(service, request), request.query_params.multi_items()
+    model, pairs = _model(service, request), query.pairs(request.scope["query_string"])
     question = walk_query.of_pairs(pairs, service.settings)
     made, pieces = await to_thread.run_sync(_walking, model, question, ending, limiter=CROWDS)
     name, media_type = f"{model.name}.{ending}", ENCODERS[ending].media_type

@@ -9,6 +9,7 @@ from pathlib import Path
 import uvicorn
 
 from service.synthesis import library
+from service.web import log
 from service.web.app import create_app
 from service.web.settings import Settings
 
@@ -19,8 +20,9 @@ def serve(paths: Sequence[Path], settings: Settings) -> None:
     Raises ModelError, before anything listens, for a file that cannot be served.
     """
     loaded = library.load(paths)
+    lines = log.to_standard_error() if settings.log == "on" else None
     config = uvicorn.Config(
-        create_app(loaded, settings),
+        create_app(loaded, settings, lines),
         host=settings.host,
         port=settings.port,
         # Named, not "auto": without them the service would run at a fraction of its speed.
@@ -37,6 +39,8 @@ def serve(paths: Sequence[Path], settings: Settings) -> None:
     for ending in (signal.SIGTERM, signal.SIGINT):
         signal.signal(ending, lambda *_: None)
     _Server(config, list(loaded.models)).run()
+    if lines is not None:
+        lines.flush()
 
 
 class _Server(uvicorn.Server):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from service.motion.errors import InvalidField
 
 PREFIX = "POSEFIELD_"
+TEXTS = ("host", "log")
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Settings:
     seconds that open requests get to finish after SIGTERM. concurrency: requests that a process
     answers at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long
     caches may use an answer under a model's plain name without asking whether it is the newest's.
+    log: whether each request is told on standard error, in one line.
     """
 
     host: str = "127.0.0.1"
@@ -39,6 +41,7 @@ class Settings:
     concurrency: int = 1000
     deadline: int = 30
     alias_seconds: int = 0
+    log: str = "on"
 
     def __post_init__(self) -> None:
         _within("port", self.port, 0, 65535)
@@ -53,6 +56,8 @@ class Settings:
         _within("concurrency", self.concurrency, 1, 1_000_000)
         _within("deadline", self.deadline, 1, 3600)
         _within("alias_seconds", self.alias_seconds, 0, 31_536_000)
+        if self.log not in ("on", "off"):
+            raise InvalidField(PREFIX + "LOG", f"{self.log!r}, expected on or off")
 
 
 def read(
@@ -73,7 +78,7 @@ def read(
 
 
 def _parse(name: str, text: str) -> str | int:
-    if name == "host":
+    if name in TEXTS:
         return text
     if not (text.isascii() and text.isdigit()):
         raise InvalidField(PREFIX + name.upper(), f"{text!r}, expected a whole number")

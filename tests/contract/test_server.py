@@ -1,6 +1,7 @@
 """The real process on a real socket: it answers, ends when told to, and refuses bad models."""
 
 import contextlib
+import json
 import os
 import signal
 import socket
