@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from weakref import WeakValueDictionary
@@ -51,6 +51,7 @@ class Intake:
         self._signatures: dict[str, str] | None = None
         self._read: dict[str, str] = {}
         self._held: dict[str, tuple[Found, Synthesizer]] = {}
+        self._released: set[str] = set()
         self._alive: WeakValueDictionary[str, Synthesizer] = WeakValueDictionary()
         self.faults: dict[str, Fault] = {}
         self.opened = self.failed = 0
@@ -60,15 +61,35 @@ class Intake:
         known, self.faults = self.faults, {}
         wanted = self._wanted(known)
         moving = self._moving()
-        for found, source in wanted.values():
-            if found.place in moving or self._read.get(found.place) == found.signature:
-                self._still(found.place, known)
-            else:
-                self._take(found, source, known)
-        for place in self._read.keys() - wanted.keys() - moving:
-            self._held.pop(place, None)
-            del self._read[place]
+        for versions in wanted:
+            for found in versions:
+                if found.place not in moving and self._is_due(found, versions):
+                    self._take(found, known)
+                elif found.place in known:
+                    self.faults[found.place] = known[found.place]
+        places = {found.place for versions in wanted for found in versions}
+        for place in self._read.keys() - places - moving:
+            self._forget(place)
         return not moving
+
+    def _is_due(self, found: Found, versions: list[Found]) -> bool:
+        """Whether to read a file: it is new, or was released and is the newest now."""
+        if self._read.get(found.place) != found.signature:
+            return True
+        newest = next((f for f in versions if f.place in self._held.keys() | self._released), found)
+        return found.place in self._released and newest.place == found.place
+
+    def _forget(self, place: str) -> None:
+        self._held.pop(place, None)
+        self._released.discard(place)
+        del self._read[place]
+
+    def release(self, held: Collection[str]) -> None:
+        """Hold no other models than of these identities."""
+        for place, (_, model) in [*self._held.items()]:
+            if model.identity not in held:
+                del self._held[place]
+                self._released.add(place)
 
     def versions(self) -> dict[str, list[Synthesizer]]:
         """Models by name, the newest version of each first."""
@@ -80,20 +101,20 @@ class Intake:
         for fault in self.faults.values():
             raise fault.error
 
-    def _wanted(self, known: dict[str, Fault]) -> dict[str, tuple[Found, Source]]:
-        """The files to be held, by place: of each name the newest few."""
+    def _wanted(self, known: dict[str, Fault]) -> list[list[Found]]:
+        """The files to be held: of each name the newest few, the newest first."""
         owners: dict[str, tuple[str, bool]] = {}
-        wanted: dict[str, tuple[Found, Source]] = {}
+        wanted = []
         for place, source in self._sources.items():
             for name, versions in sources.by_name(self._look(place, source, known)).items():
                 # A file NAME.onnx and a folder NAME of versions are two places, too.
-                owners.setdefault(name, _owner(place, versions[0]))
-                own = [found for found in versions if owners[name] == _owner(place, found)]
+                owner = owners.setdefault(name, (place, versions[0].version == ""))
+                own = [found for found in versions if (place, found.version == "") == owner]
                 for found in versions:
                     if found not in own:
                         error = ModelError(found.place, f"a second model named {name!r}")
                         self._fail(found.place, Fault(name, found.version, error), known)
-                wanted |= {found.place: (found, source) for found in own[: self._most]}
+                wanted.append(own[: self._most])
         return wanted
 
     def _look(self, place: str, source: Source, known: dict[str, Fault]) -> list[Found]:
@@ -111,16 +132,13 @@ class Intake:
         self._signatures = now
         return {p for p in now.keys() | before.keys() if now.get(p) != before.get(p)}
 
-    def _still(self, place: str, known: dict[str, Fault]) -> None:
-        if place in known:
-            self.faults[place] = known[place]
-
-    def _take(self, found: Found, source: Source, known: dict[str, Fault]) -> None:
+    def _take(self, found: Found, known: dict[str, Fault]) -> None:
         try:
-            content = source.read(found)
+            content = found.read()
             # What could be read and not be used is not tried again before it changes.
             self._read[found.place] = found.signature
             self._held[found.place] = found, self._opened(found, content)
+            self._released.discard(found.place)
         except ModelError as error:
             self._fail(found.place, Fault(found.name, found.version, error), known)
 
@@ -138,7 +156,3 @@ class Intake:
         if place not in known or str(known[place].error) != str(fault.error):
             self.failed += 1
             log.warning("%s", fault.error)
-
-
-def _owner(place: str, found: Found) -> tuple[str, bool]:
-    return place, found.version == ""

@@ -35,10 +35,9 @@ class Library:
         return (newest, *(m for m in self.older if m.name == name)) if newest else ()
 
     @property
-    def identities(self) -> tuple[tuple[str, ...], ...]:
-        """What is newest, and what else is here."""
-        groups = self.models.values(), self.older
-        return tuple(tuple(model.identity for model in group) for group in groups)
+    def identities(self) -> tuple[str, ...]:
+        """Of the newest, and then of the older ones."""
+        return tuple(model.identity for model in chain(self.models.values(), self.older))
 
     @cached_property
     def _by_key(self) -> dict[str, Synthesizer]:
@@ -71,11 +70,13 @@ def arranged(
     declared: Mapping[str, Sequence[Synthesizer]], before: Library, bounds: Bounds
 ) -> Library:
     """Library of the versions that each name has now, the newest first, and of those that answered
-    before, as far as the bounds leave room: what is furthest from the newest goes first."""
+    before, as far as the bounds leave room: what has answered stays longest, and what is furthest
+    from the newest goes first."""
     models: dict[str, Synthesizer] = {}
     ranked: list[tuple[int, Synthesizer]] = []
     for name, versions in declared.items():
-        every = {model.identity: model for model in (*versions, *before.versions(name))}
+        by_rank = versions[0], *before.versions(name), *versions[1:]
+        every = {model.identity: model for model in by_rank}
         models[name], *rest = every.values()
         ranked += enumerate(rest[: bounds.older])
     ranked.sort(key=lambda entry: entry[0])

@@ -47,28 +47,33 @@ class Objects:
             raise ModelError(self.url, f"no {ENDING} object under this URL")
         return found
 
-    def read(self, found: Found) -> bytes:
-        """Content of an object that was found, if it is still the same."""
-        try:
-            got = obstore.get(self._store, found.place.removeprefix(f"{self._base}/"))
-            if _signature(got.meta) != found.signature:
-                raise ModelError(found.place, "changed while it was read")
-            return bytes(got.bytes())
-        except (BaseError, OSError, ValueError) as fault:
-            raise _refusal(found.place, fault) from fault
-
     def _alone(self) -> Found:
-        name = self.url.rpartition("/")[2]
-        signature = _signature(obstore.head(self._store, name))
-        return Found(self.url, name.removesuffix(ENDING), "", signature)
+        path = self.url.rpartition("/")[2]
+        return self._found(obstore.head(self._store, path), path.removesuffix(ENDING), "")
 
     def _listed(self) -> list[Found]:
         metas = (m for batch in obstore.list(self._store, chunk_size=LISTED) for m in batch)
         return [
-            Found(f"{self._base}/{meta['path']}", *place, _signature(meta))
+            self._found(meta, *place)
             for meta in sorted(metas, key=lambda meta: str(meta["path"]))
             if (place := named(meta["path"]))
         ]
+
+    def _found(self, meta: Any, name: str, version: str) -> Found:
+        signature, place = _signature(meta), f"{self._base}/{meta['path']}"
+        return Found(place, name, version, signature, lambda: self._read(meta["path"], signature))
+
+    def _read(self, path: str, signature: str) -> bytes:
+        """Content of an object, if it is still the same."""
+        place = f"{self._base}/{path}"
+        try:
+            got = obstore.get(self._store, path)
+            content, read = bytes(got.bytes()), _signature(got.meta)
+        except (BaseError, OSError, ValueError) as fault:
+            raise _refusal(place, fault) from fault
+        if read != signature:
+            raise ModelError(place, "cannot be read: it has changed meanwhile")
+        return content
 
 
 def _signature(meta: Any) -> str:

@@ -80,6 +80,7 @@ class Shelf:
         at once more. For one thread at a time."""
         settled = self._intake.look()
         found = library.arranged(self._intake.versions(), self.library, self._bounds)
+        self._intake.release(found.identities)
         if changed := found.identities != self.library.identities:
             self.library = found
         self.reloads = self._reloads(changed)

@@ -5,8 +5,9 @@ it. What begins with a point is somebody's temporary file.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Protocol
 from urllib.parse import unquote, urlsplit
@@ -26,13 +27,14 @@ class Found:
     """A model file as a look at its source found it.
 
     place: its path or URL. version: what its name says besides the model's, empty for the only one.
-    signature: differs whenever the content does.
+    signature: differs whenever the content does. read: gives the content, or raises ModelError.
     """
 
     place: str
     name: str
     version: str
     signature: str
+    read: Callable[[], bytes]
 
     @property
     def order(self) -> Order:
@@ -42,13 +44,10 @@ class Found:
 
 
 class Source(Protocol):
-    """A place of model files. Both methods raise ModelError where it is not what it should be."""
+    """A place of model files."""
 
     def look(self) -> list[Found]:
-        """What is there now, at least one."""
-
-    def read(self, found: Found) -> bytes:
-        """Content of a file that was found."""
+        """What is there now, at least one; ModelError where it is not what it should be."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +59,6 @@ class File:
     def look(self) -> list[Found]:
         """The file."""
         return [_found(self.path, self.path.stem, "")]
-
-    def read(self, found: Found) -> bytes:
-        """Content of the file."""
-        return session.read(self.path)
 
 
 @dataclass(frozen=True)
@@ -81,10 +76,6 @@ class Folder:
         if not found:
             raise ModelError(self.path, f"no {ENDING} file in this folder")
         return found
-
-    def read(self, found: Found) -> bytes:
-        """Content of a file that was found."""
-        return session.read(Path(found.place))
 
 
 def source(place: str | Path) -> Source:
@@ -132,4 +123,4 @@ def _found(path: Path, name: str, version: str) -> Found:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
     # Renaming onto a file changes its inode, writing into it its time.
     signature = f"{facts.st_ino} {facts.st_size} {facts.st_mtime_ns}"
-    return Found(str(path), name, version, signature)
+    return Found(str(path), name, version, signature, partial(session.read, path))

@@ -165,6 +165,18 @@ def test_what_is_held_no_longer_is_freed(put, tmp_path):
     assert len(alive) == 1
 
 
+def test_a_version_that_had_no_room_is_opened_when_it_is_the_newest(put, tmp_path):
+    old, new = put("walk/1.onnx", 1), put("walk/2.onnx", 2)
+    shelf = Shelf([tmp_path], Bounds(older=2, memory=0))
+    assert identities(shelf) == [f"walk@{new}"] and not shelf.library.older
+    for _ in range(3):
+        shelf.look()
+    assert shelf.reloads.opened == 2
+    (tmp_path / "walk/2.onnx").unlink()
+    followed(shelf)
+    assert identities(shelf) == [f"walk@{old}"]
+
+
 def test_a_folder_of_versions_answers_with_the_highest_and_holds_the_next(put, tmp_path):
     digests = {n: put(f"walk/{n}.onnx", n) for n in (2, 10, 9, 1)}
     shelf = Shelf([tmp_path], ROOM)
