@@ -18,10 +18,12 @@ from service.encode import CROWD_ENCODERS, ENCODERS, crowd
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
+from service.synthesis.shelf import Fixed
 from service.web import contract, problems
 from service.web.contract import Contract, Operation
 from service.web.operations import OPERATIONS, Handler, Service
 from service.web.problems import RequestFault
+from service.web.readiness import Readiness
 from service.web.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -35,20 +37,25 @@ FORMATS = {
 }
 
 
-def create_app(library: Library, settings: Settings) -> Starlette:
-    """Application that answers for the models of a library."""
-    return build(contract.load(), OPERATIONS, library, settings)
+def create_app(models: Library | Readiness, settings: Settings) -> Starlette:
+    """Application that answers for the models of a library, or for those of a shelf, and that may
+    be told to turn requests away."""
+    return build(contract.load(), OPERATIONS, models, settings)
 
 
 def build(
-    agreed: Contract, handlers: Mapping[str, Handler], library: Library, settings: Settings
+    agreed: Contract,
+    handlers: Mapping[str, Handler],
+    models: Library | Readiness,
+    settings: Settings,
 ) -> Starlette:
     """Application of a contract and the handlers of its operations.
 
     Raises ValueError for an operation without a handler and a handler without an operation.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
-    service = Service(library, settings, agreed.source)
+    readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
+    service = Service(readiness, settings, agreed.source)
     paths = dict.fromkeys(operation.path for operation in agreed.operations)
     app = Starlette(
         routes=[_route(path, agreed, handlers, service) for path in paths],

@@ -31,6 +31,7 @@ from service.web import (
     walk_query,
 )
 from service.web.query import FileQuestion, PoseQuestion
+from service.web.readiness import Readiness
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
 
@@ -42,9 +43,14 @@ INLINE_POSES = 200
 class Service:
     """What every operation may use."""
 
-    library: Library
+    readiness: Readiness
     settings: Settings
     source: bytes
+
+    @property
+    def library(self) -> Library:
+        """The models as they are now: to be taken once a request."""
+        return self.readiness.models.library
 
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
@@ -149,9 +155,8 @@ async def live(service: Service, request: Request) -> Response:
 
 
 async def ready(service: Service, request: Request) -> Response:
-    """Which models answer: they were loaded and asked once before the service listened."""
-    identities = [model.identity for model in service.library.models.values()]
-    return answers.document({"status": "ready", "models": identities})
+    """Which models answer, each having been asked just now."""
+    return answers.document(service.readiness.document())
 
 
 async def get_contract(service: Service, request: Request) -> Response:

@@ -37,6 +37,7 @@ NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
+NOT_READY = Kind(503, "not-ready", "The service should not be sent requests now")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
 OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)

@@ -17,7 +17,11 @@ class Settings:
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
-    seconds that open requests get to finish after SIGTERM.
+    seconds that open requests get to finish after SIGTERM, and drain: seconds before that in which
+    the service still listens, but says that it is not ready. workers: processes that share the
+    port; 0 for as many as there are processors. reload: seconds from a look for new models to the
+    next; 0 for never. versions: older versions of a model that answer under their hash, and
+    versions_memory: bytes that all of those may take.
     """
 
     host: str = "127.0.0.1"
@@ -33,6 +37,11 @@ class Settings:
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
     grace: int = 10
+    drain: int = 0
+    workers: int = 1
+    reload: int = 10
+    versions: int = 2
+    versions_memory: int = 64 * 1024 * 1024
 
     def __post_init__(self) -> None:
         _within("port", self.port, 0, 65535)
@@ -44,6 +53,11 @@ class Settings:
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
         _within("grace", self.grace, 0, 600)
+        _within("drain", self.drain, 0, 600)
+        _within("workers", self.workers, 0, 256)
+        _within("reload", self.reload, 0, 86_400)
+        _within("versions", self.versions, 0, 1000)
+        _within("versions_memory", self.versions_memory, 0, 1 << 40)
 
 
 def read(
