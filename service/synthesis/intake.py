@@ -1,6 +1,5 @@
 """Model files taken in from their sources, look by look: opened once settled, once a content."""
 
-import logging
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -11,8 +10,6 @@ from service.motion.errors import ModelError
 from service.synthesis import session, sources
 from service.synthesis.sources import Found, Source
 from service.synthesis.synthesizer import Synthesizer
-
-log = logging.getLogger(__name__)
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 
@@ -155,4 +152,3 @@ class Intake:
         self.faults[place] = fault
         if place not in known or str(known[place].error) != str(fault.error):
             self.failed += 1
-            log.warning("%s", fault.error)

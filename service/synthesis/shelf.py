@@ -72,12 +72,20 @@ class Shelf:
         self.reloads = Reloads()
         self._bounds = bounds
         self._intake = Intake(places, most=1 + bounds.older)
-        self.look()
+        self._take()
         self._intake.check()
 
     def look(self) -> bool:
         """Take what the sources hold now; False where something has just changed and must be looked
         at once more. For one thread at a time."""
+        known = {str(fault.error) for fault in self.reloads.faults}
+        settled = self._take()
+        for fault in self.reloads.faults:
+            if str(fault.error) not in known:
+                log.warning("%s", fault.error)
+        return settled
+
+    def _take(self) -> bool:
         settled = self._intake.look()
         found = library.arranged(self._intake.versions(), self.library, self._bounds)
         self._intake.release(found.identities)
