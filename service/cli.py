@@ -242,14 +242,17 @@ app.command()(exports.export)
 
 @app.command()
 def serve(
-    paths: Annotated[list[Path], typer.Argument(help="model files, or folders of them")],
+    places: Annotated[
+        list[str],
+        typer.Argument(help="model files, folders of them, or URLs of object stores"),
+    ],
     host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
     port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
 ) -> None:
     """Answer over HTTP for the models given, until interrupted."""
     from service.web import server, settings
 
-    server.serve(paths, settings.read(host=host, port=port))
+    server.serve(places, settings.read(host=host, port=port))
 
 
 @app.command()

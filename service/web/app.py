@@ -4,18 +4,20 @@ import re
 from collections.abc import Mapping
 from functools import partial
 
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Receive, Scope, Send
 
 from service.encode import CROWD_ENCODERS, ENCODERS, crowd
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
+from service.synthesis.shelf import Fixed
 from service.web import contract, problems
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
 from service.web.log import Lines
 from service.web.operations import OPERATIONS, Handler, Service
 from service.web.problems import RequestFault
+from service.web.readiness import Readiness
 from service.web.routing import Map, Route
 from service.web.settings import Settings
 
@@ -27,15 +29,18 @@ FORMATS = {
 }
 
 
-def create_app(library: Library, settings: Settings, lines: Lines | None = None) -> ASGIApp:
-    """Application that answers for the models of a library, and tells of requests in lines."""
-    return build(contract.load(), OPERATIONS, library, settings, lines)
+def create_app(
+    models: Library | Readiness, settings: Settings, lines: Lines | None = None
+) -> "App":
+    """Application that answers for the models of a library, or for those of a shelf, that may be
+    told to turn requests away, and tells of requests in lines."""
+    return build(contract.load(), OPERATIONS, models, settings, lines)
 
 
 def build(
     agreed: Contract,
     handlers: Mapping[str, Handler],
-    library: Library,
+    models: Library | Readiness,
     settings: Settings,
     lines: Lines | None = None,
 ) -> "App":
@@ -44,7 +49,8 @@ def build(
     Raises ValueError for an operation without a handler and a handler without an operation.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
-    service = Service(library, settings, agreed.source, lines)
+    readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
+    service = Service(readiness, settings, agreed.source, lines)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

@@ -5,8 +5,11 @@ answers for all; prometheus_client reads that variable when it is imported.
 """
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import prometheus_client as prometheus
 from prometheus_client import multiprocess
@@ -79,6 +82,14 @@ def page() -> bytes:
     registry = prometheus.CollectorRegistry()
     multiprocess.MultiProcessCollector(registry)
     return prometheus.generate_latest(registry)
+
+
+@contextmanager
+def shared() -> Iterator[str]:
+    """A folder for the counters of several processes, gone with this one."""
+    with TemporaryDirectory(prefix="posefield-metrics-") as folder:
+        os.environ[FOLDER] = folder
+        yield folder
 
 
 def gone(process: int) -> None:

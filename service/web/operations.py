@@ -34,6 +34,7 @@ from service.web import (
 from service.web.batching import Batcher
 from service.web.log import Lines
 from service.web.query import FileQuestion, PoseQuestion
+from service.web.readiness import Readiness
 from service.web.settings import Settings
 from service.web.walk_query import WalkQuestion
 
@@ -45,7 +46,7 @@ INLINE_POSES = 200
 class Service:
     """What every operation may use."""
 
-    library: Library
+    readiness: Readiness
     settings: Settings
     source: bytes
     lines: Lines | None = None
@@ -55,6 +56,11 @@ class Service:
     def lifetime(self, model: str) -> bytes:
         """How long an answer may be used unasked, by the model's name in its path."""
         return caching.lifetime(model, self.settings.alias_seconds)
+
+    @property
+    def library(self) -> Library:
+        """The models as they are now: to be taken once a request."""
+        return self.readiness.models.library
 
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
@@ -159,9 +165,8 @@ async def live(service: Service, request: Request) -> Response:
 
 
 async def ready(service: Service, request: Request) -> Response:
-    """Which models answer: they were loaded and asked once before the service listened."""
-    identities = [model.identity for model in service.library.models.values()]
-    return answers.document({"status": "ready", "models": identities})
+    """Which models answer, each having been asked just now."""
+    return answers.document(service.readiness.document())
 
 
 async def get_metrics(service: Service, request: Request) -> Response:

@@ -39,10 +39,11 @@ BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
 OVERLOADED = Kind(503, "overloaded", "The service has too much to do; ask again soon")
 LATE = Kind(503, "late", "The answer took too long")
+NOT_READY = Kind(503, "not-ready", "The service should not be sent requests now")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
 OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)
-OF_LOAD = (OVERLOADED, LATE)
+OF_LOAD = (OVERLOADED, LATE, NOT_READY)
 
 TABLE: dict[type[QueryError], Kind] = {
     UnknownModel: Kind(404, "unknown-model", "No model of that name"),

@@ -22,6 +22,11 @@ class Settings:
     answers at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long
     caches may use an answer under a model's plain name without asking whether it is the newest's.
     log: whether each request is told on standard error, in one line.
+    seconds that open requests get to finish after SIGTERM, and drain: seconds before that in which
+    the service still listens, but says that it is not ready. workers: processes that share the
+    port; 0 for as many as there are processors. reload: seconds from a look for new models to the
+    next; 0 for never. versions: older versions of a model that answer under their hash, and
+    versions_memory: bytes that all of those may take.
     """
 
     host: str = "127.0.0.1"
@@ -42,6 +47,11 @@ class Settings:
     deadline: int = 30
     alias_seconds: int = 0
     log: str = "on"
+    drain: int = 0
+    workers: int = 1
+    reload: int = 10
+    versions: int = 2
+    versions_memory: int = 64 * 1024 * 1024
 
     def __post_init__(self) -> None:
         _within("port", self.port, 0, 65535)
@@ -58,6 +68,11 @@ class Settings:
         _within("alias_seconds", self.alias_seconds, 0, 31_536_000)
         if self.log not in ("on", "off"):
             raise InvalidField(PREFIX + "LOG", f"{self.log!r}, expected on or off")
+        _within("drain", self.drain, 0, 600)
+        _within("workers", self.workers, 0, 256)
+        _within("reload", self.reload, 0, 86_400)
+        _within("versions", self.versions, 0, 1000)
+        _within("versions_memory", self.versions_memory, 0, 1 << 40)
 
 
 def read(

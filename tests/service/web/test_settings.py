@@ -25,10 +25,17 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_CLIPS_LIMIT": "3",
         "POSEFIELD_CLIPS_POSES": "50",
         "POSEFIELD_GRACE": "0",
+        "POSEFIELD_DRAIN": "5",
+        "POSEFIELD_WORKERS": "4",
+        "POSEFIELD_RELOAD": "0",
+        "POSEFIELD_VERSIONS": "7",
+        "POSEFIELD_VERSIONS_MEMORY": "1000",
     }
     crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
     clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
-    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, grace=0)
+    ends = {"grace": 0, "drain": 5, "workers": 4}
+    follows = {"reload": 0, "versions": 7, "versions_memory": 1000}
+    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, **ends, **follows)
     assert settings.read(environ=given) == expected
 
 
@@ -52,6 +59,11 @@ def test_the_readme_lists_every_setting_and_its_default():
         ("PORT", "65536"),
         ("BODY_LIMIT", "0"),
         ("GRACE", "1.5"),
+        ("DRAIN", "601"),
+        ("WORKERS", "257"),
+        ("RELOAD", "-1"),
+        ("VERSIONS", "all"),
+        ("VERSIONS_MEMORY", "64M"),
     ],
 )
 def test_a_variable_that_cannot_be_used_is_named(name, text):
