@@ -155,7 +155,7 @@ def clip(
     up: UpAxis = None,
     json: Json = False,
 ) -> None:
-    """Write a clip as usda, usdc, usdz, glb, bvh, json or npz."""
+    """Write a clip as usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack."""
     found = encoder(output)
     convention = found.convention(unit, up)
     synthesizer = open_model(model)

@@ -22,7 +22,7 @@ from service.synthesis.question import ClipQuestion
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
 TALL = ("--performer", "tall")
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz")
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack")
 
 
 @pytest.fixture

@@ -14,21 +14,23 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.encode import CROWD_ENCODERS, ENCODERS, crowd
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, crowd
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.web import contract, problems
 from service.web.contract import Contract, Operation
-from service.web.operations import OPERATIONS, Handler, Service
+from service.web.operations import OPERATIONS
 from service.web.problems import RequestFault
+from service.web.service import Handler, Service
 from service.web.settings import Settings
 
 log = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(clip|clips|crowd)\.([^/]+)")
+FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd)\.([^/]+)")
 FORMATS = {
+    "pose": [*POSE_ENCODERS],
     "clip": [*ENCODERS],
     "clips": [*PACKS],
     "crowd": [*CROWD_ENCODERS, *crowd.STREAMS],
