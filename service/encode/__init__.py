@@ -8,6 +8,7 @@ from service.encode import bvh, crowd_poses, glb, keyframes, poses, tables, usd,
 from service.encode import convention as conventions
 from service.encode.arrow import arrow
 from service.encode.convention import CENTIMETRES, METRES, Convention, Unit, Up
+from service.encode.media import ARROW, JSON, MSGPACK, NPZ
 from service.encode.tables import Table
 from service.motion.answer import ClipAnswer, PoseAnswer
 from service.motion.crowd import CrowdPoses
@@ -57,11 +58,6 @@ def numbers(
     return one_by_one(lambda answer, convention: write(keyframes.table(answer, convention)))
 
 
-ARROW = "application/vnd.apache.arrow.stream"
-MSGPACK = "application/vnd.msgpack"
-# Nobody has registered an archive of arrays; as a zip some browsers would unpack it.
-NPZ = "application/x-npz"
-
 ENCODERS = {
     encoder.extension: encoder
     for encoder in (
@@ -70,7 +66,7 @@ ENCODERS = {
         # Not registered, unlike those of text and package, but what others call it.
         Encoder("usdc", "model/vnd.usdc", usd.usdc, at_once=0),
         Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz, at_once=0),
-        Encoder("json", "application/json", one_by_one(keyframes.json)),
+        Encoder("json", JSON, one_by_one(keyframes.json)),
         Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
         Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), law=True),
         Encoder("npz", NPZ, numbers(tables.npz)),
@@ -96,7 +92,7 @@ class PoseEncoder:
 POSE_ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        PoseEncoder("json", "application/json", tables.json),
+        PoseEncoder("json", JSON, tables.json),
         PoseEncoder("msgpack", MSGPACK, tables.msgpack),
         PoseEncoder("npz", NPZ, tables.npz),
         PoseEncoder("arrow", ARROW, arrow),
@@ -124,6 +120,6 @@ CROWD_ENCODERS = {
         CrowdEncoder("arrow", ARROW, arrow),
         CrowdEncoder("npz", NPZ, tables.npz),
         CrowdEncoder("msgpack", MSGPACK, tables.msgpack),
-        CrowdEncoder("json", "application/json", tables.json, crowd_poses.JSON_LIMIT),
+        CrowdEncoder("json", JSON, tables.json, crowd_poses.JSON_LIMIT),
     )
 }

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+from service.motion.card import Control
 from service.motion.clip import Clip
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles, Truths
 
 
 @dataclass(frozen=True)
@@ -56,3 +57,28 @@ class ClipAnswer:
 
     clip: Clip
     trust: Trust
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A control of a grid and its values (n,), in its unit."""
+
+    control: Control
+    values: Floats
+
+
+@dataclass(frozen=True)
+class SigmaGrid:
+    """Sigma (R, C), m, of the finest level, and whether all controls lie inside what was sampled,
+    inside (R, C), for the columns of one axis and the rows of another.
+
+    model: name@contenthash. controls: the values of those that are no axes.
+    """
+
+    model: str
+    across: Axis
+    along: Axis
+    controls: dict[str, float]
+    performer: str | None
+    sigma: Singles
+    inside: Truths

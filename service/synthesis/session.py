@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +32,15 @@ class Session:
     """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
 
     runtimes: onnxruntime's sessions, one for each level of detail; clocks: the same of the graphs
-    that tell the duration alone.
+    that tell the duration alone. gauge: bytes of the graph that tells the finest level's sigma
+    alone: few ask for it, and it is opened for the first of them.
     """
 
     card: ModelCard
     digest: str
     runtimes: tuple[Any, ...]
     clocks: tuple[Any, ...]
+    gauge: bytes
 
     def run(
         self,
@@ -63,6 +66,15 @@ class Session:
         """Durations (B,), s, as `run` gives them, in a quarter of its time."""
         answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
         return answers[0]
+
+    def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
+        """Sigmas (B,), m, as `run` gives them at level 0, in half of its time."""
+        answers: list[Singles] = self._gauge.run(["sigma"], self._feed(controls, labels))
+        return answers[0]
+
+    @cached_property
+    def _gauge(self) -> Any:
+        return _start(self.gauge, self.digest)
 
     def _feed(
         self, controls: Floats | Singles, labels: Floats | Singles | None
@@ -101,7 +113,8 @@ def open_bytes(content: bytes, source: str) -> Session:
         raise ModelError(source, f"no protocol buffer: {fault}") from fault
     runtimes = tuple(_start(own, source) for own in frozen)
     clocks = tuple(_start(freeze.for_output(own, "duration"), source) for own in frozen)
-    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes, clocks)
+    gauge = freeze.for_output(frozen[0], "sigma")
+    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes, clocks, gauge)
     for level in levels:
         _check_answer(session, source, level)
     return session

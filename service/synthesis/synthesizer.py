@@ -9,13 +9,12 @@ import numpy as np
 
 from service.motion import roles
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
-from service.motion.card import Control
 from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
 from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
-from service.synthesis import course, limits, pace
+from service.synthesis import course, door, limits, pace
 from service.synthesis.question import ClipQuestion, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
@@ -151,14 +150,11 @@ class Synthesizer:
     ) -> _Question:
         card = self.session.card
         limits.check_names(card, controls)
-        labels, coarsest = _labels(card.performers, performer), len(card.levels) - 1
+        labels, coarsest = door.labels(card.performers, performer), len(card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-        point = np.array([[_required(control, controls) for control in card.controls]])
-        warnings = tuple(_outside(c, v) for c, v in zip(card.controls, point[0], strict=True))
-        said = tuple(filter(None, warnings))
-        if said and extrapolate == "refuse":
-            raise OutsideSamples("controls", "; ".join(said))
+        point = np.array([[door.required(control, controls) for control in card.controls]])
+        said = door.outside(card.controls, point[0], extrapolate)
         # However they are put: the same question has the same bytes.
         given = {control.name: float(controls[control.name]) for control in card.controls}
         return _Question(given, performer, level, point, labels, said)
@@ -198,33 +194,3 @@ class Synthesizer:
     def _run(self, question: _Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level
         return self.session.run(question.point, when, *outputs, labels=labels, level=level)
-
-
-def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
-    """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
-    if asked is not None and asked not in performers:
-        raise InvalidField("performer", f"{asked!r}, expected {limits.known(performers)}")
-    return np.array([[float(name == asked) for name in performers]])
-
-
-def _required(control: Control, controls: Mapping[str, float]) -> float:
-    field = f"controls/{control.name}"
-    if control.name not in controls:
-        raise InvalidField(
-            field,
-            f"missing; give a number in {control.unit}, "
-            f"sampled from {control.minimum:g} to {control.maximum:g}",
-        )
-    value = limits.number(field, controls[control.name])
-    limits.within(field, value, *limits.reach(control), control.unit)
-    return value
-
-
-def _outside(control: Control, value: float) -> str | None:
-    low, high = limits.sampled(control)
-    if low <= value <= high:
-        return None
-    return (
-        f"{control.name} = {value:g} {control.unit} lies outside what was sampled, "
-        f"{control.minimum:g} to {control.maximum:g} {control.unit}"
-    )

@@ -15,6 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, crowd
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
@@ -28,12 +29,13 @@ from service.web.settings import Settings
 log = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd)\.([^/]+)")
+FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd|sigma)\.([^/]+)")
 FORMATS = {
     "pose": [*POSE_ENCODERS],
     "clip": [*ENCODERS],
     "clips": [*PACKS],
     "crowd": [*CROWD_ENCODERS, *crowd.STREAMS],
+    "sigma": [*GRID_ENCODERS],
 }
 
 

@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, CrowdEncoder, Encoder, poses
 from service.encode import crowd as crowd_usd
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS, Pack
 from service.export import pack as packing
 from service.motion.answer import PoseAnswer
@@ -26,6 +27,7 @@ from service.web import (
     pose_operations,
     query,
     sending,
+    sigma_operations,
     walk_query,
 )
 from service.web.query import FileQuestion, PoseQuestion
@@ -148,6 +150,7 @@ _FIXED: dict[str, Handler] = {
     "getPoseJson": get_pose,
     "queryPoseJson": query_pose,
     **pose_operations.OPERATIONS,
+    **sigma_operations.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
@@ -177,6 +180,8 @@ OPERATIONS: dict[str, Handler] = {
     "queryClips": _negotiated("queryClips", PACKS),
     "getCrowd": _negotiated("getCrowd", _USD),
     "queryCrowd": _negotiated("queryCrowd", CROWD_ENCODERS),
+    "getSigma": _negotiated("getSigma", GRID_ENCODERS),
+    "querySigma": _negotiated("querySigma", GRID_ENCODERS),
 }
 """Handler of each operationId."""
 

@@ -5,6 +5,7 @@ from urllib.parse import urlencode
 import pytest
 
 from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS
 
 REACH = "/v1/models/reach"
@@ -25,11 +26,13 @@ def questions(controls):
         ("POST", f"{REACH}/clip", "", {**body, "end": 0.2}, usd | ENCODERS),
         ("POST", f"{REACH}/clips", "", many, PACKS),
         ("POST", f"{REACH}/crowd", "", crowd, CROWD_ENCODERS),
+        ("GET", f"{REACH}/sigma", "?across=turn&along=stature&rows=3", None, GRID_ENCODERS),
+        ("POST", f"{REACH}/sigma", "", {"across": "turn", "along": "stature"}, GRID_ENCODERS),
         ("GET", WALK, "?count=2&seconds=0.2", None, usd),
     ]
 
 
-@pytest.mark.parametrize("which", range(7))
+@pytest.mark.parametrize("which", range(9))
 def test_each_format_is_had_by_its_media_type(which, ask, controls):
     method, path, query, body, formats = questions(controls)[which]
     for name, found in formats.items():

@@ -7,6 +7,7 @@ import pytest
 from asking import asker
 
 from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS
 from service.synthesis.library import Library
 from service.web import contract, problems
@@ -61,6 +62,8 @@ def test_each_format_has_the_media_type_of_its_encoder(spec, extension):
         ("post", "clips", PACKS),
         ("get", "crowd", {name: ENCODERS[name] for name in ("usda", "usdc", "usdz")}),
         ("post", "crowd", CROWD_ENCODERS),
+        ("get", "sigma", GRID_ENCODERS),
+        ("post", "sigma", GRID_ENCODERS),
     ],
 )
 def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats, spec):
@@ -84,7 +87,7 @@ def expected_statuses(path, method):
     statuses = {"200", "400", "405", "500"}
     if "{model}" in path:
         statuses.add("404")
-    if "/pose" in path or "/clip" in path or "/crowd" in path:
+    if path.count("/") > 3:
         statuses.add("422")
         # A path that names no format asks which is accepted.
         statuses |= set() if "." in path else {"406"}
