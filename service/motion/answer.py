@@ -82,3 +82,36 @@ class SigmaGrid:
     performer: str | None
     sigma: Singles
     inside: Truths
+
+
+@dataclass(frozen=True)
+class Captured:
+    """A captured clip, and what it has to do with an answer.
+
+    source: its file and frames. distance: from the controls asked for, in the model's own metric;
+    at one, the poses of two clips have almost nothing to do with each other. weight: what it
+    counts for in the answer's poses.
+    """
+
+    source: str
+    controls: dict[str, float]
+    performer: str | None
+    distance: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Reasons:
+    """Why an answer is as it is: the captured clips nearest to it, the nearest first, and how many
+    others there are, with what all of them count for. All weights add up to one.
+
+    model: name@contenthash. warnings: one sentence for each control outside what was sampled.
+    """
+
+    model: str
+    controls: dict[str, float]
+    performer: str | None
+    warnings: tuple[str, ...]
+    nearest: tuple[Captured, ...]
+    others: int
+    others_weight: float

@@ -10,9 +10,11 @@ import numpy as np
 import onnxruntime
 
 from service.motion import card as cards
+from service.motion import field
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Singles
 from service.motion.errors import ModelError
+from service.motion.field import Weigher
 from service.synthesis import freeze
 
 INPUTS = {"controls": 2, "time": 2}
@@ -75,6 +77,17 @@ class Session:
     @cached_property
     def _gauge(self) -> Any:
         return _start(self.gauge, self.digest)
+
+    @cached_property
+    def weigher(self) -> Weigher:
+        """What the captured clips count for; only of a card that says what that hangs on."""
+        own = self.card
+        assert own.kriging is not None
+        low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
+        points = field.half_ranges(np.array(own.examples), low, high)
+        who = np.array(own.moved_by or [0] * len(points))
+        labels = np.eye(max(len(own.performers), 1), len(own.performers))[who]
+        return Weigher(own.kriging, np.hstack([points, labels]))
 
     def _feed(
         self, controls: Floats | Singles, labels: Floats | Singles | None

@@ -29,6 +29,7 @@ from service.web import (
     sending,
     sigma_operations,
     walk_query,
+    why_operations,
 )
 from service.web.query import FileQuestion, PoseQuestion
 from service.web.service import CLIPS, CROWDS, Handler, Service, made
@@ -151,6 +152,7 @@ _FIXED: dict[str, Handler] = {
     "queryPoseJson": query_pose,
     **pose_operations.OPERATIONS,
     **sigma_operations.OPERATIONS,
+    **why_operations.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},

@@ -93,7 +93,7 @@ def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
     if not times:
         raise bad_parameter("time", "missing; give seconds from the start of the clip")
     single = unique([pair for pair in pairs if pair[0] != "time"])
-    policy, performer = _policy(single), single.pop("performer", None)
+    policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
     return PoseQuestion(numbers_of(single), times, policy, performer, level)
 
@@ -108,7 +108,7 @@ def file_of_pairs(pairs: Pairs) -> FileQuestion:
 
 def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
     """Question of texts by name, of which none is left over: what is no option is a control."""
-    policy, performer = _policy(single), single.pop("performer", None)
+    policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
     names = _word(single, "names", get_args(Names), NAMES)
     root = _word(single, "root", get_args(Root), ROOT)
@@ -168,7 +168,8 @@ def unique(pairs: Pairs) -> dict[str, str]:
     return single
 
 
-def _policy(single: dict[str, str]) -> Policy:
+def policy_of(single: dict[str, str]) -> Policy:
+    """What is said of `extrapolate`, which is taken out, or the usual."""
     return _word(single, "extrapolate", get_args(Policy), POLICY)
 
 

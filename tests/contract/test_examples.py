@@ -41,6 +41,7 @@ def test_the_example_body_matches_the_schema(name, spec):
     "name",
     [
         *(f"Pose{e}" for e in ("", "Json", "Msgpack", "Npz", "Arrow")),
+        "Why",
         *(f"Sigma{e}" for e in ("", "Json", "Msgpack", "Npz", "Arrow")),
         *(f"Clip{e}" for e in ("Usda", "Usdc", "Json", "Bvh", "Glb", "Npz", "Arrow", "Msgpack")),
     ],
