@@ -19,6 +19,7 @@ from service.synthesis.question import Policy
 from service.synthesis.synthesizer import Synthesizer
 
 NEAREST, MOST = 10, 10_000
+OLD = "expected one that says what its weights hang on; train it again"
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
     """
     card = model.session.card
     if card.kriging is None:
-        raise InvalidField("model", f"{model.identity} does not say it; train it again")
+        raise InvalidField("model", f"{model.identity}, {OLD}")
     limits.check_names(card, asked.controls)
     labels = door.labels(card.performers, asked.performer)
     controls = {c.name: door.required(c, asked.controls) for c in card.controls}

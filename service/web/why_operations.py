@@ -10,8 +10,8 @@ from service.synthesis.why import WhyQuestion, why
 from service.web import body, service, why_query
 from service.web.service import Handler, Service
 
-# To invert their system, for the first who asks, takes a millisecond.
-AT_ONCE = 200
+# Captured clips whose system is inverted, for the first who asks, in some milliseconds.
+AT_ONCE = 100
 
 
 async def get_why(served: Service, request: Request) -> Response:
