@@ -1,6 +1,6 @@
 """What a model can be asked: questions checked once, and trusted afterwards."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,13 +45,13 @@ class Door:
         warnings: tuple[str, ...] = ()
         if not self._plain(controls):
             warnings = self._checked(controls, extrapolate)
-        labels, coarsest = _labels(self._card.performers, performer), len(self._card.levels) - 1
+        own, coarsest = labels(self._card.performers, performer), len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         # However they are put: the same question has the same bytes.
         given = {name: float(controls[name]) for name, _, _ in self._ranges}
         point = np.array([list(given.values())])
-        return Question(given, performer, level, point, labels, warnings)
+        return Question(given, performer, level, point, own, warnings)
 
     def _plain(self, controls: Mapping[str, float]) -> bool:
         """Whether there is nothing to say of the controls, as of nearly all that are asked for."""
@@ -63,22 +63,19 @@ class Door:
     def _checked(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:
         """What to warn of."""
         limits.check_names(self._card, controls)
-        values = [_required(control, controls) for control in self._card.controls]
-        pairs = zip(self._card.controls, values, strict=True)
-        said = tuple(filter(None, (_outside(control, value) for control, value in pairs)))
-        if said and extrapolate == "refuse":
-            raise OutsideSamples("controls", "; ".join(said))
-        return said
+        values = np.array([required(control, controls) for control in self._card.controls])
+        return outside(self._card.controls, values, extrapolate)
 
 
-def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
+def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
     if asked is not None and asked not in performers:
         raise InvalidField("performer", f"{asked!r}, expected {limits.known(performers)}")
     return np.array([[float(name == asked) for name in performers]])
 
 
-def _required(control: Control, controls: Mapping[str, float]) -> float:
+def required(control: Control, controls: Mapping[str, float]) -> float:
+    """Value of a control; InvalidField where there is none, or none that could be answered."""
     field = f"controls/{control.name}"
     if control.name not in controls:
         raise InvalidField(
@@ -89,6 +86,16 @@ def _required(control: Control, controls: Mapping[str, float]) -> float:
     value = limits.number(field, controls[control.name])
     limits.within(field, value, *limits.reach(control), control.unit)
     return value
+
+
+def outside(controls: Sequence[Control], point: Floats, extrapolate: Policy) -> tuple[str, ...]:
+    """A sentence for each control whose value (d,) lies outside its sampled range; OutsideSamples
+    where that is refused."""
+    found = (_outside(control, value) for control, value in zip(controls, point, strict=True))
+    said = tuple(filter(None, found))
+    if said and extrapolate == "refuse":
+        raise OutsideSamples("controls", "; ".join(said))
+    return said
 
 
 def _outside(control: Control, value: float) -> str | None:

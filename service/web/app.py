@@ -6,7 +6,8 @@ from functools import partial
 
 from starlette.types import Receive, Scope, Send
 
-from service.encode import CROWD_ENCODERS, ENCODERS, crowd
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, crowd
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
@@ -15,17 +16,20 @@ from service.web import contract, problems
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
 from service.web.log import Lines
-from service.web.operations import OPERATIONS, Handler, Service
+from service.web.operations import OPERATIONS
 from service.web.problems import RequestFault
 from service.web.readiness import Readiness
 from service.web.routing import Map, Route
+from service.web.service import Handler, Service
 from service.web.settings import Settings
 
-FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(clip|clips|crowd)\.([^/]+)")
+FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd|sigma)\.([^/]+)")
 FORMATS = {
+    "pose": [*POSE_ENCODERS],
     "clip": [*ENCODERS],
     "clips": [*PACKS],
     "crowd": [*CROWD_ENCODERS, *crowd.STREAMS],
+    "sigma": [*GRID_ENCODERS],
 }
 
 

@@ -17,9 +17,9 @@ from service.motion.errors import QueryError
 from service.web import caching, compression, deadline, log, metrics, problems
 from service.web.contract import Operation
 from service.web.deadline import Watch
-from service.web.operations import Service
 from service.web.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
 from service.web.routing import Map, Place, Route
+from service.web.service import Service
 
 faults = logging.getLogger(__name__)
 

@@ -1,73 +1,43 @@
 """What each operation of the contract does: decode, ask, encode."""
 
-import os
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from functools import partial
 
-from anyio import CapacityLimiter, to_thread
-from starlette.concurrency import run_in_threadpool
+from anyio import to_thread
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, CrowdEncoder, Encoder, poses
 from service.encode import crowd as crowd_usd
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS, Pack
 from service.export import pack as packing
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
-from service.synthesis.library import Library
 from service.synthesis.synthesizer import Moments, Row, Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
     answers,
     body,
-    caching,
     clips_query,
     contract,
     crowd_query,
     metrics,
+    negotiation,
+    pose_operations,
     query,
     sending,
+    sigma_operations,
     walk_query,
+    why_operations,
 )
-from service.web.batching import Batcher
-from service.web.log import Lines
 from service.web.query import FileQuestion, PoseQuestion
-from service.web.readiness import Readiness
-from service.web.settings import Settings
+from service.web.service import CLIPS, CROWDS, Handler, Service, made
+from service.web.service import model as _model
 from service.web.walk_query import WalkQuestion
 
 # 200 poses of 33 joints take 1 ms as JSON; more would hold up other requests.
 INLINE_POSES = 200
-
-
-@dataclass(frozen=True)
-class Service:
-    """What every operation may use."""
-
-    readiness: Readiness
-    settings: Settings
-    source: bytes
-    lines: Lines | None = None
-    code: bytes = field(default_factory=caching.code)
-    batcher: Batcher = field(default_factory=Batcher)
-
-    def lifetime(self, model: str) -> bytes:
-        """How long an answer may be used unasked, by the model's name in its path."""
-        return caching.lifetime(model, self.settings.alias_seconds)
-
-    @property
-    def library(self) -> Library:
-        """The models as they are now: to be taken once a request."""
-        return self.readiness.models.library
-
-
-# Crowds take as long as many clips: of their own, these threads hold nobody else up.
-CROWDS = CapacityLimiter(os.cpu_count() or 1)
-CLIPS = CapacityLimiter(os.cpu_count() or 1)
-
-Handler = Callable[[Service, Request], Awaitable[Response]]
 
 
 async def list_models(service: Service, request: Request) -> Response:
@@ -179,11 +149,14 @@ async def get_contract(service: Service, request: Request) -> Response:
     return Response(service.source, media_type=contract.MEDIA_TYPE)
 
 
-OPERATIONS: dict[str, Handler] = {
+_FIXED: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
-    "getPose": get_pose,
-    "queryPose": query_pose,
+    "getPoseJson": get_pose,
+    "queryPoseJson": query_pose,
+    **pose_operations.OPERATIONS,
+    **sigma_operations.OPERATIONS,
+    **why_operations.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
@@ -194,20 +167,37 @@ OPERATIONS: dict[str, Handler] = {
     "getReadiness": ready,
     "getContract": get_contract,
 }
+
+
+def _negotiated(stem: str, formats: Mapping[str, negotiation.Format]) -> Handler:
+    """Handler of an operation whose formats, the usual one first, have operations of their own."""
+    offers = {name: found.media_type for name, found in formats.items()}
+    handlers = {name: _FIXED[f"{stem}{name.capitalize()}"] for name in formats}
+    return negotiation.negotiated(offers, handlers)
+
+
+_USD = {name: ENCODERS[name] for name in ("usdc", "usda", "usdz")}
+_CLIP = _USD | ENCODERS
+OPERATIONS: dict[str, Handler] = {
+    **_FIXED,
+    "getPose": _negotiated("getPose", POSE_ENCODERS),
+    "queryPose": _negotiated("queryPose", POSE_ENCODERS),
+    "getClip": _negotiated("getClip", _CLIP),
+    "queryClip": _negotiated("queryClip", _CLIP),
+    "queryClips": _negotiated("queryClips", PACKS),
+    "getCrowd": _negotiated("getCrowd", _USD),
+    "queryCrowd": _negotiated("queryCrowd", CROWD_ENCODERS),
+    "getSigma": _negotiated("getSigma", GRID_ENCODERS),
+    "querySigma": _negotiated("querySigma", GRID_ENCODERS),
+}
 """Handler of each operationId."""
-
-
-def _model(service: Service, request: Request) -> Synthesizer:
-    """The model of the request's path, which was found before the operation began."""
-    found: Synthesizer = request.scope["model"]
-    return found
 
 
 async def _pose(service: Service, model: Synthesizer, question: PoseQuestion) -> Response:
     controls, times, policy = question.controls, question.times, question.extrapolate
     asked = model.moments(controls, times, policy, question.performer, question.level)
     if len(times) > INLINE_POSES:
-        content = await run_in_threadpool(_posed, model, asked, None)
+        content = await to_thread.run_sync(_posed, model, asked, None)
     else:
         content = _posed(model, asked, await service.batcher.row(model, asked))
     return Response(content, media_type="application/json")
@@ -221,10 +211,5 @@ async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) ->
     convention = encoder.convention(question.unit, question.up)
     answer = model.clip(question.clip)
     quick = len(answer.clip) <= encoder.at_once
-    content = await _made(quick, partial(encoder.encode, answer, convention))
+    content = await made(quick, partial(encoder.encode, answer, convention))
     return answers.file(content, encoder, answer.trust)
-
-
-async def _made(quick: bool, make: Callable[[], bytes]) -> bytes:
-    """What `make` returns: at once if that is quick, else in a thread."""
-    return make() if quick else await run_in_threadpool(make)

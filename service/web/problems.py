@@ -35,6 +35,7 @@ BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
 BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
 NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
+NOT_ACCEPTABLE = Kind(406, "not-acceptable", "Nothing that is accepted is there")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
 OVERLOADED = Kind(503, "overloaded", "The service has too much to do; ask again soon")
@@ -42,8 +43,16 @@ LATE = Kind(503, "late", "The answer took too long")
 NOT_READY = Kind(503, "not-ready", "The service should not be sent requests now")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
-OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)
 OF_LOAD = (OVERLOADED, LATE, NOT_READY)
+OF_REQUEST = (
+    BAD_PARAMETER,
+    BAD_BODY,
+    NO_SUCH_PATH,
+    METHOD_NOT_ALLOWED,
+    NOT_ACCEPTABLE,
+    BODY_TOO_LARGE,
+    NOT_JSON,
+)
 
 TABLE: dict[type[QueryError], Kind] = {
     UnknownModel: Kind(404, "unknown-model", "No model of that name"),

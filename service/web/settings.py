@@ -17,16 +17,16 @@ class Settings:
     host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
-    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
-    seconds that open requests get to finish after SIGTERM. concurrency: requests that a process
-    answers at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long
-    caches may use an answer under a model's plain name without asking whether it is the newest's.
-    log: whether each request is told on standard error, in one line.
-    seconds that open requests get to finish after SIGTERM, and drain: seconds before that in which
-    the service still listens, but says that it is not ready. workers: processes that share the
-    port; 0 for as many as there are processors. reload: seconds from a look for new models to the
-    next; 0 for never. versions: older versions of a model that answer under their hash, and
-    versions_memory: bytes that all of those may take.
+    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
+    grid_limit: points of a grid of sigma. grace: seconds that open requests get to finish after
+    SIGTERM, and drain: seconds before that in which the service still listens, but says that it is
+    not ready. workers: processes that share the port; 0 for as many as there are processors.
+    reload: seconds from a look for new models to the next; 0 for never. versions: older versions of
+    a model that answer under their hash, and versions_memory: bytes that all of those may take.
+    concurrency: requests that a process answers at a time, and deadline: seconds until an answer
+    has to begin. alias_seconds: how long caches may use an answer under a model's plain name
+    without asking whether it is the newest's. log: whether each request is told on standard error,
+    in one line.
     """
 
     host: str = "127.0.0.1"
@@ -41,6 +41,8 @@ class Settings:
     clips_body_limit: int = 8 * 1024 * 1024
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
+    # 50 ms of work.
+    grid_limit: int = 65_536
     grace: int = 10
     # A pose takes a tenth of a millisecond, a thousand in flight a tenth of a second.
     concurrency: int = 1000
@@ -62,6 +64,7 @@ class Settings:
         _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
         _within("grace", self.grace, 0, 600)
         _within("concurrency", self.concurrency, 1, 1_000_000)
         _within("deadline", self.deadline, 1, 3600)

@@ -6,7 +6,9 @@ import openapi_spec_validator
 import pytest
 from asking import asker
 
-from service.encode import ENCODERS
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
+from service.encode.grids import GRID_ENCODERS
+from service.encode.packs import PACKS
 from service.synthesis.library import Library
 from service.web import contract, problems
 from service.web.app import build, create_app
@@ -51,6 +53,31 @@ def test_each_format_has_the_media_type_of_its_encoder(spec, extension):
     assert list(answer["content"]) == [ENCODERS[extension].media_type]
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "formats"),
+    [
+        ("get", "pose", POSE_ENCODERS),
+        ("post", "pose", POSE_ENCODERS),
+        ("get", "clip", ENCODERS),
+        ("post", "clip", ENCODERS),
+        ("post", "clips", PACKS),
+        ("get", "crowd", {name: ENCODERS[name] for name in ("usda", "usdc", "usdz")}),
+        ("post", "crowd", CROWD_ENCODERS),
+        ("get", "sigma", GRID_ENCODERS),
+        ("post", "sigma", GRID_ENCODERS),
+    ],
+)
+def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats, spec):
+    every = spec["paths"][f"/v1/models/{{model}}/{path}"][method]["responses"]["200"]["$ref"]
+    contents = spec["components"]["responses"][every.rpartition("/")[2]]["content"]
+    assert set(contents) == {found.media_type for found in formats.values()}
+    assert len(contents) == len(formats)
+    for name, found in formats.items():
+        own = spec["paths"][f"/v1/models/{{model}}/{path}.{name}"][method]["responses"]["200"]
+        answer = spec["components"]["responses"][own["$ref"].rpartition("/")[2]]
+        assert answer["content"] == {found.media_type: contents[found.media_type]}
+
+
 def test_every_operation_documents_the_errors_it_can_give(spec):
     for path, item in spec["paths"].items():
         for method in item.keys() & set(contract.METHODS):
@@ -65,8 +92,10 @@ def expected_statuses(path, method):
             statuses.add("304")
     if path.startswith("/v1") or path == "/readyz":
         statuses.add("503")
-    if "/pose" in path or "/clip" in path or "/crowd" in path:
+    if path.count("/") > 3:
         statuses.add("422")
+        # A path that names no format asks which is accepted.
+        statuses |= set() if "." in path or path.endswith("/why") else {"406"}
     return statuses | ({"413", "415"} if method == "post" else set())
 
 

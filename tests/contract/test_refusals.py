@@ -264,7 +264,14 @@ def test_an_unknown_format_names_the_formats_there_are(refuse):
     assert problem["errors"][0]["parameter"] == "format"
 
 
-@pytest.mark.parametrize("path", ["/", "/v1", "/v1/models/", "/v1/models/reach/clip", "/livez/"])
+def test_what_nobody_makes_is_not_acceptable(ask, refuse, controls):
+    asked, headers = f"{POSE}?{urlencode({**controls, 'time': 0})}", {"accept": "text/html"}
+    problem = refuse(406, "not-acceptable", "GET", asked, headers=headers)
+    assert "'text/html', expected one of application/json, application/vnd.m" in problem["detail"]
+    assert ask("GET", asked, headers=headers).headers["vary"] == "Accept"
+
+
+@pytest.mark.parametrize("path", ["/", "/v1", "/v1/models/", "/v1/models/reach/clip/", "/livez/"])
 def test_an_unknown_path_is_refused(path, refuse):
     refuse(404, "no-such-path", "GET", path)
 
