@@ -4,6 +4,7 @@ import logging
 import re
 import uuid
 from collections.abc import Mapping
+from dataclasses import replace
 
 from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
@@ -19,6 +20,9 @@ from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.web import contract, problems
+from service.web.access import door, policy
+from service.web.access.audit import Call
+from service.web.access.policy import Policy
 from service.web.contract import Contract, Operation
 from service.web.operations import OPERATIONS, Handler, Service
 from service.web.problems import RequestFault
@@ -36,7 +40,7 @@ FORMATS = {
 
 
 def create_app(library: Library, settings: Settings) -> Starlette:
-    """Application that answers for the models of a library."""
+    """Application that answers for the models of a library; raises as `build` does."""
     return build(contract.load(), OPERATIONS, library, settings)
 
 
@@ -45,13 +49,16 @@ def build(
 ) -> Starlette:
     """Application of a contract and the handlers of its operations.
 
-    Raises ValueError for an operation without a handler and a handler without an operation.
+    Raises ValueError for an operation without a handler and a handler without an operation, and
+    InvalidField or FileError for settings that would let in whom they should not, or nobody.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
+    rules = policy.of(settings)
+    policy.check_exposure(settings, rules)
     service = Service(library, settings, agreed.source)
     paths = dict.fromkeys(operation.path for operation in agreed.operations)
     app = Starlette(
-        routes=[_route(path, agreed, handlers, service) for path in paths],
+        routes=[_route(path, agreed, handlers, service, rules) for path in paths],
         middleware=[Middleware(Envelope)],
         exception_handlers={
             HTTPException: _of_routing,
@@ -72,16 +79,34 @@ def _check_complete(agreed: set[str], handled: set[str]) -> None:
         )
 
 
-def _route(path: str, agreed: Contract, handlers: Mapping[str, Handler], service: Service) -> Route:
+def _route(
+    path: str,
+    agreed: Contract,
+    handlers: Mapping[str, Handler],
+    service: Service,
+    rules: Policy,
+) -> Route:
     """Route of all methods of a path, so that a 405 names them all."""
     by_method = {o.method: o for o in agreed.operations if o.path == path}
 
     async def endpoint(request: Request) -> Response:
         operation = by_method["GET" if request.method == "HEAD" else request.method]
+        seen = _let_in(operation, service, rules, request)
         _check_parameters(operation, request)
-        return await handlers[operation.id](service, request)
+        return await handlers[operation.id](seen, request)
 
     return Route(path, endpoint, methods=list(by_method))
+
+
+def _let_in(operation: Operation, service: Service, rules: Policy, request: Request) -> Service:
+    """The service as whoever asks may see it; raises RequestFault 401 or 403."""
+    scope = request.scope
+    call = Call(scope["state"]["request_id"], request.method, operation.path)
+    known = scope["principal"] = door.check(rules, scope["headers"], operation.scope, call)
+    if operation.scope is None or known.models is None:
+        return service
+    asked = request.path_params.get("model")
+    return replace(service, library=door.seen(service.library, known, asked, call))
 
 
 def _check_parameters(operation: Operation, request: Request) -> None:

@@ -1,6 +1,6 @@
 """The contract: api/openapi.yaml as the service reads it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ class Operation:
     """One operation of the contract.
 
     query: names of its query parameters. open_query: whether the query may hold other names too,
-    because an exploded object (the controls of a model) stands among the parameters.
+    because an exploded object (the controls of a model) stands among the parameters. scope: what a
+    key must allow, where the service asks for keys; None where it never does.
     """
 
     id: str
@@ -24,6 +25,7 @@ class Operation:
     path: str
     query: frozenset[str]
     open_query: bool
+    scope: str | None
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,16 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 path=path,
                 query=frozenset(p["name"] for p in query) - set(exploded),
                 open_query=bool(exploded),
+                scope=_scope(item[method].get("security", document.get("security", []))),
             )
+
+
+def _scope(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
+    """The one scope of a security requirement; its other alternative is a service without keys."""
+    scopes = [scope for alternative in security for of in alternative.values() for scope in of]
+    if len(scopes) > 1:
+        raise ValueError(f"scopes {scopes}, expected one at most")
+    return scopes[0] if scopes else None
 
 
 def _resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:

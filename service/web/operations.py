@@ -149,8 +149,13 @@ async def live(service: Service, request: Request) -> Response:
 
 
 async def ready(service: Service, request: Request) -> Response:
-    """Which models answer: they were loaded and asked once before the service listened."""
-    identities = [model.identity for model in service.library.models.values()]
+    """Which models answer: they were loaded and asked once before the service listened.
+
+    Whoever is not known hears that they do, and no names.
+    """
+    known = request.scope["principal"]
+    models = service.library.models.values()
+    identities = [model.identity for model in models if known.may_read(model.name)]
     return answers.document({"status": "ready", "models": identities})
 
 

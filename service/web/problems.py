@@ -33,13 +33,18 @@ class Kind:
 
 BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
 BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
+UNAUTHENTICATED = Kind(401, "unauthenticated", "Nobody known asks")
+FORBIDDEN = Kind(403, "forbidden", "Whoever asks may not")
 NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
-OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)
+OF_REQUEST = (
+    *(BAD_PARAMETER, BAD_BODY, UNAUTHENTICATED, FORBIDDEN),
+    *(NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON),
+)
 
 TABLE: dict[type[QueryError], Kind] = {
     UnknownModel: Kind(404, "unknown-model", "No model of that name"),

@@ -18,6 +18,11 @@ class Settings:
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
     seconds that open requests get to finish after SIGTERM.
+
+    keys, keys_file: API keys as lines of name, hash and scopes. open: whether everybody may ask on
+    an address that is not this machine's alone. metrics_open: whether /metrics needs no key.
+    jwt_keys: file or URL of the issuer's public keys; jwt_refresh: seconds between two looks at it;
+    jwt_leeway: seconds that clocks may differ by; jwt_scopes: name of the claim that holds scopes.
     """
 
     host: str = "127.0.0.1"
@@ -33,6 +38,17 @@ class Settings:
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
     grace: int = 10
+    keys: str = ""
+    keys_file: str = ""
+    open: bool = False
+    metrics_open: bool = False
+    jwt_keys: str = ""
+    jwt_issuer: str = ""
+    jwt_audience: str = ""
+    jwt_algorithm: str = "RS256"
+    jwt_scopes: str = "scope"
+    jwt_leeway: int = 30
+    jwt_refresh: int = 300
 
     def __post_init__(self) -> None:
         _within("port", self.port, 0, 65535)
@@ -44,6 +60,8 @@ class Settings:
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
         _within("grace", self.grace, 0, 600)
+        _within("jwt_leeway", self.jwt_leeway, 0, 600)
+        _within("jwt_refresh", self.jwt_refresh, 10, 86_400)
 
 
 def read(
@@ -53,8 +71,12 @@ def read(
 
     Raises InvalidField for a variable or value that cannot be used.
     """
-    found = {f.name: environ.get(PREFIX + f.name.upper()) for f in fields(Settings)}
-    values = {name: _parse(name, text) for name, text in found.items() if text is not None}
+    found = {f.name: (f.default, environ.get(PREFIX + f.name.upper())) for f in fields(Settings)}
+    values = {
+        name: _parse(name, default, text)
+        for name, (default, text) in found.items()
+        if text is not None
+    }
     settings = Settings(**values)  # type: ignore[arg-type]  # each name has its own type
     return replace(
         settings,
@@ -63,9 +85,14 @@ def read(
     )
 
 
-def _parse(name: str, text: str) -> str | int:
-    if name == "host":
+def _parse(name: str, default: object, text: str) -> str | int:
+    """Value of a variable, of the type that the setting's default has."""
+    if isinstance(default, str):
         return text
+    if isinstance(default, bool):
+        if text not in ("0", "1"):
+            raise InvalidField(PREFIX + name.upper(), f"{text!r}, expected 0 or 1")
+        return text == "1"
     if not (text.isascii() and text.isdigit()):
         raise InvalidField(PREFIX + name.upper(), f"{text!r}, expected a whole number")
     return int(text)

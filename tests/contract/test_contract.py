@@ -50,6 +50,13 @@ def test_each_format_has_the_media_type_of_its_encoder(spec, extension):
     assert list(answer["content"]) == [ENCODERS[extension].media_type]
 
 
+OPEN = {"/livez", "/readyz", "/openapi.yaml"}
+
+
+def test_only_these_operations_never_ask_for_a_key():
+    assert {o.path for o in contract.load().operations if o.scope is None} == OPEN
+
+
 def test_every_operation_documents_the_errors_it_can_give(spec):
     for path, item in spec["paths"].items():
         for method in item.keys() & set(contract.METHODS):
@@ -58,6 +65,8 @@ def test_every_operation_documents_the_errors_it_can_give(spec):
 
 def expected_statuses(path, method):
     statuses = {"200", "400", "405", "500"}
+    if path not in OPEN:
+        statuses |= {"401", "403"}
     if "{model}" in path:
         statuses.add("404")
     if "/pose" in path or "/clip" in path or "/crowd" in path:

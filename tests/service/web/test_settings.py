@@ -25,10 +25,14 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_CLIPS_LIMIT": "3",
         "POSEFIELD_CLIPS_POSES": "50",
         "POSEFIELD_GRACE": "0",
+        "POSEFIELD_OPEN": "1",
+        "POSEFIELD_KEYS_FILE": "keys",
+        "POSEFIELD_JWT_LEEWAY": "0",
     }
     crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
     clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
-    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, grace=0)
+    access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
+    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, grace=0, **access)
     assert settings.read(environ=given) == expected
 
 
@@ -36,7 +40,8 @@ def test_the_readme_lists_every_setting_and_its_default():
     readme = (Path(__file__).parents[3] / "README.md").read_text()
     for setting in fields(Settings):
         name = f"POSEFIELD_{setting.name.upper()}"
-        assert f"| `{name}` | `{setting.default}` |" in readme
+        default = int(setting.default) if setting.type is bool else setting.default
+        assert f"| `{name}` | `{default}` |".replace(" `` ", " ") in readme
 
 
 @pytest.mark.parametrize(
@@ -52,6 +57,9 @@ def test_the_readme_lists_every_setting_and_its_default():
         ("PORT", "65536"),
         ("BODY_LIMIT", "0"),
         ("GRACE", "1.5"),
+        ("OPEN", "yes"),
+        ("JWT_REFRESH", "9"),
+        ("JWT_LEEWAY", "-1"),
     ],
 )
 def test_a_variable_that_cannot_be_used_is_named(name, text):
