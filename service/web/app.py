@@ -19,7 +19,7 @@ from service.encode import CROWD_ENCODERS, ENCODERS, crowd
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
-from service.web import contract, problems
+from service.web import contract, problems, protocol
 from service.web.access import door, policy
 from service.web.access.audit import Call
 from service.web.access.policy import Policy
@@ -158,6 +158,10 @@ class Envelope:
             await send(message)
 
         try:
+            if protocol.FAULT in scope:
+                refusal = await problems.of_fault(Request(scope), scope[protocol.FAULT])
+                await refusal(scope, receive, sealed)
+                return
             await self.app(scope, receive, sealed)
         except ClientDisconnect:
             log.info("request %s: the client went away", identity)

@@ -33,18 +33,25 @@ class Kind:
 
 BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
 BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
+MALFORMED = Kind(400, "malformed-request", "This is not HTTP as the service reads it")
 UNAUTHENTICATED = Kind(401, "unauthenticated", "Nobody known asks")
 FORBIDDEN = Kind(403, "forbidden", "Whoever asks may not")
 NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
+TOO_SLOW = Kind(408, "request-too-slow", "The request took too long to arrive")
+URL_TOO_LONG = Kind(414, "url-too-long", "The URL is too long")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
+HEAD_TOO_LARGE = Kind(431, "head-too-large", "The request's head is too large")
+NO_CONNECTION_LEFT = Kind(503, "no-connection-left", "The service has no connection left")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
 OF_REQUEST = (
     *(BAD_PARAMETER, BAD_BODY, UNAUTHENTICATED, FORBIDDEN),
     *(NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON),
 )
+OF_WIRE = (MALFORMED, TOO_SLOW, URL_TOO_LONG, HEAD_TOO_LARGE, NO_CONNECTION_LEFT)
+"""What service/web/protocol.py refuses before any operation is known."""
 
 TABLE: dict[type[QueryError], Kind] = {
     UnknownModel: Kind(404, "unknown-model", "No model of that name"),

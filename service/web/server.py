@@ -9,6 +9,7 @@ from pathlib import Path
 import uvicorn
 
 from service.synthesis import library
+from service.web import patience, protocol
 from service.web.app import create_app
 from service.web.settings import Settings
 
@@ -25,7 +26,9 @@ def serve(paths: Sequence[Path], settings: Settings) -> None:
         port=settings.port,
         # Named, not "auto": without them the service would run at a fraction of its speed.
         loop="uvloop",
-        http="httptools",
+        http=protocol.bounded(patience.of(settings)),
+        # Who asks for whom is no concern of ours, and whom to believe is not known here.
+        proxy_headers=False,
         ws="none",
         lifespan="off",
         log_level="warning",

@@ -19,6 +19,11 @@ class Settings:
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
     seconds that open requests get to finish after SIGTERM.
 
+    url_limit, head_limit: bytes of a URL, and of all header lines. head_time, body_time: seconds in
+    which a request's head and body have to arrive; idle_time: seconds that an unused connection
+    stays open; drain_time: seconds in which a client has to take what was sent; who sends or takes
+    4 KiB a second has longer. connections: how many may be open.
+
     keys, keys_file: API keys as lines of name, hash and scopes. open: whether everybody may ask on
     an address that is not this machine's alone. metrics_open: whether /metrics needs no key.
     jwt_keys: file or URL of the issuer's public keys; jwt_refresh: seconds between two looks at it;
@@ -38,6 +43,15 @@ class Settings:
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
     grace: int = 10
+    url_limit: int = 8 * 1024
+    head_limit: int = 16 * 1024
+    head_time: int = 10
+    body_time: int = 20
+    # Longer than what usual proxies keep unused connections for: they should end them, not we.
+    idle_time: int = 75
+    drain_time: int = 30
+    # With twice as many about to end, the usual 1024 open files of a process are enough.
+    connections: int = 500
     keys: str = ""
     keys_file: str = ""
     open: bool = False
@@ -60,6 +74,13 @@ class Settings:
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
         _within("grace", self.grace, 0, 600)
+        _within("url_limit", self.url_limit, 256, 64 * 1024)
+        _within("head_limit", self.head_limit, 1024, 256 * 1024)
+        _within("head_time", self.head_time, 1, 600)
+        _within("body_time", self.body_time, 1, 600)
+        _within("idle_time", self.idle_time, 1, 3600)
+        _within("drain_time", self.drain_time, 1, 3600)
+        _within("connections", self.connections, 1, 100_000)
         _within("jwt_leeway", self.jwt_leeway, 0, 600)
         _within("jwt_refresh", self.jwt_refresh, 10, 86_400)
 

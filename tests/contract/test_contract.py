@@ -75,7 +75,8 @@ def expected_statuses(path, method):
 
 
 def test_the_contract_lists_every_problem_type(spec):
-    kinds = {*problems.OF_REQUEST, *problems.TABLE.values(), problems.INTERNAL}
+    known = (*problems.OF_REQUEST, *problems.OF_WIRE, *problems.TABLE.values())
+    kinds = {*known, problems.INTERNAL}
     listed = spec["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
     assert set(listed) == {problems.TYPE_PREFIX + kind.name for kind in kinds}
 
