@@ -75,6 +75,7 @@ class Bounded(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         """Read what a client sent."""
         if self.refused or self.wire.left:
+            self.wire.drop(data)
             return
         self.received += len(data)
         try:

@@ -13,6 +13,9 @@ LINGER = 2.0
 """Seconds in which what a refused client still sends is read and thrown away: were the socket
 closed at once, that would reset the connection and lose the answer (RFC 9112, 9.6)."""
 
+UNHEARD = 8 * 1024 * 1024
+"""Bytes that it may send meanwhile."""
+
 UNSENT = 128 * 1024
 """Bytes that may wait in the system to be sent."""
 
@@ -32,7 +35,7 @@ class Wire:
         self.drain_time = drain_time
         self.left = False
         self._left_at = self._owed_since = math.inf
-        self._owed = 0
+        self._owed = self._dropped = 0
         # The system's own buffer would swallow megabytes and hide who takes nothing of them.
         transport.get_extra_info("socket").setsockopt(
             socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT
@@ -60,6 +63,12 @@ class Wire:
             return
         self.transport.write_eof()
         self.transport.resume_reading()
+
+    def drop(self, data: bytes) -> None:
+        """Throw away what comes after the last answer, but not without end."""
+        self._dropped += len(data)
+        if self._dropped > UNHEARD:
+            self.transport.abort()
 
     def owe(self) -> None:
         """From now on the client has to take what was sent."""
