@@ -13,6 +13,7 @@ from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.synthesis.shelf import Fixed
 from service.web import contract, problems
+from service.web.access import policy
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
 from service.web.log import Lines
@@ -50,11 +51,14 @@ def build(
 ) -> "App":
     """Application of a contract and the handlers of its operations.
 
-    Raises ValueError for an operation without a handler and a handler without an operation.
+    Raises ValueError for an operation without a handler and a handler without an operation, and
+    InvalidField or FileError for settings that would let in whom they should not, or nobody.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
     readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
-    service = Service(readiness, settings, agreed.source, lines)
+    rules = policy.of(settings)
+    policy.check_exposure(settings, rules)
+    service = Service(readiness, settings, agreed.source, rules, lines)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import service
 
 ALWAYS_NEW = b"no-store"
-FOR_EVER = b"public, max-age=31536000, immutable"
-AGAIN = b"public, no-cache"
+FOR_EVER = b"max-age=31536000, immutable"
+AGAIN = b"no-cache"
 
 LIBRARIES = ("backports.zstd", "msgspec", "nanoarrow", "numpy", "onnxruntime", "orjson", "usd-core")
 """Those that have a say in an answer's bytes."""
@@ -49,9 +49,10 @@ def held(given: str, own: str) -> bool:
     return given.strip() == "*" or own in (t.strip().removeprefix("W/") for t in given.split(","))
 
 
-def lifetime(model: str, alias_seconds: int) -> bytes:
+def lifetime(model: str, alias_seconds: int, closed: bool) -> bytes:
     """How long an answer may be used unasked: for ever under a model's hash, under its name alone
-    for so many seconds."""
+    for so many seconds. closed: by whoever asked and had to say who they are, not by others."""
+    whose = b"private, " if closed else b"public, "
     if "@" in model:
-        return FOR_EVER
-    return b"public, max-age=%d" % alias_seconds if alias_seconds else AGAIN
+        return whose + FOR_EVER
+    return whose + (b"max-age=%d" % alias_seconds if alias_seconds else AGAIN)

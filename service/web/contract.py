@@ -1,6 +1,6 @@
 """The contract: api/openapi.yaml as the service reads it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +19,7 @@ class Operation:
     query: names of its query parameters. open_query: whether the query may hold other names too,
     because an exploded object (the controls of a model) stands among the parameters. media_types:
     of what it answers with when all is well. responses: statuses. tags: under which it is listed.
+    scope: what a key must allow, where the service asks for keys; None where it never does.
     """
 
     id: str
@@ -29,6 +30,7 @@ class Operation:
     media_types: tuple[str, ...] = ()
     responses: frozenset[str] = frozenset()
     tags: frozenset[str] = frozenset()
+    scope: str | None = None
 
     @cached_property
     def negotiated(self) -> bool:
@@ -81,12 +83,21 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 media_types=_media_types(document, item[method]["responses"]),
                 responses=frozenset(item[method]["responses"]),
                 tags=frozenset(item[method].get("tags", ())),
+                scope=_scope(item[method].get("security", document.get("security", []))),
             )
 
 
 def _media_types(document: Mapping[str, Any], responses: Mapping[str, Any]) -> tuple[str, ...]:
     well = (_resolve(document, node) for code, node in responses.items() if code.startswith("2"))
     return tuple(name for node in well for name in node.get("content", ()))
+
+
+def _scope(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
+    """The one scope of a security requirement; its other alternative is a service without keys."""
+    scopes = [scope for alternative in security for of in alternative.values() for scope in of]
+    if len(scopes) > 1:
+        raise ValueError(f"scopes {scopes}, expected one at most")
+    return scopes[0] if scopes else None
 
 
 def _resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:

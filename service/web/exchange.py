@@ -14,7 +14,10 @@ from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from service.motion.errors import QueryError
-from service.web import caching, compression, deadline, log, metrics, problems
+from service.web import caching, compression, deadline, log, metrics, problems, protocol
+from service.web.access import door
+from service.web.access.audit import Call
+from service.web.access.principal import EVERYONE
 from service.web.contract import Operation
 from service.web.deadline import Watch
 from service.web.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
@@ -91,6 +94,8 @@ class Exchange:
 
     async def _answer(self) -> Response:
         site, scope = self._site, self._scope
+        if protocol.FAULT in scope:
+            raise scope[protocol.FAULT]
         found = site.places.find(scope["path"])
         if found is None:
             raise site.missing(scope["path"])
@@ -111,12 +116,25 @@ class Exchange:
             raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
         if scope["query_string"] and not operation.open_query:
             _check_parameters(self._request, operation)
+        self._let_in(operation)
         if route.compresses and b"accept-encoding" in self._headers:
             self._coding = compression.preferred(self._headers[b"accept-encoding"])
         if "model" in scope["path_params"]:
-            scope["model"] = site.service.library.find(scope["path_params"]["model"])
+            scope["model"] = scope["library"].find(scope["path_params"]["model"])
             if operation.pure:
                 self._check_held(route)
+
+    def _let_in(self, operation: Operation) -> None:
+        """Who asks, and the library as they may see it; RequestFault 401 or 403."""
+        scope, service = self._scope, self._site.service
+        scope["library"], scope["principal"] = service.library, EVERYONE
+        if service.rules.closed:
+            call = Call(self._identity, scope["method"], operation.path)
+            known = door.check(service.rules, scope["headers"], operation.scope, call)
+            scope["principal"] = known
+            if operation.scope is not None:
+                asked = scope["path_params"].get("model")
+                scope["library"] = door.seen(service.library, known, asked, call)
 
     def _check_held(self, route: Route) -> None:
         scope, accepted = self._scope, b""
@@ -171,6 +189,7 @@ class Exchange:
             "method": self._scope["method"],
             "operation": operation,
             "model": model.identity if model else None,
+            "who": self._scope["principal"].name if "principal" in self._scope else None,
             "tag": self._tag,
             "status": self._status,
             "bytes": self._size,

@@ -42,7 +42,7 @@ INLINE_POSES = 200
 
 async def list_models(service: Service, request: Request) -> Response:
     """Which models there are."""
-    return answers.document(answers.models(service.library))
+    return answers.document(answers.models(request.scope["library"]))
 
 
 async def get_model(service: Service, request: Request) -> Response:
@@ -135,8 +135,11 @@ async def live(service: Service, request: Request) -> Response:
 
 
 async def ready(service: Service, request: Request) -> Response:
-    """Which models answer, each having been asked just now."""
-    return answers.document(service.readiness.document())
+    """Which models answer, each having been asked just now.
+
+    Whoever is not known hears that they do, and no names.
+    """
+    return answers.document(service.readiness.document(request.scope["principal"].may_read))
 
 
 async def get_metrics(service: Service, request: Request) -> Response:

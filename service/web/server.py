@@ -11,7 +11,7 @@ import uvicorn
 
 from service.synthesis.library import Bounds
 from service.synthesis.shelf import Shelf
-from service.web import listening, log, metrics, workers
+from service.web import listening, log, metrics, patience, protocol, workers
 from service.web.app import create_app
 from service.web.draining import Ending, Server
 from service.web.log import Lines
@@ -77,7 +77,9 @@ def _config(readiness: Readiness, settings: Settings, lines: Lines | None) -> uv
         create_app(readiness, settings, lines),
         # Named, not "auto": without them the service would run at a fraction of its speed.
         loop="uvloop",
-        http="httptools",
+        http=protocol.bounded(patience.of(settings)),
+        # Who asks for whom is no concern of ours, and whom to believe is not known here.
+        proxy_headers=False,
         ws="none",
         lifespan="off",
         log_level="warning",

@@ -12,6 +12,7 @@ from starlette.responses import Response
 from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
 from service.web import caching
+from service.web.access.policy import Policy
 from service.web.batching import Batcher
 from service.web.log import Lines
 from service.web.readiness import Readiness
@@ -29,13 +30,14 @@ class Service:
     readiness: Readiness
     settings: Settings
     source: bytes
+    rules: Policy
     lines: Lines | None = None
     code: bytes = field(default_factory=caching.code)
     batcher: Batcher = field(default_factory=Batcher)
 
     def lifetime(self, model: str) -> bytes:
         """How long an answer may be used unasked, by the model's name in its path."""
-        return caching.lifetime(model, self.settings.alias_seconds)
+        return caching.lifetime(model, self.settings.alias_seconds, self.rules.closed)
 
     @property
     def library(self) -> Library:

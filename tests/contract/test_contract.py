@@ -78,6 +78,13 @@ def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats,
         assert answer["content"] == {found.media_type: contents[found.media_type]}
 
 
+OPEN = {"/livez", "/readyz", "/openapi.yaml"}
+
+
+def test_only_these_operations_never_ask_for_a_key():
+    assert {o.path for o in contract.load().operations if o.scope is None} == OPEN
+
+
 def test_every_operation_documents_the_errors_it_can_give(spec):
     for path, item in spec["paths"].items():
         for method in item.keys() & set(contract.METHODS):
@@ -86,6 +93,8 @@ def test_every_operation_documents_the_errors_it_can_give(spec):
 
 def expected_statuses(path, method):
     statuses = {"200", "400", "405", "500"}
+    if path not in OPEN:
+        statuses |= {"401", "403"}
     if "{model}" in path:
         statuses.add("404")
         if method == "get":
@@ -100,7 +109,8 @@ def expected_statuses(path, method):
 
 
 def test_the_contract_lists_every_problem_type(spec):
-    kinds = {*problems.OF_REQUEST, *problems.TABLE.values(), problems.INTERNAL, *problems.OF_LOAD}
+    known = (*problems.OF_REQUEST, *problems.OF_WIRE, *problems.OF_LOAD, *problems.TABLE.values())
+    kinds = {*known, problems.INTERNAL}
     listed = spec["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
     assert set(listed) == {problems.TYPE_PREFIX + kind.name for kind in kinds}
 

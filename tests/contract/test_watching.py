@@ -90,7 +90,18 @@ def test_a_request_is_one_line(told, loaded, controls):
     assert set(line) == {*LINE}
 
 
-LINE = ("time", "request", "method", "operation", "model", "tag", "status", "bytes", "milliseconds")
+LINE = (
+    "time",
+    "request",
+    "method",
+    "operation",
+    "model",
+    "who",
+    "tag",
+    "status",
+    "bytes",
+    "milliseconds",
+)
 
 
 def test_a_line_holds_nothing_that_a_client_wrote_but_its_id(told):
