@@ -20,8 +20,9 @@ from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.web import contract, problems
 from service.web.contract import Contract, Operation
-from service.web.operations import OPERATIONS, Handler, Service
+from service.web.operations import OPERATIONS
 from service.web.problems import RequestFault
+from service.web.service import Handler, Service
 from service.web.settings import Settings
 
 log = logging.getLogger(__name__)

@@ -1,12 +1,9 @@
 """What each operation of the contract does: decode, ask, encode."""
 
-import os
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from functools import partial
 
-from anyio import CapacityLimiter, to_thread
-from starlette.concurrency import run_in_threadpool
+from anyio import to_thread
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -17,7 +14,6 @@ from service.export import pack as packing
 from service.motion.answer import PoseAnswer
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
-from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
@@ -26,32 +22,18 @@ from service.web import (
     clips_query,
     contract,
     crowd_query,
+    inference,
     query,
     sending,
     walk_query,
 )
 from service.web.query import FileQuestion, PoseQuestion
-from service.web.settings import Settings
+from service.web.service import CLIPS, CROWDS, Handler, Service, made
+from service.web.service import model as _model
 from service.web.walk_query import WalkQuestion
 
 # 200 poses of 33 joints take 1 ms as JSON; more would hold up other requests.
 INLINE_POSES = 200
-
-
-@dataclass(frozen=True)
-class Service:
-    """What every operation may use."""
-
-    library: Library
-    settings: Settings
-    source: bytes
-
-
-# Crowds take as long as many clips: of their own, these threads hold nobody else up.
-CROWDS = CapacityLimiter(os.cpu_count() or 1)
-CLIPS = CapacityLimiter(os.cpu_count() or 1)
-
-Handler = Callable[[Service, Request], Awaitable[Response]]
 
 
 async def list_models(service: Service, request: Request) -> Response:
@@ -172,12 +154,9 @@ OPERATIONS: dict[str, Handler] = {
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,
+    **inference.OPERATIONS,
 }
 """Handler of each operationId."""
-
-
-def _model(service: Service, request: Request) -> Synthesizer:
-    return service.library.find(request.path_params["model"])
 
 
 async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
@@ -188,7 +167,7 @@ async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
         question.performer,
         question.level,
     )
-    content = await _made(len(answer.times) <= INLINE_POSES, partial(poses.json, answer))
+    content = await made(len(answer.times) <= INLINE_POSES, partial(poses.json, answer))
     return Response(content, media_type="application/json")
 
 
@@ -196,10 +175,5 @@ async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) ->
     convention = encoder.convention(question.unit, question.up)
     answer = model.clip(question.clip)
     quick = len(answer.clip) <= encoder.at_once
-    content = await _made(quick, partial(encoder.encode, answer, convention))
+    content = await made(quick, partial(encoder.encode, answer, convention))
     return answers.file(content, encoder, answer.trust)
-
-
-async def _made(quick: bool, make: Callable[[], bytes]) -> bytes:
-    """What `make` returns: at once if that is quick, else in a thread."""
-    return make() if quick else await run_in_threadpool(make)

@@ -16,8 +16,9 @@ class Settings:
     host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
-    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
-    seconds that open requests get to finish after SIGTERM.
+    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
+    inference_body_limit: bytes of a body of tensors, and inference_poses: rows times times of one.
+    grace: seconds that open requests get to finish after SIGTERM.
     """
 
     host: str = "127.0.0.1"
@@ -32,6 +33,8 @@ class Settings:
     clips_body_limit: int = 8 * 1024 * 1024
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
+    inference_body_limit: int = 32 * 1024 * 1024
+    inference_poses: int = 100_000
     grace: int = 10
 
     def __post_init__(self) -> None:
@@ -43,6 +46,8 @@ class Settings:
         _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("inference_body_limit", self.inference_body_limit, 1, 1024 * 1024 * 1024)
+        _within("inference_poses", self.inference_poses, 1, 10_000_000)
         _within("grace", self.grace, 0, 600)
 
 

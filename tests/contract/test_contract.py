@@ -60,7 +60,7 @@ def expected_statuses(path, method):
     statuses = {"200", "400", "405", "500"}
     if "{model}" in path:
         statuses.add("404")
-    if "/pose" in path or "/clip" in path or "/crowd" in path:
+    if any(word in path for word in ("/pose", "/clip", "/crowd", "/infer")):
         statuses.add("422")
     return statuses | ({"413", "415"} if method == "post" else set())
 

@@ -24,11 +24,14 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_CLIPS_BODY_LIMIT": "40",
         "POSEFIELD_CLIPS_LIMIT": "3",
         "POSEFIELD_CLIPS_POSES": "50",
+        "POSEFIELD_INFERENCE_BODY_LIMIT": "60",
+        "POSEFIELD_INFERENCE_POSES": "7",
         "POSEFIELD_GRACE": "0",
     }
     crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
     clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
-    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, grace=0)
+    tensors = {"inference_body_limit": 60, "inference_poses": 7}
+    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, **tensors, grace=0)
     assert settings.read(environ=given) == expected
 
 
