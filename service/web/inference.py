@@ -145,6 +145,7 @@ def _inferred(
     model: Synthesizer, content: bytes, length: int | None, most: int
 ) -> tuple[bytes, int | None]:
     asked = wire.received(content, length)
+    inference_query.check_model(model, asked)
     binary = inference_query.outputs(asked)
     question = inference_query.question(model.session.card, asked)
     inference_query.check_size(question, most if all(binary.values()) else min(most, JSON_POSES))

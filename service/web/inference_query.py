@@ -7,10 +7,22 @@ from service.motion.conventions import Singles
 from service.motion.errors import InvalidField, QueryError
 from service.synthesis import session
 from service.synthesis.session import LEVEL, PERFORMER
+from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.tensors import TensorQuestion
 from service.web import problems
 from service.web.problems import RequestFault, pointer
 from service.web.tensors import Received, Tensor, unfit
+
+
+def check_model(model: Synthesizer, asked: Received) -> None:
+    """RequestFault where the body names another model than the path."""
+    named = {
+        "model_name": (asked.body.model_name, (model.name, model.identity)),
+        "model_version": (asked.body.model_version, (model.session.digest,)),
+    }
+    for member, (given, known) in named.items():
+        if isinstance(given, str) and given not in known:
+            raise unfit(f"{given!r}, expected {known[0]!r} as in the path", pointer(member))
 
 
 def question(card: ModelCard, asked: Received) -> TensorQuestion:

@@ -66,6 +66,9 @@ class InferenceBody(Struct, frozen=True, forbid_unknown_fields=True):
     inputs: list[InputBody]
     outputs: list[OutputBody] = []
     id: str | UnsetType = UNSET
+    # The path says both; clients of KServe say the first once more.
+    model_name: str | UnsetType = UNSET
+    model_version: str | UnsetType = UNSET
     parameters: InferenceParameters = InferenceParameters()
 
 

@@ -180,6 +180,8 @@ def test_a_version_is_a_hash_and_an_id_comes_back(ask, loaded, tensors):
     told = {"model_name": "reach", "model_version": digest, "id": "a 1"}
     assert {name: answer.json()[name] for name in told} == told
     assert "id" not in ask("POST", f"{PATH}/infer", json=question(tensors)).json()
+    twice = question(tensors, model_name="reach", model_version=digest)
+    assert ask("POST", f"{PATH}/infer", json=twice).status_code == 200
     assert ask("GET", f"{PATH}/versions/{digest}").json() == ask("GET", PATH).json()
     assert ask("GET", f"{PATH}@{digest}/ready").json() == {"name": "reach", "ready": True}
 
@@ -235,6 +237,14 @@ WRONG = [
     (spoiled(lambda b: b.pop("inputs")), 400, "bad-body", "/inputs", "missing"),
     (spoiled(lambda b: b.update(frames=1)), 400, "bad-body", "/frames", "unknown"),
     (spoiled(lambda b: b.update(id=1)), 400, "bad-body", "/id", "str"),
+    (spoiled(lambda b: b.update(model_name="walk")), 422, "invalid-field", "/model_name", "as in"),
+    (
+        spoiled(lambda b: b.update(model_version="1")),
+        422,
+        "invalid-field",
+        "/model_version",
+        "expected",
+    ),
     (put(0, datatype="FP16"), 400, "bad-body", "/inputs/0/datatype", "FP16"),
     (put(0, shape=[5.5, 4]), 400, "bad-body", "/inputs/0/shape/0", "multiple of 1"),
     (put(0, shape=[-1, 4]), 400, "bad-body", "/inputs/0/shape/0", ">= 0"),
