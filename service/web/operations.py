@@ -22,6 +22,7 @@ from service.web import (
     clips_query,
     contract,
     crowd_query,
+    inference,
     metrics,
     negotiation,
     pose_operations,
@@ -169,6 +170,7 @@ _FIXED: dict[str, Handler] = {
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,
+    **inference.OPERATIONS,
 }
 
 

@@ -20,6 +20,7 @@ from service.motion.errors import (
 
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:posefield:problem:"
+INFERENCE = "/v2"
 
 
 @dataclass(frozen=True)
@@ -156,4 +157,7 @@ def _answer(
         "instance": request.state.request_id,
         "errors": errors,
     }
+    if request.scope["path"].startswith(INFERENCE):
+        # Clients of the Open Inference Protocol read nothing else.
+        document["error"] = detail
     return Response(orjson.dumps(document), kind.status, headers, MEDIA_TYPE)

@@ -24,6 +24,8 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_CLIPS_BODY_LIMIT": "40",
         "POSEFIELD_CLIPS_LIMIT": "3",
         "POSEFIELD_CLIPS_POSES": "50",
+        "POSEFIELD_INFERENCE_BODY_LIMIT": "60",
+        "POSEFIELD_INFERENCE_POSES": "7",
         "POSEFIELD_GRACE": "0",
         "POSEFIELD_OPEN": "1",
         "POSEFIELD_KEYS_FILE": "keys",
@@ -39,7 +41,8 @@ def test_each_setting_has_a_variable():
     ends = {"grace": 0, "drain": 5, "workers": 4}
     follows = {"reload": 0, "versions": 7, "versions_memory": 1000}
     access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
-    others = {**crowds, **clips, **ends, **follows, **access}
+    tensors = {"inference_body_limit": 60, "inference_poses": 7}
+    others = {**crowds, **clips, **tensors, **ends, **follows, **access}
     expected = Settings("::1", 9000, body_limit=10, **others)
     assert settings.read(environ=given) == expected
 
