@@ -114,9 +114,9 @@ class Exchange:
         if site.open > site.service.settings.concurrency and operation.sheds:
             detail = f"{site.open - 1} requests are being answered"
             raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
+        self._let_in(operation)
         if scope["query_string"] and not operation.open_query:
             _check_parameters(self._request, operation)
-        self._let_in(operation)
         if route.compresses and b"accept-encoding" in self._headers:
             self._coding = compression.preferred(self._headers[b"accept-encoding"])
         if "model" in scope["path_params"]:
