@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from service.encode import bvh, crowd_poses, glb, keyframes, poses, tables, usd, usdz
 from service.encode import convention as conventions
@@ -84,7 +85,7 @@ class PoseEncoder:
     media_type: str
     write: Callable[[Table], bytes]
 
-    def encode(self, answer: PoseAnswer) -> bytes:
+    def encode(self, answer: PoseAnswer[Any]) -> bytes:
         """Bytes of an answer."""
         return self.write(poses.table(answer))
 

@@ -1,11 +1,13 @@
 """Poses as a table, one row a time."""
 
+from typing import Any
+
 from service.encode import tables
 from service.encode.tables import Table, single
 from service.motion.answer import PoseAnswer
 
 
-def table(answer: PoseAnswer) -> Table:
+def table(answer: PoseAnswer[Any]) -> Table:
     """Table of S rows; bone offsets hold for all times."""
     return Table(
         {
@@ -18,6 +20,6 @@ def table(answer: PoseAnswer) -> Table:
     )
 
 
-def json(answer: PoseAnswer) -> bytes:
+def json(answer: PoseAnswer[Any]) -> bytes:
     """One JSON object: schema PoseAnswer of the contract."""
     return tables.json(table(answer))

@@ -1,11 +1,16 @@
 """What a model answers: poses or a clip, and how far they may be trusted."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from service.motion.card import Control
 from service.motion.clip import Clip
 from service.motion.conventions import Floats, Singles, Truths
+
+Number = TypeVar("Number", bound=np.floating[Any])
 
 
 @dataclass(frozen=True)
@@ -41,13 +46,13 @@ class Trust:
 
 
 @dataclass(frozen=True)
-class PoseAnswer:
+class PoseAnswer(Generic[Number]):
     """Poses at times (S,), s: rotations (S, J, 4), root_position (S, 3), bone_offsets (J, 3)."""
 
     times: Floats
-    rotations: Floats
-    root_position: Floats
-    bone_offsets: Floats
+    rotations: NDArray[Number]
+    root_position: NDArray[Number]
+    bone_offsets: NDArray[Number]
     trust: Trust
 
 

@@ -69,9 +69,7 @@ def negotiated(offers: Mapping[str, str], handlers: Mapping[str, Handler]) -> Ha
     table = tuple(offers.items())
 
     async def handler(service: Service, request: Request) -> Response:
-        response = await handlers[format_of(request, table)](service, request)
-        response.headers["Vary"] = VARY
-        return response
+        return await handlers[format_of(request, table)](service, request)
 
     return handler
 

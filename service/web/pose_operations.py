@@ -18,7 +18,7 @@ AT_ONCE = 2000
 async def get_pose(encoder: PoseEncoder, served: Service, request: Request) -> Response:
     """Poses in the encoder's format, asked for by query parameters."""
     model = service.model(served, request)
-    question = query.pose_of_pairs(request.query_params.multi_items())
+    question = query.pose_of_pairs(query.pairs(request.scope["query_string"]))
     return await _pose(model, question, encoder)
 
 

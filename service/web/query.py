@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast, get_args
+from urllib.parse import parse_qsl
 
 import msgspec
 
@@ -84,6 +85,11 @@ class FileBody(ClipBody, frozen=True):
 _POSE = msgspec.json.Decoder(PoseBody)
 _FILE = msgspec.json.Decoder(FileBody)
 _FLOAT = msgspec.json.Decoder(float)
+
+
+def pairs(query_string: bytes) -> list[tuple[str, str]]:
+    """Names and values of a query string."""
+    return parse_qsl(query_string.decode("latin-1"), keep_blank_values=True)
 
 
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:

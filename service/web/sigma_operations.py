@@ -9,7 +9,7 @@ from service.encode.grids import GRID_ENCODERS, GridEncoder
 from service.synthesis import grid
 from service.synthesis.grid import GridQuestion
 from service.synthesis.synthesizer import Synthesizer
-from service.web import answers, body, service, sigma_query
+from service.web import answers, body, query, service, sigma_query
 from service.web.service import Handler, Service
 
 # A millisecond.
@@ -18,7 +18,7 @@ AT_ONCE = 1024
 
 async def get_sigma(encoder: GridEncoder, served: Service, request: Request) -> Response:
     """A grid in the encoder's format, asked for by query parameters."""
-    model, pairs = service.model(served, request), request.query_params.multi_items()
+    model, pairs = service.model(served, request), query.pairs(request.scope["query_string"])
     return await _answer(model, sigma_query.of_pairs(pairs, served.settings), encoder)
 
 

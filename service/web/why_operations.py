@@ -7,7 +7,7 @@ from starlette.responses import Response
 from service.encode import reasons
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.why import WhyQuestion, why
-from service.web import body, service, why_query
+from service.web import body, query, service, why_query
 from service.web.service import Handler, Service
 
 # Captured clips whose system is inverted, for the first who asks, in some milliseconds.
@@ -17,7 +17,7 @@ AT_ONCE = 100
 async def get_why(served: Service, request: Request) -> Response:
     """Reasons asked for by query parameters."""
     model = service.model(served, request)
-    return await _answer(model, why_query.of_pairs(request.query_params.multi_items()))
+    return await _answer(model, why_query.of_pairs(query.pairs(request.scope["query_string"])))
 
 
 async def query_why(served: Service, request: Request) -> Response:

@@ -27,8 +27,9 @@ def test_routes_and_operations_are_the_same_set(spec, app):
         for method in item
         if method in contract.METHODS
     }
-    # Starlette answers HEAD wherever GET is, and the contract says so in its introduction.
-    served = {(m, route.path) for route in app.routes for m in route.methods if m != "HEAD"}
+    # HEAD is answered wherever GET is, and the contract says so in its introduction.
+    places = app.site.places.places
+    served = {(m, place.template) for place in places for m in place.routes if m != "HEAD"}
     assert served == agreed
 
 
@@ -77,6 +78,13 @@ def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats,
         assert answer["content"] == {found.media_type: contents[found.media_type]}
 
 
+OPEN = {"/livez", "/readyz", "/openapi.yaml", "/v2", "/v2/health/live", "/v2/health/ready"}
+
+
+def test_only_these_operations_never_ask_for_a_key():
+    assert {o.path for o in contract.load().operations if o.scope is None} == OPEN
+
+
 def test_every_operation_documents_the_errors_it_can_give(spec):
     for path, item in spec["paths"].items():
         for method in item.keys() & set(contract.METHODS):
@@ -85,9 +93,17 @@ def test_every_operation_documents_the_errors_it_can_give(spec):
 
 def expected_statuses(path, method):
     statuses = {"200", "400", "405", "500"}
+    if path not in OPEN:
+        statuses |= {"401", "403"}
     if "{model}" in path:
         statuses.add("404")
-    if path.count("/") > 3:
+        if method == "get":
+            statuses.add("304")
+    if path.startswith(("/v1", "/v2/models")) or path.endswith(("/readyz", "/health/ready")):
+        statuses.add("503")
+    if path.endswith("/infer"):
+        statuses.add("422")
+    if path.startswith("/v1") and path.count("/") > 3:
         statuses.add("422")
         # A path that names no format asks which is accepted.
         statuses |= set() if "." in path or path.endswith("/why") else {"406"}
@@ -95,7 +111,8 @@ def expected_statuses(path, method):
 
 
 def test_the_contract_lists_every_problem_type(spec):
-    kinds = {*problems.OF_REQUEST, *problems.TABLE.values(), problems.INTERNAL}
+    known = (*problems.OF_REQUEST, *problems.OF_WIRE, *problems.OF_LOAD, *problems.TABLE.values())
+    kinds = {*known, problems.INTERNAL}
     listed = spec["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
     assert set(listed) == {problems.TYPE_PREFIX + kind.name for kind in kinds}
 

@@ -281,11 +281,21 @@ def test_a_strange_host_is_no_failure(host, refuse):
     refuse(404, "no-such-path", "GET", "/nowhere", headers={"host": host})
 
 
-@pytest.mark.parametrize(("path", "allow"), [(POSE, "GET, HEAD, POST"), ("/livez", "GET, HEAD")])
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
+@pytest.mark.parametrize(
+    ("path", "allow"), [(POSE, "GET, HEAD, OPTIONS, POST"), ("/livez", "GET, HEAD, OPTIONS")]
+)
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "TRACE"])
 def test_another_method_is_told_which_are_allowed(path, allow, method, ask, refuse):
     refuse(405, "method-not-allowed", method, path)
     assert ask(method, path).headers["allow"] == allow
+
+
+@pytest.mark.parametrize(
+    ("path", "allow"), [(POSE, "GET, HEAD, OPTIONS, POST"), ("/livez", "GET, HEAD, OPTIONS")]
+)
+def test_options_says_what_is_allowed(path, allow, ask):
+    answer = ask("OPTIONS", path)
+    assert (answer.status_code, answer.content, answer.headers["allow"]) == (204, b"", allow)
 
 
 def test_too_many_times_are_refused(refuse, controls):
