@@ -1,41 +1,13 @@
 """The real process on a real socket: it answers, ends when told to, and refuses bad models."""
 
-import contextlib
-import os
 import signal
 import socket
-import subprocess
-import sys
 import threading
-from pathlib import Path
 
 import httpx
 import pytest
 from pxr import Usd
-
-ROOT = Path(__file__).parents[2]
-POSEFIELD = Path(sys.executable).with_name("posefield")
-
-
-@contextlib.contextmanager
-def process(*paths, **environ):
-    """The service as a process of its own; killed if the test leaves it running."""
-    command = [POSEFIELD, "serve", *map(str, paths)]
-    given = {**os.environ, "POSEFIELD_PORT": "0", **environ}
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, cwd=ROOT, env=given, stdout=pipe, stderr=pipe) as child:
-        watch = threading.Timer(60, child.kill)
-        watch.start()
-        try:
-            yield child
-        finally:
-            watch.cancel()
-            child.kill()
-
-
-def address(child) -> str:
-    """Where the service says it listens: the one line that it prints."""
-    return child.stdout.readline().decode().split()[-1]
+from serving import address, process
 
 
 @pytest.fixture(scope="module")
