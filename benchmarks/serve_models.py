@@ -75,7 +75,9 @@ def _taken(folder: Path, **environ: str) -> list[float]:
 
 def _start(folder: Path) -> list[Row]:
     took, count = _taken(folder), len(list(folder.iterdir()))
-    said = f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s"
+    with _serving(folder) as (process, _, _):
+        own = _processor_time(process.pid)
+    said = f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s; {own:.2f} s of processor time"
     return [Row(f"start to ready, {count} models", statistics.median(took), "s", said, None, READY)]
 
 
@@ -149,6 +151,12 @@ def _replace(folder: Path, number: int) -> None:
     aside = folder / "aside"
     aside.write_bytes(path.read_bytes()[:-6] + b"\x32\x04" + b"%04d" % (1000 + number))
     aside.rename(path)
+
+
+def _processor_time(process: int) -> float:
+    """Seconds that a process has computed."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return sum(int(ticks) for ticks in fields[11:13]) / os.sysconf("SC_CLK_TCK")
 
 
 def _at(times: list[float], share: float) -> float:
