@@ -34,10 +34,13 @@ def serve(places: Sequence[str | Path], settings: Settings, hooks: Hooks | None 
         sys.stdout.flush()
 
     work = Work(tuple(str(place) for place in places), settings, sockets)
-    if (count := settings.workers or workers.processors()) > 1:
-        workers.keep(count, work, listens, hooks or Hooks())
-    else:
-        answer(work, listens)
+    try:
+        if (count := settings.workers or workers.processors()) > 1:
+            workers.keep(count, work, listens, hooks or Hooks())
+        else:
+            answer(work, listens)
+    finally:
+        listening.close(sockets)
 
 
 def answer(
