@@ -1,6 +1,6 @@
 """The models a service answers for: an immutable whole, which another may take the place of."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, chain, takewhile
@@ -33,6 +33,11 @@ class Library:
         """All versions of a name that are here, the newest first; none for a name unknown."""
         newest = self.models.get(name)
         return (newest, *(m for m in self.older if m.name == name)) if newest else ()
+
+    def of(self, may_read: Callable[[str], bool]) -> "Library":
+        """The models of some names alone."""
+        models = {name: model for name, model in self.models.items() if may_read(name)}
+        return Library(models, tuple(model for model in self.older if may_read(model.name)))
 
     @property
     def identities(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import numpy as np
 import onnxruntime
 
 from service.motion import card as cards
+from service.motion import field
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Singles
 from service.motion.errors import ModelError
+from service.motion.field import Weigher
 from service.synthesis import freeze
 
 INPUTS = {"controls": 2, "time": 2}
@@ -56,13 +59,15 @@ class Session:
     """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
 
     runtimes: onnxruntime's sessions, one for each level of detail; clocks: the same of the graphs
-    that tell the duration alone. size: bytes of the file. golden: what it answers in the middle.
+    that tell the duration alone, and gauges of the one that tells the finest level's sigma. size:
+    bytes of the file. golden: what it answers in the middle.
     """
 
     card: ModelCard
     digest: str
     runtimes: Sequence[Any]
     clocks: Sequence[Any]
+    gauges: Sequence[Any]
     size: int
     golden: bytes = b""
 
@@ -90,6 +95,22 @@ class Session:
         """Durations (B,), s, as `run` gives them, in a quarter of its time."""
         answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
         return answers[0]
+
+    def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
+        """Sigmas (B,), m, as `run` gives them at level 0, in half of its time."""
+        answers: list[Singles] = self.gauges[0].run(["sigma"], self._feed(controls, labels))
+        return answers[0]
+
+    @cached_property
+    def weigher(self) -> Weigher:
+        """What the captured clips count for; only of a card that says what that hangs on."""
+        own = self.card
+        assert own.kriging is not None
+        low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
+        points = field.half_ranges(np.array(own.examples), low, high)
+        who = np.array(own.moved_by or [0] * len(points))
+        labels = np.eye(max(len(own.performers), 1), len(own.performers))[who]
+        return Weigher(own.kriging, np.hstack([points, labels]))
 
     @property
     def memory(self) -> int:
@@ -152,12 +173,13 @@ def _levelled(card: ModelCard, content: bytes, source: str) -> Session:
         except (ValueError, LookupError) as fault:
             raise ModelError(source, f"no protocol buffer: {fault}") from fault
 
-    def clock(number: int) -> Any:
-        return _start(freeze.for_output(level(number), "duration"), source)
+    def telling(output: str) -> Callable[[int], Any]:
+        return lambda number: _start(freeze.for_output(level(number), output), source)
 
     count = len(card.levels)
     runtimes = Runtimes(lambda number: _start(level(number), source), count)
-    session = Session(card, digest(content), runtimes, Runtimes(clock, count), len(content))
+    clocks, gauges = Runtimes(telling("duration"), count), Runtimes(telling("sigma"), 1)
+    session = Session(card, digest(content), runtimes, clocks, gauges, len(content))
     # Asks the finest level and its clock, and so opens them.
     return replace(session, golden=session.trial())
 

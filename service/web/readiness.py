@@ -4,6 +4,7 @@ A new file that cannot be used is shown, and changes nothing: the version before
 """
 
 import time
+from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Any
 
@@ -28,20 +29,22 @@ class Readiness:
         self._tried: tuple[Library, float] | None = None
         self._wrong: list[str] = []
 
-    def document(self) -> dict[str, Any]:
-        """What answers, and what became of newer files; RequestFault 503 when not ready."""
+    def document(self, may_read: Callable[[str], bool]) -> dict[str, Any]:
+        """What answers, and what became of newer files, of the models whose names may be read;
+        RequestFault 503 when not ready."""
         library = self.models.library
         if self.draining:
             raise RequestFault(problems.NOT_READY, "the service is ending")
         if not library.models:
             raise RequestFault(problems.NOT_READY, "there is no model")
         if wrong := self._tested(library):
-            detail = f"not as when opened answers {', '.join(wrong)}"
+            known = ", ".join(name for name in wrong if may_read(name.partition("@")[0]))
+            detail = f"not as when opened answers {known or 'a model'}"
             raise RequestFault(problems.NOT_READY, detail)
         return {
             "status": "ready",
-            "models": [model.identity for model in library.models.values()],
-            "reload": _told(self.models.reloads),
+            "models": [m.identity for m in library.models.values() if may_read(m.name)],
+            "reload": _told(self.models.reloads, may_read),
         }
 
     def _tested(self, library: Library) -> list[str]:
@@ -60,13 +63,13 @@ def _answers(model: Synthesizer) -> bool:
         return False
 
 
-def _told(reloads: Reloads) -> dict[str, Any]:
+def _told(reloads: Reloads, may_read: Callable[[str], bool]) -> dict[str, Any]:
     return {
         "looks": reloads.looks,
         "opened": reloads.opened,
         "failed": reloads.failed,
         "changed": datetime.fromtimestamp(reloads.changed, UTC).isoformat(timespec="seconds"),
-        "faults": [_fault(fault) for fault in reloads.faults],
+        "faults": [_fault(fault) for fault in reloads.faults if may_read(fault.name)],
     }
 
 

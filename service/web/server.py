@@ -11,9 +11,10 @@ import uvicorn
 
 from service.synthesis.library import Bounds
 from service.synthesis.shelf import Shelf
-from service.web import listening, workers
+from service.web import listening, log, metrics, patience, protocol, workers
 from service.web.app import create_app
 from service.web.draining import Ending, Server
+from service.web.log import Lines
 from service.web.readiness import Readiness
 from service.web.settings import Settings
 from service.web.workers import Hooks, Work
@@ -36,7 +37,9 @@ def serve(places: Sequence[str | Path], settings: Settings, hooks: Hooks | None 
     work = Work(tuple(str(place) for place in places), settings, sockets)
     try:
         if (count := settings.workers or workers.processors()) > 1:
-            workers.keep(count, work, listens, hooks or Hooks())
+            with metrics.shared() as folder:
+                own = Hooks(lambda number: {metrics.FOLDER: folder}, metrics.gone)
+                workers.keep(count, work, listens, hooks or own)
         else:
             answer(work, listens)
     finally:
@@ -53,8 +56,9 @@ def answer(
     settings = work.settings
     shelf = Shelf(work.places, Bounds(settings.versions, settings.versions_memory))
     readiness = Readiness(shelf)
+    lines = log.to_standard_error() if settings.log == "on" else None
     server = Server(
-        _config(readiness, settings),
+        _config(readiness, settings, lines),
         readiness,
         Ending(settings.drain, settings.grace),
         lambda: listens([*shelf.library.models]),
@@ -62,6 +66,8 @@ def answer(
     )
     with shelf.watched(settings.reload):
         server.run(work.sockets)
+    if lines is not None:
+        lines.flush()
     if server.cut_off:
         # A thread that is not done would hold the process up.
         logging.shutdown()
@@ -69,12 +75,14 @@ def answer(
         os._exit(0)
 
 
-def _config(readiness: Readiness, settings: Settings) -> uvicorn.Config:
+def _config(readiness: Readiness, settings: Settings, lines: Lines | None) -> uvicorn.Config:
     return uvicorn.Config(
-        create_app(readiness, settings),
+        create_app(readiness, settings, lines),
         # Named, not "auto": without them the service would run at a fraction of its speed.
         loop="uvloop",
-        http="httptools",
+        http=protocol.bounded(patience.of(settings)),
+        # Who asks for whom is no concern of ours, and whom to believe is not known here.
+        proxy_headers=False,
         ws="none",
         lifespan="off",
         log_level="warning",

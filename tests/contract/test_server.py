@@ -1,5 +1,6 @@
 """The real process on a real socket: it answers, ends when told to, and refuses bad models."""
 
+import json
 import signal
 import socket
 import threading
@@ -75,11 +76,13 @@ def test_a_chunked_body_without_end_is_cut_off(client):
 
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
 def test_told_to_end_it_ends_well(ending, models):
-    with process(models) as child:
+    with process(models, POSEFIELD_LOG="on") as child:
         assert httpx.get(address(child) + "/readyz").status_code == 200
         child.send_signal(ending)
         assert child.wait(20) == 0
-        assert child.stdout.read() == child.stderr.read() == b""
+        assert child.stdout.read() == b""
+        (line,) = map(json.loads, child.stderr)
+        assert (line["operation"], line["status"]) == ("getReadiness", 200)
 
 
 def test_open_requests_are_answered_before_the_end(models, controls):

@@ -162,7 +162,7 @@ def test_as_many_as_there_are_processors(models):
 
 
 def test_ctrl_c_reaches_them_in_order(models):
-    given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_WORKERS": "2"}
+    given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "2"}
     command = [Path(sys.executable).with_name("posefield"), "serve", str(models)]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, env=given, stdout=pipe, stderr=pipe, process_group=0) as child:
