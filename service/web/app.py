@@ -19,14 +19,14 @@ from service.encode import CROWD_ENCODERS, ENCODERS, crowd
 from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
-from service.web import contract, problems, protocol
+from service.web import browser, contract, cors, problems, protocol
 from service.web.access import door, policy
 from service.web.access.audit import Call
 from service.web.access.policy import Policy
 from service.web.contract import Contract, Operation
 from service.web.operations import OPERATIONS, Handler, Service
 from service.web.problems import RequestFault
-from service.web.settings import Settings
+from service.web.settings import PREFIX, Settings
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ def build(
     paths = dict.fromkeys(operation.path for operation in agreed.operations)
     app = Starlette(
         routes=[_route(path, agreed, handlers, service, rules) for path in paths],
-        middleware=[Middleware(Envelope)],
+        middleware=[Middleware(Envelope, origins=cors.read(settings.origins, f"{PREFIX}ORIGINS"))],
         exception_handlers={
             HTTPException: _of_routing,
             RequestFault: problems.of_fault,
@@ -124,6 +124,10 @@ async def _of_routing(request: Request, fault: Exception) -> Response:
     path = request.scope["path"]
     if fault.status_code == problems.METHOD_NOT_ALLOWED.status:
         allow = ", ".join(sorted((fault.headers or {})["Allow"].split(", ")))
+        if request.method == "OPTIONS" and cors.is_preflight(request.scope["headers"]):
+            response = Response(status_code=204, headers={"Allow": allow})
+            response.raw_headers += cors.preflight(allow.encode())
+            return response
         detail = f"{request.method}, expected one of {allow}"
         refusal = RequestFault(problems.METHOD_NOT_ALLOWED, detail, headers={"Allow": allow})
         return await problems.of_fault(request, refusal)
@@ -137,8 +141,9 @@ async def _of_routing(request: Request, fault: Exception) -> Response:
 class Envelope:
     """Gives every request an id, every answer its common headers and every failure one shape."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, origins: frozenset[bytes]) -> None:
         self.app = app
+        self.origins = origins
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -146,7 +151,7 @@ class Envelope:
             return
         identity = _request_id(scope)
         scope.setdefault("state", {})["request_id"] = identity
-        started = False
+        started, headers_given = False, dict(scope["headers"])
 
         async def sealed(message: Message) -> None:
             nonlocal started
@@ -154,7 +159,8 @@ class Envelope:
                 started = True
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-Id"] = identity
-                headers["X-Content-Type-Options"] = "nosniff"
+                message["headers"] += browser.common({name for name, _ in message["headers"]})
+                message["headers"] += cors.headers(headers_given.get(b"origin"), self.origins)
             await send(message)
 
         try:
