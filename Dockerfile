@@ -4,6 +4,11 @@ ENV UV_COMPILE_BYTECODE=1 \
     UV_LINK_MODE=copy \
     UV_PROJECT_ENVIRONMENT=/opt/posefield \
     UV_PYTHON_DOWNLOADS=never
+# Debian keeps one version of a package: there is none to name.
+# hadolint ignore=DL3008
+RUN apt-get update && \
+    apt-get install --yes --no-install-recommends binutils && \
+    rm -rf /var/lib/apt/lists/*
 RUN pip install --no-cache-dir uv==0.13.8
 # Object stores are 16 MB, Dask another 18: --build-arg EXTRAS="--extra store --extra dask". Parquet is 170.
 ARG EXTRAS="--extra store"
@@ -12,6 +17,13 @@ WORKDIR /src
 COPY pyproject.toml uv.lock README.md LICENSE ./
 # hadolint ignore=SC2086
 RUN uv sync --frozen --no-dev --no-install-project ${EXTRAS}
+# A third of USD's wheel is symbols. Not everywhere: stripped, OpenBLAS of NumPy's does not load any more.
+# What follows are the wheels' own tests, and tools that make models.
+WORKDIR /opt/posefield/lib/python3.11/site-packages
+RUN find pxr usd_core.libs -name '*.so*' -type f -exec strip --strip-unneeded {} + && \
+    find . -type d -name tests -prune -exec rm -r {} + && \
+    rm -r onnxruntime/quantization onnxruntime/tools onnxruntime/transformers
+WORKDIR /src
 # service/web/openapi.yaml is a link into api/.
 COPY api api
 COPY service service
@@ -21,6 +33,15 @@ RUN uv sync --frozen --no-dev --no-editable ${EXTRAS}
 RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
 
 FROM python:3.11-slim-bookworm
+ARG SOURCE=""
+ARG REVISION=""
+LABEL org.opencontainers.image.title="posefield" \
+      org.opencontainers.image.description="Control parameters and a time in, poses and clips out." \
+      org.opencontainers.image.version="0.1.0" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.base.name="docker.io/library/python:3.11-slim-bookworm" \
+      org.opencontainers.image.source="${SOURCE}" \
+      org.opencontainers.image.revision="${REVISION}"
 # Bytecode is compiled above; the root may be read-only. onnxruntime reports to its vendor unless told not to.
 # It listens for everybody, and so starts only with keys (POSEFIELD_KEYS_FILE, ...) or with POSEFIELD_OPEN=1.
 ENV PATH=/opt/posefield/bin:$PATH \

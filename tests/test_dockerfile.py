@@ -65,6 +65,7 @@ def test_the_build_takes_the_lock_and_what_exports_to_stores_need(stages):
     assert all("--frozen" in line and "--no-dev" in line for line in syncs)
     assert "--no-editable" in syncs[-1]
     assert values(stages[0], "ARG") == ['EXTRAS="--extra store"']
+    assert values(stages[1], "ARG") == ['SOURCE=""', 'REVISION=""']
     assert all(line.endswith(" ${EXTRAS}") and "--extra" not in line for line in syncs)
     known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert "store" in known["optional-dependencies"]
@@ -102,6 +103,16 @@ def test_it_serves_the_models_folder(stages):
     assert [json.loads(line) for line in values(final, "ENTRYPOINT")] == [["posefield", "serve"]]
     assert [json.loads(line) for line in values(final, "CMD")] == [["/models"]]
     assert values(final, "EXPOSE") == [environment(final)["POSEFIELD_PORT"]]
+
+
+def test_labels_say_what_it_is(stages):
+    given = dict(pair.split("=", 1) for pair in shlex.split(values(stages[1], "LABEL")[0]))
+    said = {name.removeprefix("org.opencontainers.image."): text for name, text in given.items()}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert (said["title"], said["version"]) == (project["name"], __version__)
+    assert said["licenses"] == project["license"]
+    assert said["base.name"].endswith("/" + values(stages[1], "FROM")[0])
+    assert (said["source"], said["revision"]) == ("${SOURCE}", "${REVISION}")
 
 
 def test_it_is_healthy_when_it_is_ready(stages):

@@ -10,14 +10,19 @@ MEDIA_TYPE = "application/json"
 async def read(request: Request, limit: int) -> bytes:
     """Body of a JSON request; nothing beyond `limit` bytes is read, declared or chunked."""
     _check_media_type(request.headers.get("content-type", ""))
+    return await content(request, limit)
+
+
+async def content(request: Request, limit: int) -> bytes:
+    """Body of a request, whatever it is; nothing beyond `limit` bytes is read."""
     if _declared(request) > limit:
         raise _too_large(limit)
-    content = bytearray()
+    found = bytearray()
     async for chunk in request.stream():
-        content += chunk
-        if len(content) > limit:
+        found += chunk
+        if len(found) > limit:
             raise _too_large(limit)
-    return bytes(content)
+    return bytes(found)
 
 
 def _check_media_type(given: str) -> None:

@@ -11,12 +11,15 @@ COMMON = (
     # Pages that CORS lets in fetch with it; this is for those that would embed.
     (b"cross-origin-resource-policy", b"same-origin"),
 )
-"""Headers of every answer."""
+"""Headers of every answer that is data."""
+
+PAGES = tuple(pair for pair in COMMON if pair[0] != b"content-security-policy")
+"""Headers of every page of our own, which says by itself what it loads: see `page`."""
 
 
-def common(given: set[bytes]) -> list[tuple[bytes, bytes]]:
-    """Headers of an answer that has some by itself: its own hold."""
-    return [pair for pair in COMMON if pair[0] not in given]
+def of(media_type: str | None) -> tuple[tuple[bytes, bytes], ...]:
+    """Headers of an answer."""
+    return PAGES if media_type == "text/html" else COMMON
 
 
 def page(script: str = "'self'", style: str = "'self'") -> dict[str, str]:

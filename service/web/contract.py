@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ class Operation:
     """One operation of the contract.
 
     query: names of its query parameters. open_query: whether the query may hold other names too,
-    because an exploded object (the controls of a model) stands among the parameters. scope: what a
-    key must allow, where the service asks for keys; None where it never does.
+    because an exploded object (the controls of a model) stands among the parameters. media_types:
+    of what it answers with when all is well. responses: statuses.
+    scope: what a key must allow, where the service asks for keys; None where it never does.
     """
 
     id: str
@@ -25,7 +27,24 @@ class Operation:
     path: str
     query: frozenset[str]
     open_query: bool
-    scope: str | None
+    media_types: tuple[str, ...] = ()
+    responses: frozenset[str] = frozenset()
+    scope: str | None = None
+
+    @cached_property
+    def negotiated(self) -> bool:
+        """Whether Accept chooses among the media types."""
+        return "406" in self.responses
+
+    @cached_property
+    def sheds(self) -> bool:
+        """Whether it is refused when there is too much to do; what watches the service is not."""
+        return self.scope == "read"
+
+    @cached_property
+    def pure(self) -> bool:
+        """Whether its answer follows from the model and the request's line alone."""
+        return self.method == "GET" and "{model}" in self.path
 
 
 @dataclass(frozen=True)
@@ -60,8 +79,15 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 path=path,
                 query=frozenset(p["name"] for p in query) - set(exploded),
                 open_query=bool(exploded),
+                media_types=_media_types(document, item[method]["responses"]),
+                responses=frozenset(item[method]["responses"]),
                 scope=_scope(item[method].get("security", document.get("security", []))),
             )
+
+
+def _media_types(document: Mapping[str, Any], responses: Mapping[str, Any]) -> tuple[str, ...]:
+    well = (_resolve(document, node) for code, node in responses.items() if code.startswith("2"))
+    return tuple(name for node in well for name in node.get("content", ()))
 
 
 def _scope(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:

@@ -5,6 +5,7 @@ sets itself, so that no page can ask in the name of whoever looks at it.
 """
 
 import re
+from collections.abc import Mapping
 
 from service.motion.errors import InvalidField
 
@@ -68,7 +69,6 @@ def preflight(allow: bytes) -> Headers:
     ]
 
 
-def is_preflight(given: Headers) -> bool:
-    """Whether a browser asks with OPTIONS if it may ask otherwise."""
-    names = {name for name, _ in given}
-    return b"origin" in names and b"access-control-request-method" in names
+def is_preflight(given: Mapping[bytes, bytes]) -> bool:
+    """Whether a browser asks with OPTIONS if it may ask otherwise; given: the request's headers."""
+    return b"origin" in given and b"access-control-request-method" in given

@@ -16,8 +16,17 @@ class Settings:
     host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
-    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them. grace:
-    seconds that open requests get to finish after SIGTERM.
+    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
+    grid_limit: points of a grid of sigma. grace: seconds that open requests get to finish after
+    SIGTERM, and drain: seconds before that in which the service still listens, but says that it is
+    not ready. workers: processes that share the port; 0 for as many as there are processors.
+    reload: seconds from a look for new models to the next; 0 for never. versions: older versions of
+    a model that answer under their hash, and versions_memory: bytes that all of those may take.
+    concurrency: requests that a process answers at a time, and deadline: seconds until an answer
+    has to begin. alias_seconds: how long caches may use an answer under a model's plain name
+    without asking whether it is the newest's. log: whether each request is told on standard error,
+    in one line. inference_body_limit: bytes of a body of tensors, and inference_poses: rows times
+    times of one.
 
     url_limit, head_limit: bytes of a URL, and of all header lines. head_time, body_time: seconds in
     which a request's head and body have to arrive; idle_time: seconds that an unused connection
@@ -44,7 +53,21 @@ class Settings:
     clips_body_limit: int = 8 * 1024 * 1024
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
+    # 50 ms of work.
+    grid_limit: int = 65_536
+    inference_body_limit: int = 32 * 1024 * 1024
+    inference_poses: int = 100_000
     grace: int = 10
+    # A pose takes a tenth of a millisecond, a thousand in flight a tenth of a second.
+    concurrency: int = 1000
+    deadline: int = 30
+    alias_seconds: int = 0
+    log: str = "on"
+    drain: int = 0
+    workers: int = 1
+    reload: int = 10
+    versions: int = 2
+    versions_memory: int = 64 * 1024 * 1024
     url_limit: int = 8 * 1024
     head_limit: int = 16 * 1024
     head_time: int = 10
@@ -76,7 +99,20 @@ class Settings:
         _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
+        _within("inference_body_limit", self.inference_body_limit, 1, 1024 * 1024 * 1024)
+        _within("inference_poses", self.inference_poses, 1, 10_000_000)
         _within("grace", self.grace, 0, 600)
+        _within("concurrency", self.concurrency, 1, 1_000_000)
+        _within("deadline", self.deadline, 1, 3600)
+        _within("alias_seconds", self.alias_seconds, 0, 31_536_000)
+        if self.log not in ("on", "off"):
+            raise InvalidField(PREFIX + "LOG", f"{self.log!r}, expected on or off")
+        _within("drain", self.drain, 0, 600)
+        _within("workers", self.workers, 0, 256)
+        _within("reload", self.reload, 0, 86_400)
+        _within("versions", self.versions, 0, 1000)
+        _within("versions_memory", self.versions_memory, 0, 1 << 40)
         _within("url_limit", self.url_limit, 256, 64 * 1024)
         _within("head_limit", self.head_limit, 1024, 256 * 1024)
         _within("head_time", self.head_time, 1, 600)

@@ -18,12 +18,12 @@ from typing import Any, BinaryIO
 
 import httpx
 import uvicorn
-from starlette.applications import Starlette
+from starlette.types import ASGIApp
 
 Ask = Callable[..., httpx.Response]
 
 
-def asker(app: Starlette) -> Ask:
+def asker(app: ASGIApp) -> Ask:
     async def send(method: str, url: str, **content: Any) -> httpx.Response:
         transport = httpx.ASGITransport(app)
         async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
@@ -33,7 +33,7 @@ def asker(app: Starlette) -> Ask:
 
 
 @contextmanager
-def listening(app: Starlette) -> Iterator[str]:
+def listening(app: ASGIApp) -> Iterator[str]:
     """Address of the app, which listens on a socket in a thread of this process."""
     config = uvicorn.Config(app, port=0, lifespan="off", log_config=None)
     server = uvicorn.Server(config)
@@ -66,7 +66,8 @@ class Served:
 def process(*paths: Path, **environ: str) -> Iterator[Served]:
     """The service as a process of its own; killed where the test leaves it running."""
     command = [Path(sys.executable).with_name("posefield"), "serve", *paths]
-    given = {**os.environ, "POSEFIELD_PORT": "0", **environ}
+    quiet = {"POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "1"}
+    given = {**os.environ, **quiet, **environ}
     pipe = subprocess.PIPE
     with subprocess.Popen(command, env=given, stdout=pipe, stderr=pipe) as child:
         try:

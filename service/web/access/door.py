@@ -42,8 +42,7 @@ def seen(library: Library, principal: Principal, asked: str | None, call: Call) 
     if asked is not None and not principal.may_read(name := asked.partition("@")[0]):
         known = name if name in library.models else "unknown"
         audit.refused(call, 404, principal.name, f"may not read model {known}")
-    models = {name: model for name, model in library.models.items() if principal.may_read(name)}
-    return Library(models)
+    return library.of(principal.may_read)
 
 
 def _found(policy: Policy, headers: Headers) -> Principal:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from service.synthesis.library import NAME
+from service.synthesis.intake import NAME
 
 READ = "read"
 METRICS = "metrics"

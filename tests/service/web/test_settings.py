@@ -24,15 +24,26 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_CLIPS_BODY_LIMIT": "40",
         "POSEFIELD_CLIPS_LIMIT": "3",
         "POSEFIELD_CLIPS_POSES": "50",
+        "POSEFIELD_INFERENCE_BODY_LIMIT": "60",
+        "POSEFIELD_INFERENCE_POSES": "7",
         "POSEFIELD_GRACE": "0",
         "POSEFIELD_OPEN": "1",
         "POSEFIELD_KEYS_FILE": "keys",
         "POSEFIELD_JWT_LEEWAY": "0",
+        "POSEFIELD_DRAIN": "5",
+        "POSEFIELD_WORKERS": "4",
+        "POSEFIELD_RELOAD": "0",
+        "POSEFIELD_VERSIONS": "7",
+        "POSEFIELD_VERSIONS_MEMORY": "1000",
     }
     crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
     clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
+    ends = {"grace": 0, "drain": 5, "workers": 4}
+    follows = {"reload": 0, "versions": 7, "versions_memory": 1000}
     access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
-    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, grace=0, **access)
+    tensors = {"inference_body_limit": 60, "inference_poses": 7}
+    others = {**crowds, **clips, **tensors, **ends, **follows, **access}
+    expected = Settings("::1", 9000, body_limit=10, **others)
     assert settings.read(environ=given) == expected
 
 
@@ -57,6 +68,11 @@ def test_the_readme_lists_every_setting_and_its_default():
         ("PORT", "65536"),
         ("BODY_LIMIT", "0"),
         ("GRACE", "1.5"),
+        ("DRAIN", "601"),
+        ("WORKERS", "257"),
+        ("RELOAD", "-1"),
+        ("VERSIONS", "all"),
+        ("VERSIONS_MEMORY", "64M"),
         ("OPEN", "yes"),
         ("JWT_REFRESH", "9"),
         ("JWT_LEEWAY", "-1"),

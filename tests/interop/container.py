@@ -1,0 +1,163 @@
+"""The image runs where it may write nothing, and answers there what the service answers here."""
+
+import os
+import signal
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import debian
+import httpx
+import image
+import trained
+from image import Image
+
+from service import __version__
+from service.encode import ENCODERS, poses
+from service.synthesis.question import ClipQuestion
+
+# What the Dockerfile adds to its base: 334 MB were measured, 428 before anything was left out.
+BUDGET = 350_000_000
+PORT = "8000"
+# A process that ended because it was told to, and one that stands still.
+PATIENCE, STILL = 15.0, 60.0
+
+
+def faults() -> list[str]:
+    """What is wrong with the image, a line each."""
+    if reason := debian.missing(image.TOOLS):
+        print(f"the image is not built: {reason}")
+        return []
+    began = time.monotonic()
+    with image.built() as built, tempfile.TemporaryDirectory() as name:
+        print(f"image in {time.monotonic() - began:.0f} s: {built.own / 1e6:.0f} MB", end=" ")
+        print(f"on a base of {built.base / 1e6:.0f}")
+        found = [*_described(built), *_jailed(built, Path(name)), *_served(built, Path(name))]
+    return [f"image: {fault}" for fault in found]
+
+
+def _described(built: Image) -> Iterator[str]:
+    """Faults of what the image says of itself."""
+    labels, prefix = built.config["Labels"], "org.opencontainers.image."
+    expected = {
+        "User": "10001:10001",
+        "ExposedPorts": {f"{PORT}/tcp": {}},
+        "Entrypoint": ["posefield", "serve"],
+        "Cmd": ["/models"],
+        "Volumes": {},
+    }
+    said = {
+        "title": "posefield",
+        "version": __version__,
+        "licenses": "Apache-2.0",
+        "base.name": image.base(),
+        "source": image.SOURCE,
+        "revision": image.REVISION,
+    }
+    for key, value in expected.items():
+        if built.config[key] != value:
+            yield f"{key} {built.config[key]!r}, expected {value!r}"
+    for key, value in said.items():
+        if labels.get(prefix + key) != value:
+            yield f"label {key} {labels.get(prefix + key)!r}, expected {value!r}"
+    if built.own > BUDGET:
+        yield f"{built.own} bytes beyond the base, expected at most {BUDGET}"
+
+
+def _jailed(built: Image, folder: Path) -> Iterator[str]:
+    """Faults of the container itself: what is tested in it has to be one."""
+    script = "id -u; id -g; grep -E '^(CapEff|NoNewPrivs)' /proc/self/status"
+    tried = " ".join(f"{place}/x" for place in ("", "/opt/posefield", "/models", "/var/tmp"))
+    script = f"{script}; touch /tmp/x && rm /tmp/x; touch {tried}"
+    said, complaint, _ = _run(built, ["sh", "-c", script], folder)
+    expected = ["10001", "10001", "CapEff:\t0000000000000000", "NoNewPrivs:\t1"]
+    if said.splitlines() != expected:
+        yield f"the process is {said.splitlines()}, expected {expected}"
+    if complaint.count("Read-only file system") != 4:
+        yield f"the root can be written: {complaint!r}"
+
+
+def _served(built: Image, folder: Path) -> Iterator[str]:
+    """Faults of the service in the image."""
+    models, temporary = _places(folder)
+    model, content = trained.family()
+    (models / "reaching.onnx").write_bytes(content)
+    port = str(_free_port())
+    told = {"POSEFIELD_PORT": port}
+    health = built.config["Healthcheck"]["Test"][1:]
+    command = [*built.config["Entrypoint"], *built.config["Cmd"]]
+    if _run(built, health, folder, **told)[2] == 0:
+        yield "healthy before it was started"
+    began = time.monotonic()
+    with built.start(command, models, temporary, **told) as jail:
+        line = jail.stdout.readline().decode() if jail.stdout else ""
+        print(f"it answers after {time.monotonic() - began:.1f} s: {line}", end="")
+        if line:
+            yield from _answers(f"http://127.0.0.1:{port}", model)
+            if _run(built, health, folder, **told)[2]:
+                yield "not healthy while it answers"
+            os.kill(_first(jail.pid), signal.SIGTERM)
+        said, complaint = jail.communicate(timeout=PATIENCE)
+    if (jail.returncode, said, complaint) != (0, b"", b""):
+        yield f"SIGTERM ends it with {jail.returncode}, {said!r} {complaint!r}"
+    if left := sorted(path.name for path in temporary.iterdir()):
+        yield f"it leaves {left} in /tmp"
+
+
+def _answers(url: str, model: trained.Synthesizer) -> Iterator[str]:
+    """Faults of answers, which have to be those of here to the last byte."""
+    controls = {control.name: control.default for control in model.session.card.controls}
+    clip = model.clip(ClipQuestion(controls))
+    expected = {
+        f"/v1/models/{model.name}/pose": poses.json(model.pose(controls, [0.5], "warn")),
+        f"/v1/models/{model.name}/clip.usdc": ENCODERS["usdc"].encode(
+            clip, ENCODERS["usdc"].convention(None, None)
+        ),
+    }
+    with httpx.Client(base_url=url, timeout=STILL) as client:
+        for path in ("/livez", "/readyz"):
+            if (status := client.get(path).status_code) != httpx.codes.OK:
+                yield f"{path} answers {status}"
+        for path, content in expected.items():
+            answer = client.get(
+                path, params=controls | {"time": 0.5} if "pose" in path else controls
+            )
+            if answer.content != content:
+                yield f"{path} answers {answer.status_code} with other bytes than here"
+
+
+def _run(built: Image, command: list[str], folder: Path, **told: str) -> tuple[str, str, int]:
+    """Output, complaints and exit code of a command in a container."""
+    with built.start(command, *_places(folder), **told) as jail:
+        said, complaint = jail.communicate(timeout=STILL)
+    return said.decode(), complaint.decode(), jail.returncode
+
+
+def _places(folder: Path) -> tuple[Path, Path]:
+    """Folders for models and for /tmp."""
+    models, temporary = folder / "models", folder / "tmp"
+    models.mkdir(exist_ok=True)
+    temporary.mkdir(exist_ok=True)
+    # The container's user is nobody here.
+    folder.chmod(0o755)
+    temporary.chmod(0o1777)
+    return models, temporary
+
+
+def _first(unshare: int) -> int:
+    """The container's first process, which unshare started, as it is numbered here."""
+    return int(Path(f"/proc/{unshare}/task/{unshare}/children").read_text())
+
+
+def _free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as held:
+        return int(held.getsockname()[1])
+
+
+if __name__ == "__main__":
+    found = faults()
+    print("\n".join(found) or "no fault in the image")
+    sys.exit(bool(found))

@@ -1,0 +1,178 @@
+"""The service's manifests: Kubernetes knows all of it, and its parts fit each other."""
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import kubernetes_validate
+import pytest
+import yaml
+
+import service
+from service.web import contract
+from service.web.settings import PREFIX, Settings
+
+DEPLOY = Path(service.__file__).parent / "deploy"
+ROOT = Path(__file__).parents[2]
+KUBERNETES = "1.37"
+KINDS = (
+    "ServiceAccount",
+    "Deployment",
+    "Service",
+    "HorizontalPodAutoscaler",
+    "PodDisruptionBudget",
+    "NetworkPolicy",
+)
+
+
+@pytest.fixture
+def objects():
+    """Every object by its kind."""
+    found = list(yaml.safe_load_all((DEPLOY / "serve.yaml").read_text()))
+    assert [each["kind"] for each in found] == list(KINDS)
+    return {each["kind"]: each for each in found}
+
+
+@pytest.fixture
+def pod(objects):
+    return objects["Deployment"]["spec"]["template"]
+
+
+@pytest.fixture
+def container(pod):
+    (own,) = pod["spec"]["containers"]
+    return own
+
+
+def environment(container):
+    return {each["name"]: each["value"] for each in container["env"]}
+
+
+def validate(manifest):
+    kubernetes_validate.validate(manifest, KUBERNETES, strict=True)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_kubernetes_knows_every_field(kind, objects):
+    validate(objects[kind])
+
+
+@pytest.mark.parametrize(
+    ("kind", "spoil"),
+    [
+        ("ServiceAccount", lambda it: it.update(automountToken=False)),
+        ("Deployment", lambda it: it["spec"]["template"]["spec"].update(seccompProfile={})),
+        ("Deployment", lambda it: it["spec"].update(replicas="2")),
+        ("Service", lambda it: it["spec"]["ports"][0].pop("port")),
+        ("HorizontalPodAutoscaler", lambda it: it["spec"].pop("maxReplicas")),
+        ("PodDisruptionBudget", lambda it: it["spec"].update(minimum=1)),
+        ("NetworkPolicy", lambda it: it["spec"].update(egress={})),
+    ],
+)
+def test_what_kubernetes_does_not_know_is_found(kind, spoil, objects):
+    """Negative control of the test above."""
+    spoil(objects[kind])
+    with pytest.raises(kubernetes_validate.ValidationError):
+        validate(objects[kind])
+
+
+def test_all_of_them_mean_the_same_pods(objects, pod):
+    labels, spec = pod["metadata"]["labels"], objects["Deployment"]["spec"]
+    spread = [each["labelSelector"] for each in pod["spec"]["topologySpreadConstraints"]]
+    chosen = [
+        spec["selector"]["matchLabels"],
+        objects["Service"]["spec"]["selector"],
+        objects["PodDisruptionBudget"]["spec"]["selector"]["matchLabels"],
+        objects["NetworkPolicy"]["spec"]["podSelector"]["matchLabels"],
+        *(each["matchLabels"] for each in spread),
+    ]
+    assert all(each == chosen[0] for each in chosen)
+    assert labels.items() >= chosen[0].items()
+    # A new version has to be within the selector of the old one.
+    assert "app.kubernetes.io/version" not in chosen[0]
+    export = yaml.safe_load((DEPLOY / "export-job.yaml").read_text())
+    assert not export["spec"]["template"]["metadata"]["labels"].items() >= chosen[0].items()
+
+
+def test_they_name_each_other(objects, pod):
+    target = objects["HorizontalPodAutoscaler"]["spec"]["scaleTargetRef"]
+    own = objects["Deployment"]
+    assert target == {
+        "apiVersion": own["apiVersion"],
+        "kind": own["kind"],
+        "name": own["metadata"]["name"],
+    }
+    assert pod["spec"]["serviceAccountName"] == objects["ServiceAccount"]["metadata"]["name"]
+    # Else every rollout would undo what the autoscaler has done.
+    assert "replicas" not in own["spec"]
+
+
+def test_one_may_go_while_the_rest_answer(objects):
+    least = objects["HorizontalPodAutoscaler"]["spec"]["minReplicas"]
+    assert least > objects["PodDisruptionBudget"]["spec"]["maxUnavailable"] == 1
+    assert objects["Deployment"]["spec"]["strategy"]["rollingUpdate"]["maxUnavailable"] == 0
+
+
+def test_the_port_is_one(objects, container):
+    (port,) = container["ports"]
+    assert str(port["containerPort"]) == environment(container)["POSEFIELD_PORT"]
+    exposed = re.search(r"^EXPOSE (\d+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    assert exposed and int(exposed[1]) == port["containerPort"]
+    probes = [container[f"{name}Probe"]["httpGet"] for name in ("startup", "readiness", "liveness")]
+    (service_port,) = objects["Service"]["spec"]["ports"]
+    (rule,) = objects["NetworkPolicy"]["spec"]["ingress"]
+    named = [*(probe["port"] for probe in probes), service_port["targetPort"]]
+    assert {*named, *(each["port"] for each in rule["ports"])} == {port["name"]}
+
+
+def test_probes_ask_what_the_contract_has(container):
+    paths = {o.path for o in contract.load().operations if o.method == "GET"}
+    asked = {
+        name: container[f"{name}Probe"]["httpGet"]["path"] for name in ("liveness", "readiness")
+    }
+    assert asked == {"liveness": "/livez", "readiness": "/readyz"}
+    assert container["startupProbe"]["httpGet"]["path"] == "/readyz"
+    assert set(asked.values()) <= paths
+
+
+def test_variables_are_settings(container):
+    known = {PREFIX + each.name.upper() for each in fields(Settings)}
+    assert set(environment(container)) <= known
+    assert f"{PREFIX}GRACE_PERIOD" not in known
+
+
+def test_a_pod_that_goes_has_the_time_it_needs(pod, container):
+    quiet = container["lifecycle"]["preStop"]["sleep"]["seconds"]
+    grace = int(environment(container)["POSEFIELD_GRACE"])
+    # Endpoints are forgotten everywhere within some seconds.
+    assert quiet >= 5
+    assert pod["spec"]["terminationGracePeriodSeconds"] >= quiet + grace + 5
+
+
+def test_a_pod_may_do_little(pod, container):
+    user = re.search(r"^USER (\d+):(\d+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    context, own = pod["spec"]["securityContext"], container["securityContext"]
+    assert user and [context["runAsUser"], context["runAsGroup"]] == [int(n) for n in user.groups()]
+    assert context["runAsNonRoot"] and context["seccompProfile"] == {"type": "RuntimeDefault"}
+    assert own["readOnlyRootFilesystem"] and not own["allowPrivilegeEscalation"]
+    assert own["capabilities"] == {"drop": ["ALL"]}
+    assert pod["spec"]["automountServiceAccountToken"] is False
+    mounts = {each["mountPath"]: each.get("readOnly", False) for each in container["volumeMounts"]}
+    assert mounts == {"/models": True, "/tmp": False}
+    assert container["args"] == ["/models"]
+    volumes = {volume["name"] for volume in pod["spec"]["volumes"]}
+    assert {each["name"] for each in container["volumeMounts"]} == volumes
+
+
+def test_nobody_is_let_in_or_out_unasked(objects):
+    policy = objects["NetworkPolicy"]["spec"]
+    assert policy["policyTypes"] == ["Ingress", "Egress"]
+    assert policy["egress"] == []
+    # An empty selector, or none, would be everybody.
+    assert all(all(peer.values()) for rule in policy["ingress"] for peer in rule["from"])
+
+
+def test_the_image_is_of_this_version(pod, container):
+    assert container["image"] == f"posefield:{service.__version__}"
+    assert pod["metadata"]["labels"]["app.kubernetes.io/version"] == service.__version__
+    assert container["resources"]["requests"].keys() == {"cpu", "memory"}
