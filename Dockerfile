@@ -29,6 +29,8 @@ COPY api api
 COPY service service
 # hadolint ignore=SC2086
 RUN uv sync --frozen --no-dev --no-editable ${EXTRAS}
+# What is in it, by what is installed: /opt/posefield/share/sbom.cdx.json (CycloneDX).
+RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
 
 FROM python:3.11-slim-bookworm
 ARG SOURCE=""
@@ -41,6 +43,7 @@ LABEL org.opencontainers.image.title="posefield" \
       org.opencontainers.image.source="${SOURCE}" \
       org.opencontainers.image.revision="${REVISION}"
 # Bytecode is compiled above; the root may be read-only. onnxruntime reports to its vendor unless told not to.
+# It listens for everybody, and so starts only with keys (POSEFIELD_KEYS_FILE, ...) or with POSEFIELD_OPEN=1.
 ENV PATH=/opt/posefield/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     PYTHONUNBUFFERED=1 \

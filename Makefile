@@ -48,6 +48,10 @@ test: $(ENV) ## lint, types, layers and all tests (no Blender, no browser)
 interop: $(ENV) ## read our files back through Blender, three.js and the glTF validator
 	$(BIN)/python tests/interop/run.py
 
+.PHONY: audit
+audit: $(ENV) ## ask OSV for known vulnerabilities of what the lock file names
+	.ci/audit
+
 .PHONY: bench
 bench: $(ENV) ## print the benchmark table and write build/bench.json
 	$(BIN)/python benchmarks/bench.py

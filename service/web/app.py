@@ -12,7 +12,7 @@ from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.synthesis.shelf import Fixed
-from service.web import contract, problems
+from service.web import contract, cors, problems
 from service.web.access import policy
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
@@ -22,7 +22,7 @@ from service.web.problems import RequestFault
 from service.web.readiness import Readiness
 from service.web.routing import Map, Route
 from service.web.service import Handler, Service
-from service.web.settings import Settings
+from service.web.settings import PREFIX, Settings
 
 FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd|sigma)\.([^/]+)")
 FORMATS = {
@@ -58,7 +58,8 @@ def build(
     readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
     rules = policy.of(settings)
     policy.check_exposure(settings, rules)
-    service = Service(readiness, settings, agreed.source, rules, lines)
+    origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
+    service = Service(readiness, settings, agreed.source, rules, origins, lines)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

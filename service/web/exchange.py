@@ -14,7 +14,17 @@ from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from service.motion.errors import QueryError
-from service.web import caching, compression, deadline, log, metrics, problems, protocol
+from service.web import (
+    browser,
+    caching,
+    compression,
+    cors,
+    deadline,
+    log,
+    metrics,
+    problems,
+    protocol,
+)
 from service.web.access import door
 from service.web.access.audit import Call
 from service.web.access.principal import EVERYONE
@@ -27,7 +37,6 @@ from service.web.service import Service
 faults = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
-COMMON = ((b"x-content-type-options", b"nosniff"),)
 # A prefix of this process and a number: a random number for each would take four times as long.
 _PROCESS, _NUMBERS = os.urandom(12).hex(), count(1)
 
@@ -102,11 +111,22 @@ class Exchange:
         place, scope["path_params"] = found
         route = place.routes.get(scope["method"])
         if route is None:
-            return _other_method(scope["method"], place)
+            return self._other_method(place)
         self._route = route
         self._prepare(route)
         limit = deadline.seconds(self._headers.get(b"prefer"), site.service.settings.deadline)
         return await site.watch.within(limit, route.endpoint(self._request))
+
+    def _other_method(self, place: Place) -> Response:
+        """Answer to OPTIONS, or the fault of a method that the path does not take."""
+        method, allow = self._scope["method"], {"Allow": place.allow}
+        if method != "OPTIONS":
+            detail = f"{method}, expected one of {place.allow}"
+            raise RequestFault(METHOD_NOT_ALLOWED, detail, headers=allow)
+        response = Response(status_code=204, headers=allow)
+        if self._site.service.origins and cors.is_preflight(self._headers):
+            response.raw_headers += cors.preflight(place.allow.encode())
+        return response
 
     def _prepare(self, route: Route) -> None:
         """Refuse what needs no model, find the model, and see whether the client has the answer."""
@@ -155,7 +175,9 @@ class Exchange:
 
     def _surrounding(self, response: Response) -> list[tuple[bytes, bytes]]:
         """Headers that every answer has, or every answer of its kind."""
-        headers = [(b"x-request-id", self._identity.encode()), *COMMON]
+        headers = [(b"x-request-id", self._identity.encode()), *browser.of(response.media_type)]
+        if origins := self._site.service.origins:
+            headers += cors.headers(self._headers.get(b"origin"), origins)
         held = response.status_code in (200, 304)
         if held and self._route and self._route.vary:
             headers.append((b"vary", self._route.vary))
@@ -214,13 +236,3 @@ def _check_parameters(request: Request, operation: Operation) -> None:
         name = min(unknown)
         detail = f"{name}: no such query parameter; there are {sorted(operation.query) or 'none'}"
         raise RequestFault(problems.BAD_PARAMETER, detail, {"parameter": name})
-
-
-def _other_method(method: str, place: Place) -> Response:
-    """Answer to OPTIONS, or the fault of a method that the path does not take."""
-    allow = {"Allow": place.allow}
-    if method == "OPTIONS":
-        return Response(status_code=204, headers=allow)
-    raise RequestFault(
-        METHOD_NOT_ALLOWED, f"{method}, expected one of {place.allow}", headers=allow
-    )

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 from service.web.settings import Settings
@@ -25,6 +26,16 @@ class Limits:
     idle_time: int
     drain_time: int
     connections: int
+
+    @cached_property
+    def least(self) -> int:
+        """Bytes that are too few for a URL or header lines that are too long."""
+        return min(self.url, self.head)
+
+    @cached_property
+    def most(self) -> int:
+        """Bytes that are too many for a head."""
+        return self.url + self.head
 
 
 def of(settings: Settings) -> Limits:

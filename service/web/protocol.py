@@ -6,6 +6,7 @@ import enum
 from typing import Any, ClassVar
 
 import httptools
+from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
 from service.web import problems
@@ -46,8 +47,9 @@ def bounded(limits: Limits) -> type["Bounded"]:
 class Bounded(HttpToolsProtocol):
     """One connection.
 
-    since: when it began to wait for what `phase` says. received: bytes of the request that is being
-    read, head: of its header lines, body: of its body. refused: whether a fault is the last answer.
+    since: when it began to wait for what `phase` says. first, after: bytes of the piece in which
+    the request that is being read began, and of those after it; body: of its body. refused:
+    whether a fault is the last answer.
     """
 
     limits: ClassVar[Limits]
@@ -57,7 +59,7 @@ class Bounded(HttpToolsProtocol):
         super().__init__(*args, **kwargs)
         self.phase = IDLE
         self.since = self.loop.time()
-        self.received = self.head = self.body = self.hosts = 0
+        self.piece = self.first = self.after = self.body = self.hosts = 0
         self.codings: list[bytes] = []
         self.refused = False
         self.fault: RequestFault | None = None
@@ -77,7 +79,8 @@ class Bounded(HttpToolsProtocol):
         if self.refused or self.wire.left:
             self.wire.drop(data)
             return
-        self.received += len(data)
+        self.piece = len(data)
+        self.after += self.piece
         try:
             self.parser.feed_data(data)
         except httptools.HttpParserUpgrade as upgrade:
@@ -94,16 +97,11 @@ class Bounded(HttpToolsProtocol):
     def on_message_begin(self) -> None:
         super().on_message_begin()
         self.phase, self.since = HEAD, self.loop.time()
-        self.head = self.body = self.hosts = 0
-        if self.codings:
-            self.codings = []
+        self.first, self.after = self.piece, 0
+        self.body = self.hosts = 0
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        if self.phase is not HEAD:
-            # A trailer: to take it for a header would let it past whoever looked at those.
-            return
         name = name.lower()
-        self.head += len(name) + len(value) + 4
         if name in _OF_READING:
             self._note(name, value.strip().lower())
         self.headers.append((name, value))
@@ -119,27 +117,38 @@ class Bounded(HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         if self.parser.should_upgrade():
             return
-        self._check_head()
+        limits, size = self.limits, self.first + self.after
+        if size > limits.least or self.hosts != 1 or self.codings or len(self.headers) > FIELDS:
+            self._check_head()
         super().on_headers_complete()
+        # What comes now are trailers: as headers they would get past whoever looked at those.
+        self.headers = []
         self.phase, self.since = BODY, self.loop.time()
         if len(self.pipeline) >= PIPELINE:
             raise self._fault(problems.MALFORMED, f"more than {PIPELINE} requests ahead of answers")
 
     def on_body(self, body: bytes) -> None:
         self.body += len(body)
-        if self.cycle.response_complete and self.body > UNREAD:
-            self.transport.close()
-        super().on_body(body)
+        cycle = self.cycle
+        if cycle.response_complete:
+            if self.body > UNREAD:
+                self.transport.close()
+            return
+        cycle.body += body
+        if len(cycle.body) > HIGH_WATER_LIMIT:
+            self.flow.pause_reading()
+        cycle.message_event.set()
 
     def on_message_complete(self) -> None:
         if self.parser.should_upgrade():
             return
-        self.received = 0
-        if self.cycle.response_complete:
+        cycle = self.cycle
+        if cycle.response_complete:
             self.phase, self.since = IDLE, self.loop.time()
-        else:
-            self.phase = WHOLE
-        super().on_message_complete()
+            return
+        self.phase = WHOLE
+        cycle.more_body = False
+        cycle.message_event.set()
 
     # What is sent -------------------------------------------------------------------------------
 
@@ -219,27 +228,30 @@ class Bounded(HttpToolsProtocol):
 
     def _check_head(self) -> None:
         limits, version = self.limits, self.parser.get_http_version()
+        codings, self.codings = self.codings, []
         if len(self.url) > limits.url:
             raise self._too_long()
-        if self.head > limits.head or len(self.headers) > FIELDS:
+        if sum(len(n) + len(v) + 4 for n, v in self.headers) > limits.head:
+            raise self._too_large()
+        if len(self.headers) > FIELDS:
             raise self._too_large()
         if version not in ("1.1", "1.0"):
             raise self._fault(problems.MALFORMED, f"HTTP/{version}, expected HTTP/1.1")
         if self.hosts != 1 and (version == "1.1" or self.hosts):
             # Who reads one of two, and who the other, do not see the same request (RFC 9112, 3.2).
             raise self._fault(problems.MALFORMED, f"{self.hosts} Host headers, expected one")
-        if self.codings and (self.codings != [b"chunked"] or version != "1.1"):
+        if codings and (codings != [b"chunked"] or version != "1.1"):
             raise self._fault(problems.MALFORMED, "Transfer-Encoding, expected none or chunked")
 
     def _check_unfinished_head(self) -> None:
         if len(self.url) > self.limits.url:
             self._refuse(self._too_long())
-        elif self.received > self.limits.url + self.limits.head:
+        elif self.after > self.limits.most:
             self._refuse(self._too_large())
 
     def _check_framing(self) -> None:
         """Chunk sizes may have extensions, and bodies trailers: without end, if nobody counts."""
-        if self.received - self.body * FRAMING > 2 * (self.limits.url + self.limits.head):
+        if self.after - self.body * FRAMING > 2 * self.limits.most:
             self._refuse(self._fault(problems.MALFORMED, "a chunked body of hardly any content"))
 
     def _too_long(self) -> RequestFault:
@@ -291,6 +303,7 @@ class Bounded(HttpToolsProtocol):
 
     def _last(self, fault: RequestFault) -> RequestResponseCycle:
         """The answer to a request that was not read: nothing of it but its headers is known."""
+        headers = self.scope["headers"] if self.phase in (HEAD, BODY) else []
         scope: dict[str, Any] = {
             "type": "http",
             "asgi": {"version": self.asgi_version, "spec_version": "2.3"},
@@ -299,7 +312,7 @@ class Bounded(HttpToolsProtocol):
             "client": self.client,
             "scheme": self.scheme,
             "root_path": self.root_path,
-            "headers": self.headers or [],
+            "headers": headers,
             "state": self.app_state.copy(),
             "method": "GET",
             "path": "",

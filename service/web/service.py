@@ -31,6 +31,7 @@ class Service:
     settings: Settings
     source: bytes
     rules: Policy
+    origins: frozenset[bytes] = frozenset()
     lines: Lines | None = None
     code: bytes = field(default_factory=caching.code)
     batcher: Batcher = field(default_factory=Batcher)

@@ -33,6 +33,8 @@ class Settings:
     stays open; drain_time: seconds in which a client has to take what was sent; who sends or takes
     4 KiB a second has longer. connections: how many may be open.
 
+    origins: pages of other origins that may read answers, with commas between them.
+
     keys, keys_file: API keys as lines of name, hash and scopes. open: whether everybody may ask on
     an address that is not this machine's alone. metrics_open: whether /metrics needs no key.
     jwt_keys: file or URL of the issuer's public keys; jwt_refresh: seconds between two looks at it;
@@ -75,6 +77,7 @@ class Settings:
     drain_time: int = 30
     # With twice as many about to end, the usual 1024 open files of a process are enough.
     connections: int = 500
+    origins: str = ""
     keys: str = ""
     keys_file: str = ""
     open: bool = False

@@ -66,7 +66,8 @@ class Served:
 def process(*paths: Path, **environ: str) -> Iterator[Served]:
     """The service as a process of its own; killed where the test leaves it running."""
     command = [Path(sys.executable).with_name("posefield"), "serve", *paths]
-    given = {**os.environ, "POSEFIELD_PORT": "0", **environ}
+    quiet = {"POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "1"}
+    given = {**os.environ, **quiet, **environ}
     pipe = subprocess.PIPE
     with subprocess.Popen(command, env=given, stdout=pipe, stderr=pipe) as child:
         try:

@@ -1,0 +1,80 @@
+"""Pages of other origins: who may read answers, and what their browsers are told."""
+
+import re
+
+import pytest
+
+from service.motion.errors import InvalidField
+from service.web import cors
+
+ALLOWED = cors.read("https://a.example, http://localhost:5173", "ORIGINS")
+
+
+def test_none_may_if_none_is_named():
+    assert cors.read("", "ORIGINS") == cors.read(" , ", "ORIGINS") == frozenset()
+    assert cors.headers(b"https://a.example", frozenset()) == []
+
+
+def test_an_origin_is_allowed_by_its_very_name():
+    given = dict(cors.headers(b"https://a.example", ALLOWED))
+    assert given[b"access-control-allow-origin"] == b"https://a.example"
+    assert given[b"vary"] == b"Origin"
+    assert b"Posefield-Sigma" in given[b"access-control-expose-headers"]
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        b"https://b.example",
+        b"http://a.example",
+        b"https://a.example:8443",
+        b"https://a.example.evil",
+        b"https://evil/https://a.example",
+        b"https://A.example",
+        b"null",
+        b"*",
+        b"",
+        None,
+    ],
+)
+def test_every_other_is_not_but_caches_are_told(origin):
+    assert cors.headers(origin, ALLOWED) == [(b"vary", b"Origin")]
+
+
+def test_all_may_be_allowed_and_none_by_name():
+    given = dict(cors.headers(b"https://b.example", cors.read("*", "ORIGINS")))
+    assert given[b"access-control-allow-origin"] == b"*"
+    assert b"vary" not in given
+
+
+def test_credentials_of_browsers_are_never_allowed():
+    for allowed in (ALLOWED, cors.EVERY):
+        for pair in (*cors.headers(b"https://a.example", allowed), *cors.preflight(b"GET")):
+            assert b"credentials" not in pair[0]
+
+
+def test_a_preflight_names_methods_and_headers():
+    given = dict(cors.preflight(b"GET, HEAD, POST"))
+    assert given[b"access-control-allow-methods"] == b"GET, HEAD, POST"
+    assert {b"Authorization", b"Content-Type"} <= set(
+        given[b"access-control-allow-headers"].split(b", ")
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a.example",
+        "https://a.example/",
+        "https://a.example/path",
+        "https://A.example",
+        "ftp://a.example",
+        "https://*.example",
+        "*, https://a.example",
+        "null",
+        "https://a.example https://b.example",
+    ],
+)
+def test_what_is_no_origin_is_refused(text):
+    with pytest.raises(InvalidField, match=re.escape("ORIGINS: ")):
+        cors.read(text, "ORIGINS")
