@@ -31,7 +31,7 @@ from service.export.queries import Asked
 from service.export.query import Source
 from service.export.reading import Defaults
 from service.export.target import open_target
-from service.synthesis import library
+from service.synthesis import intake
 
 ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
 LONGER = 8
@@ -53,7 +53,7 @@ class Bench:
     def of(cls, model: Path, clips: int, form: str) -> "Bench":
         """Clips at points sampled from a model's controls."""
         content = model.read_bytes()
-        opened = library.opened(model, content)
+        opened = intake.opened(model.stem, model, content)
         source = queries.source(Asked(sample=clips), Defaults(form), opened)
         digest = hashlib.sha256(content).hexdigest()
         job = Job(opened.identity, digest, source.digest, "folder", 1)
@@ -159,7 +159,8 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
     """Seconds a clip of each stage, each done over many clips by itself."""
     rows = bench.source.rows()
     asked = [next(rows) for _ in range(STAGED)]
-    opened = library.opened(Path(bench.work.job.model.partition("@")[0]), bench.work.model)
+    name = bench.work.job.model.partition("@")[0]
+    opened = intake.opened(name, name, bench.work.model)
     encoder = ENCODERS[form]
     answers = [opened.clip(query.question) for query in asked]
     files = encoder.write(answers, encoder.usual)

@@ -228,10 +228,16 @@ def quaternions(net: Net, rows: str, means: str) -> str:
         "Reshape", rows, net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
     )
     squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
-    half = net("Sqrt", net("Add", squares, net.number(TINY)))
-    along = net("Mul", means, net("Cos", half))
-    across = net("Mul", joints, net("Div", net("Sin", half), half))
-    return net("Add", along, across)
+    cosine, share = _of_half_angles(net, squares)
+    return net("Add", net("Mul", means, cosine), net("Mul", joints, share))
+
+
+def _of_half_angles(net: Net, squares: str) -> tuple[str, str]:
+    """Cosines of half angles and shares sin(a) / a, of squares (J, 1, P) of the half angles."""
+    half = net("Sqrt", net("Add", net.padded(squares), net.number(TINY)))
+    shape = net("Shape", squares)
+    share = net("Div", net("Sin", half), half)
+    return net.unpadded(net("Cos", half), shape), net.unpadded(share, shape)
 
 
 def innermost_joints(net: Net, rotations: str, joints: int) -> str:

@@ -5,7 +5,7 @@ The gate asks the very session that the service will use, and compares joints in
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -22,6 +22,7 @@ from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 from service.motion.detail import Level
 from service.motion.errors import ExportRefused
+from service.motion.field import Hyper
 from service.synthesis import session
 from service.synthesis.session import OUTPUTS, Session
 
@@ -147,11 +148,13 @@ def _card(
         levels=ladder,
         durations=(float(durations.min()), float(durations.max())),
         performers=trained.model.bank.performers,
-        examples=tuple(tuple(map(_round, example.controls)) for example in examples),
+        examples=tuple(tuple(map(float, example.controls)) for example in examples),
         moved_by=tuple(map(int, trained.laid.moved_by)),
         feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
+        sources=tuple(example.row.source for example in examples),
+        kriging=_plainly(trained.pose.hyper),
         roles={str(role): joint for role, joint in recipe.roles.items()},
     )
 
@@ -198,6 +201,11 @@ def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str,
             *_found(trained),
         ],
     }
+
+
+def _plainly(hyper: Hyper) -> Hyper:
+    """The same in numbers of Python, which a card can hold."""
+    return replace(hyper, nugget=float(hyper.nugget), label=float(hyper.label))
 
 
 def _round(value: Any) -> float:

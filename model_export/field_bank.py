@@ -15,6 +15,7 @@ import numpy as np
 from model_export import kriging
 from model_export.kriging import Kriging
 from service.motion.conventions import Floats
+from service.motion.field import half_ranges
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,6 @@ class Constant:
 Field = Kriging | Constant
 
 VARIANCE, POSE = "variance", "pose"
-
-
-def half_ranges(controls: Floats, low: Floats, high: Floats) -> Floats:
-    """Controls (B, d) on a scale where the range from low to high (d,) is -1 to 1."""
-    return (2.0 * controls - low - high) / (high - low)
 
 
 def width(field: Field) -> int:

@@ -187,5 +187,7 @@ def _variance(bank: FieldBank, net: Net, basis: str, straight: str, ends: dict[s
     stored = net.weights("precision", -bank.precision)
     precision = net("Pad", stored, net.indices(around, around, 0, 0))
     form = net("Slice", precision, net.indices(0, 0), ends["curved"], net.indices(0, 1))
-    curved = net("ReduceSum", net("Mul", net("MatMul", own, form), own), one)
+    ones = net.weights("pairs", np.ones((len(bank.precision) + around, 2)))
+    pairs = net("Slice", ones, net.indices(0, 0), ends["curved"], net.indices(0, 1))
+    curved = net.row_sums(net("Mul", net("MatMul", own, form), own), pairs)
     return net("Relu", net("Add", curved, straight))

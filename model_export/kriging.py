@@ -1,33 +1,24 @@
 """Universal kriging of many values at once, in its dual form.
 
-The system is [[C + nugget I, F], [Fᵀ, 0]] with covariance C between samples and drift F; its dual
-weights answer a query by one product, its inverse gives variance and leave-one-out residuals
-(Dubrule, "Cross validation of kriging in a unique neighborhood", Math. Geology 1983). The nugget is
-filtered: it stands on the diagonal only and not in the query, so that the answer is continuous in
-the controls.
+The dual weights of the system (service/motion/field.py) answer a query by one product, its inverse
+gives variance and leave-one-out residuals (Dubrule, "Cross validation of kriging in a unique
+neighborhood", Math. Geology 1983). The nugget is filtered: it stands on the diagonal only and not
+in the query, so that the answer is continuous in the controls.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from model_export.covariance import COVARIANCES
+from service.motion import field
 from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
 
-
-@dataclass(frozen=True)
-class Hyper:
-    """covariance: its name. drifts: polynomial degrees, 0 or 1, whose predictions are averaged.
-    scales (d,): what a unit of each control is worth as distance (one over the range). nugget: as
-    a share of the sill. label: the distance between two performers who are told apart, who never
-    enter the drift."""
-
-    covariance: str
-    drifts: tuple[int, ...]
-    scales: Floats
-    nugget: float
-    label: float = 0.0
+# The service asks for these too; training knows them as a part of kriging.
+from service.motion.field import Hyper as Hyper
+from service.motion.field import covariances as covariances
+from service.motion.field import drift as drift
+from service.motion.field import noisy as noisy
 
 
 @dataclass(frozen=True)
@@ -59,42 +50,7 @@ class Kriging:
         return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
     def _basis(self, points: Floats) -> Floats:
-        near = covariances(self.hyper, points, self.samples)
-        return np.hstack([near, drift(points, len(self.hyper.scales), max(self.hyper.drifts))])
-
-
-def covariances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
-    """Covariance (A, B) between points (A, d + p) and (B, d + p).
-
-    Different performers are `label` apart, whoever they are: the product of their labels is 0, and
-    1 for the same one.
-    """
-    d = len(hyper.scales)
-    gaps = (a[:, None, :d] - b[None, :, :d]) * hyper.scales
-    others = 1.0 - a[:, d:] @ b[:, d:].T
-    squared = np.sum(np.square(gaps), axis=-1) + hyper.label**2 * others
-    return COVARIANCES[hyper.covariance].numpy(squared)
-
-
-def drift(points: Floats, controls: int, degree: int) -> Floats:
-    """Drift functions (B, k) at points (B, d + p): a constant, and the controls for degree one."""
-    one = np.ones((len(points), 1))
-    return np.hstack([one, points[:, :controls]]) if degree else one
-
-
-def invert(hyper: Hyper, samples: Floats, degree: int) -> Floats:
-    """Inverse (n + k, n + k) of the kriging system with a drift of that degree."""
-    f = drift(samples, len(hyper.scales), degree)
-    n, k = f.shape
-    system = np.zeros((n + k, n + k))
-    system[:n, :n] = noisy(hyper, samples)
-    system[:n, n:], system[n:, :n] = f, f.T
-    return np.linalg.inv(system)
-
-
-def noisy(hyper: Hyper, samples: Floats) -> Floats:
-    """Covariance (n, n) of measured samples: that of the field, and the nugget."""
-    return covariances(hyper, samples, samples) + hyper.nugget * np.eye(len(samples))
+        return field.basis(self.hyper, points, self.samples)
 
 
 def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
@@ -103,10 +59,7 @@ def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
     With more than one drift the weights are averaged, and the variance is that of their average.
     """
     n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
-    weighing = np.zeros((n + functions, n))
-    for degree in hyper.drifts:
-        own = invert(hyper, samples, degree)[:, :n]
-        weighing[: len(own)] += own / len(hyper.drifts)
+    weighing = field.weighing(hyper, samples)
     toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
     form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
     return Kriging(hyper, samples, weighing @ values, weighing, form)

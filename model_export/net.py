@@ -13,6 +13,9 @@ OPSET, IR_VERSION = 18, 8
 Shapes = dict[str, list[str | int]]
 """Axes by the name of an input or output: a size, or a name for what the caller decides."""
 
+REGISTER = 16
+"""Numbers that a processor works on at once, at most."""
+
 
 class Net:
     """A graph under construction; equal calls in equal order give equal bytes."""
@@ -51,6 +54,30 @@ class Net:
     def indices(self, *values: int) -> str:
         """A list of whole numbers: a shape, axes, starts or ends."""
         return self.weights("indices_" + "_".join(map(str, values)), np.array(values))
+
+    def row_sums(self, terms: str, pairs: str) -> str:
+        """Sums (..., 1) over the last axis of terms (..., n), the same for a row wherever it stands
+        among others; pairs (n, 2): ones.
+
+        ReduceSum adds from where memory is aligned, which differs from row to row, and a product
+        with one column takes rows by fours. A second column leaves each row to itself.
+        """
+        sums = self("MatMul", terms, pairs)
+        return self("Slice", sums, self.indices(0), self.indices(1), self.indices(-1))
+
+    def padded(self, values: str) -> str:
+        """All the numbers in a row, and some more.
+
+        The last numbers of a row, which fill no register, get their sine and cosine one by one and
+        rounded otherwise. Here those are nobody's.
+        """
+        row = self("Reshape", values, self.indices(-1))
+        return self("Pad", row, self.indices(0, REGISTER - 1))
+
+    def unpadded(self, row: str, shape: str) -> str:
+        """The numbers of a padded row without the rest, in the shape that they had."""
+        own = self("Slice", row, self.indices(0), self.indices(1 - REGISTER))
+        return self("Reshape", own, shape)
 
     def _kind(self, name: str) -> int:
         constant = self._constants.get(name)

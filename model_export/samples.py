@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model_export.field_bank import half_ranges
 from model_export.ingest import Example
-from model_export.kriging import drift
 from model_export.recipe import Recipe
 from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
+from service.motion.field import drift, half_ranges
 
 EMPTY = np.zeros(0, dtype=np.int64)
 

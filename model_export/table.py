@@ -38,6 +38,14 @@ class Row:
         """How messages name it: its line and its file."""
         return f"line {self.line}, {self.place.name}"
 
+    @property
+    def source(self) -> str:
+        """File, and frames of it where it is a part."""
+        if self.first_frame == 0 and self.last_frame is None:
+            return self.place.name
+        last = "the end" if self.last_frame is None else self.last_frame
+        return f"{self.place.name}, frames {self.first_frame} to {last}"
+
     def fault(self, message: str) -> RecipeError:
         """Error that names this row."""
         return RecipeError(self.table, message, self.line)

@@ -84,11 +84,13 @@ class Travel:
         axes = np.vstack([np.eye(3)[[0, 2]], np.zeros(3)])
         moved = net("Add", root, net("MatMul", gone, net.weights("travel_axes", axes)))
         # Half the angle, with axes for the root's four numbers: (B, S, 1, 1).
-        angle = net("MatMul", gone, net.weights("travel_turn", np.array([[0.0], [0.0], [0.5]])))
-        half = net("Unsqueeze", angle, net.indices(3))
+        angle = net("Slice", gone, net.indices(2), net.indices(3), net.indices(2))
+        half = net("Unsqueeze", net("Mul", angle, net.number(0.5)), net.indices(3))
+        row, shape = net.padded(half), net("Shape", half)
+        cosine, sine = (net.unpadded(net(turn, row), shape) for turn in ("Cos", "Sin"))
         joints = net.indices(2)
         own = net("Slice", rotations, net.indices(0), net.indices(1), joints)
         others = net("Slice", rotations, net.indices(1), net.indices(END), joints)
         across = net("MatMul", own, net.weights("travel_quarter", TURN))
-        turned = net("Add", net("Mul", own, net("Cos", half)), net("Mul", across, net("Sin", half)))
+        turned = net("Add", net("Mul", own, cosine), net("Mul", across, sine))
         return net("Concat", turned, others, axis=2), moved, gone

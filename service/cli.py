@@ -17,7 +17,7 @@ import orjson
 import typer
 
 from service import __version__, exports
-from service.encode import ENCODERS, Encoder, poses
+from service.encode import ENCODERS, Encoder, poses, reasons
 from service.encode.convention import Unit, Up
 from service.motion import card as cards
 from service.motion import files
@@ -36,6 +36,8 @@ from service.synthesis import library, pace, session
 from service.synthesis.question import ClipQuestion, Policy, Root
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
+from service.synthesis.why import NEAREST, WhyQuestion
+from service.synthesis.why import why as find_reasons
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -68,6 +70,7 @@ EXTRAS = {
     **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate"),
     "distributed": "dask",
     "obstore": "store",
+    **dict.fromkeys(("jwt", "cryptography"), "jwt"),
 }
 
 
@@ -155,7 +158,7 @@ def clip(
     up: UpAxis = None,
     json: Json = False,
 ) -> None:
-    """Write a clip as usda, usdc, usdz, glb, bvh, json or npz."""
+    """Write a clip as usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack."""
     found = encoder(output)
     convention = found.convention(unit, up)
     synthesizer = open_model(model)
@@ -237,19 +240,62 @@ def lens(position: str, fov: float, height: float) -> Camera:
         raise InvalidField("camera", f"{position!r}, expected X,Y,Z in metres") from fault
 
 
+@app.command()
+def why(
+    model: ModelPath,
+    control: Controls = None,
+    extrapolate: Extrapolate = "warn",
+    performer: Performer = None,
+    nearest: Annotated[int, typer.Option(help="captured clips to list")] = NEAREST,
+    json: Json = False,
+) -> None:
+    """Say what an answer is made of: the captured clips near it, and what each counts for."""
+    synthesizer = open_model(model)
+    asked = WhyQuestion(numbers(control or []), extrapolate, performer, nearest)
+    found = find_reasons(synthesizer, asked)
+    _warn(found.warnings)
+    typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
+
+
 app.command()(exports.export)
 
 
 @app.command()
 def serve(
-    paths: Annotated[list[Path], typer.Argument(help="model files, or folders of them")],
+    places: Annotated[
+        list[str],
+        typer.Argument(help="model files, folders of them, or URLs of object stores"),
+    ],
     host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
     port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
 ) -> None:
     """Answer over HTTP for the models given, until interrupted."""
     from service.web import server, settings
 
-    server.serve(paths, settings.read(host=host, port=port))
+    server.serve(places, settings.read(host=host, port=port))
+
+
+@app.command()
+def key(
+    name: Annotated[str, typer.Argument(help="whose key it is, as the log will name it")],
+    model: Annotated[
+        list[str] | None, typer.Option(help="a model that it may read; all if none is named")
+    ] = None,
+    metrics: Annotated[bool, typer.Option("--metrics", help="let it read /metrics too")] = False,
+    json: Json = False,
+) -> None:
+    """Make an API key: the line for POSEFIELD_KEYS_FILE on standard output, and, once, the key
+    itself on standard error."""
+    from service.web.access import keys
+
+    scopes = [f"read:{one}" for one in model or ["*"]] + ["metrics"] * metrics
+    secret = keys.make()
+    line = keys.line(name, scopes, secret)
+    if json:
+        typer.echo(as_json({"key": secret, "line": line}))
+        return
+    typer.echo(line)
+    typer.echo(f"the key of {name}, which is kept nowhere: {secret}", err=True)
 
 
 @app.command()

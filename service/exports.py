@@ -18,7 +18,7 @@ from service.export.reading import Defaults
 from service.export.run import Outcome, Shard
 from service.motion.errors import InvalidField
 from service.motion.roles import Names
-from service.synthesis import library, session
+from service.synthesis import intake, session
 from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
 
 
@@ -89,7 +89,7 @@ def export(
         root=root,
         loop=loop,
     )
-    opened = library.opened(model, content)
+    opened = intake.opened(model.stem, model, content)
     source = queries.source(asked, Defaults(form, question), opened)
     job = Job(
         opened.identity,

@@ -22,7 +22,7 @@ from service.synthesis.question import ClipQuestion
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
 TALL = ("--performer", "tall")
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz")
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack")
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_it_is_a_command_of_its_own():
     command = str(Path(sys.executable).parent / "posefield")
     done = subprocess.run([command, "--help"], capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    for name in ("sample", "train", "inspect", "pose", "clip", "serve", "check"):
+    for name in ("sample", "train", "inspect", "pose", "clip", "why", "serve", "check"):
         assert re.search(rf"\b{name}\b", done.stdout)
 
 
@@ -69,6 +69,35 @@ def test_a_process_ends_with_the_code_of_its_fault(tmp_path):
     assert (done.returncode, done.stdout) == (3, "")
     said = f"posefield: {tmp_path / 'none.onnx'}: cannot be read: No such file or directory\n"
     assert done.stderr == said
+
+
+# --- why ------------------------------------------------------------------------------------------
+
+
+def test_why_lists_the_nearest_clips_and_the_others(posefield, labelled_path):
+    code, out, err = posefield("why", labelled_path, *CONTROLS, *TALL, "--nearest", 3)
+    head, *lines, others = out.splitlines()
+    assert (code, err, len(lines)) == (0, "", 3)
+    assert head.split() == ["clip", "distance", "weight"]
+    assert re.fullmatch(
+        r"reach_\d+\.bvh +0\.\d{3} +\d+\.\d %  (tall|middle|short), stature .*", lines[0]
+    )
+    assert re.fullmatch(r"43 others +-?\d+\.\d %", others)
+
+
+def test_why_answers_as_json(posefield, labelled_path):
+    code, out, err = posefield("why", labelled_path, *CONTROLS[:-1], "target_height=9", "--json")
+    found = json.loads(out)
+    assert code == 0 and err.startswith("warning: target_height = 9 m lies outside")
+    weights = [clip["weight"] for clip in found["nearest"]]
+    assert len(weights) == 10 and found["others"]["count"] == 36
+    assert abs(sum(weights) + found["others"]["weight"] - 1.0) < 1e-7
+
+
+def test_why_of_nothing_is_refused(refused, labelled_path):
+    assert "nearest: 0 clips, expected 1" in refused(
+        2, "why", labelled_path, *CONTROLS, "--nearest", 0
+    )
 
 
 # --- sample ---------------------------------------------------------------------------------------

@@ -9,8 +9,8 @@ from math import exp, sqrt
 
 import numba
 
-from model_export.covariance import RATE52
 from service.motion.conventions import Floats
+from service.motion.covariance import RATE52
 
 compiled = numba.njit(fastmath=True)
 

@@ -3,21 +3,15 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from service.encode import (
-    bvh,
-    crowd_arrow,
-    crowd_npz,
-    crowd_poses,
-    glb,
-    keyframes,
-    npz,
-    usd,
-    usdz,
-)
+from service.encode import bvh, crowd_poses, glb, keyframes, poses, tables, usd, usdz
 from service.encode import convention as conventions
+from service.encode.arrow import arrow
 from service.encode.convention import CENTIMETRES, METRES, Convention, Unit, Up
-from service.motion.answer import ClipAnswer
+from service.encode.media import ARROW, JSON, MSGPACK, NPZ
+from service.encode.tables import Table
+from service.motion.answer import ClipAnswer, PoseAnswer
 from service.motion.crowd import CrowdPoses
 
 
@@ -58,19 +52,51 @@ def one_by_one(
     return lambda answers, convention: [encode(answer, convention) for answer in answers]
 
 
+def numbers(
+    write: Callable[[Table], bytes],
+) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+    """What writes several answers as tables."""
+    return one_by_one(lambda answer, convention: write(keyframes.table(answer, convention)))
+
+
 ENCODERS = {
     encoder.extension: encoder
     for encoder in (
         # A template takes 30 ms to make, and every number of frames has one of its own.
         Encoder("usda", "model/vnd.usda", usd.usda, at_once=0),
-        # The binary form has no registered media type.
-        Encoder("usdc", "application/octet-stream", usd.usdc, at_once=0),
+        # Not registered, unlike those of text and package, but what others call it.
+        Encoder("usdc", "model/vnd.usdc", usd.usdc, at_once=0),
         Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz, at_once=0),
-        Encoder("json", "application/json", one_by_one(keyframes.json)),
+        Encoder("json", JSON, one_by_one(keyframes.json)),
         Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
         Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), law=True),
-        # An archive of arrays has no registered media type; as a zip some browsers would unpack it.
-        Encoder("npz", "application/octet-stream", one_by_one(npz.npz)),
+        Encoder("npz", NPZ, numbers(tables.npz)),
+        Encoder("arrow", ARROW, numbers(arrow)),
+        Encoder("msgpack", MSGPACK, numbers(tables.msgpack)),
+    )
+}
+
+
+@dataclass(frozen=True)
+class PoseEncoder:
+    """How one format of poses at some times is named and made."""
+
+    extension: str
+    media_type: str
+    write: Callable[[Table], bytes]
+
+    def encode(self, answer: PoseAnswer[Any]) -> bytes:
+        """Bytes of an answer."""
+        return self.write(poses.table(answer))
+
+
+POSE_ENCODERS = {
+    encoder.extension: encoder
+    for encoder in (
+        PoseEncoder("json", JSON, tables.json),
+        PoseEncoder("msgpack", MSGPACK, tables.msgpack),
+        PoseEncoder("npz", NPZ, tables.npz),
+        PoseEncoder("arrow", ARROW, arrow),
     )
 }
 
@@ -81,15 +107,20 @@ class CrowdEncoder:
 
     extension: str
     media_type: str
-    encode: Callable[[CrowdPoses], bytes]
+    write: Callable[[Table], bytes]
     most: float = math.inf
+
+    def encode(self, crowd: CrowdPoses) -> bytes:
+        """Bytes of a block of poses."""
+        return self.write(crowd_poses.table(crowd))
 
 
 CROWD_ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        CrowdEncoder("arrow", "application/vnd.apache.arrow.stream", crowd_arrow.arrow),
-        CrowdEncoder("npz", "application/octet-stream", crowd_npz.npz),
-        CrowdEncoder("json", "application/json", crowd_poses.json, crowd_poses.JSON_LIMIT),
+        CrowdEncoder("arrow", ARROW, arrow),
+        CrowdEncoder("npz", NPZ, tables.npz),
+        CrowdEncoder("msgpack", MSGPACK, tables.msgpack),
+        CrowdEncoder("json", JSON, tables.json, crowd_poses.JSON_LIMIT),
     )
 }

@@ -4,8 +4,9 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
-from service.encode import axes
+from service.encode import axes, tables
 from service.encode.convention import Convention
+from service.encode.tables import Table
 from service.motion.answer import ClipAnswer
 from service.motion.clip import Clip
 from service.motion.conventions import Floats
@@ -24,7 +25,10 @@ DECIMALS = 6
 
 
 def json(answer: ClipAnswer, convention: Convention) -> bytes:
-    """One JSON object: the skeleton, every frame's rotations and root position, and the trust."""
+    """One JSON object: the skeleton, every frame's rotations and root position, and the trust.
+
+    Rounded, unlike the table: nobody reads a micrometre, and digits are what JSON takes time for.
+    """
     clip = axes.moved(convention, answer.clip)
     content = {
         "units": units(convention),
@@ -37,6 +41,21 @@ def json(answer: ClipAnswer, convention: Convention) -> bytes:
         "trust": answer.trust.facts(),
     }
     return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def table(answer: ClipAnswer, convention: Convention) -> Table:
+    """The same as a table, one row a frame; bone offsets hold for all."""
+    clip = axes.moved(convention, answer.clip)
+    numbers = {name: tables.single(values) for name, values in tracks(clip).items()}
+    fixed = {"bone_offsets": numbers.pop("bone_offsets")}
+    facts = {
+        "names": list(clip.skeleton.names),
+        "parents": list(clip.skeleton.parents),
+        "rate": clip.rate,
+        "units": units(convention),
+        "trust": answer.trust.facts(),
+    }
+    return Table({"times": times(clip), **numbers}, facts, fixed)
 
 
 def units(convention: Convention) -> dict[str, str]:

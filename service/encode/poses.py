@@ -1,26 +1,25 @@
-"""Poses as plain numbers in JSON."""
+"""Poses as a table, one row a time."""
 
 from typing import Any
 
-import numpy as np
-import orjson
-
+from service.encode import tables
+from service.encode.tables import Table, single
 from service.motion.answer import PoseAnswer
-from service.motion.conventions import Floats
 
 
-def json(answer: PoseAnswer) -> bytes:
+def table(answer: PoseAnswer[Any]) -> Table:
+    """Table of S rows; bone offsets hold for all times."""
+    return Table(
+        {
+            "times": answer.times,
+            "rotations": single(answer.rotations),
+            "root_position": single(answer.root_position),
+        },
+        {"trust": answer.trust.facts()},
+        {"bone_offsets": single(answer.bone_offsets)},
+    )
+
+
+def json(answer: PoseAnswer[Any]) -> bytes:
     """One JSON object: schema PoseAnswer of the contract."""
-    content = {
-        "trust": answer.trust.facts(),
-        "times": answer.times.tolist(),
-        "rotations": _short(answer.rotations),
-        "root_position": _short(answer.root_position),
-        "bone_offsets": _short(answer.bone_offsets),
-    }
-    return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-def _short(values: Floats) -> Any:
-    """The same as float32, which is what the model answers and takes half the digits."""
-    return np.ascontiguousarray(values, dtype=np.float32)
+    return tables.json(table(answer))

@@ -1,10 +1,16 @@
 """What a model answers: poses or a clip, and how far they may be trusted."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from service.motion.card import Control
 from service.motion.clip import Clip
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles, Truths
+
+Number = TypeVar("Number", bound=np.floating[Any])
 
 
 @dataclass(frozen=True)
@@ -40,13 +46,13 @@ class Trust:
 
 
 @dataclass(frozen=True)
-class PoseAnswer:
+class PoseAnswer(Generic[Number]):
     """Poses at times (S,), s: rotations (S, J, 4), root_position (S, 3), bone_offsets (J, 3)."""
 
     times: Floats
-    rotations: Floats
-    root_position: Floats
-    bone_offsets: Floats
+    rotations: NDArray[Number]
+    root_position: NDArray[Number]
+    bone_offsets: NDArray[Number]
     trust: Trust
 
 
@@ -56,3 +62,61 @@ class ClipAnswer:
 
     clip: Clip
     trust: Trust
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A control of a grid and its values (n,), in its unit."""
+
+    control: Control
+    values: Floats
+
+
+@dataclass(frozen=True)
+class SigmaGrid:
+    """Sigma (R, C), m, of the finest level, and whether all controls lie inside what was sampled,
+    inside (R, C), for the columns of one axis and the rows of another.
+
+    model: name@contenthash. controls: the values of those that are no axes.
+    """
+
+    model: str
+    across: Axis
+    along: Axis
+    controls: dict[str, float]
+    performer: str | None
+    sigma: Singles
+    inside: Truths
+
+
+@dataclass(frozen=True)
+class Captured:
+    """A captured clip, and what it has to do with an answer.
+
+    source: its file and frames. distance: from the controls asked for, in the model's own metric;
+    at one, the poses of two clips have almost nothing to do with each other. weight: what it
+    counts for in the answer's poses.
+    """
+
+    source: str
+    controls: dict[str, float]
+    performer: str | None
+    distance: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Reasons:
+    """Why an answer is as it is: the captured clips nearest to it, the nearest first, and how many
+    others there are, with what all of them count for. All weights add up to one.
+
+    model: name@contenthash. warnings: one sentence for each control outside what was sampled.
+    """
+
+    model: str
+    controls: dict[str, float]
+    performer: str | None
+    warnings: tuple[str, ...]
+    nearest: tuple[Captured, ...]
+    others: int
+    others_weight: float

@@ -13,6 +13,7 @@ import numpy as np
 
 from service.motion import roles
 from service.motion.detail import Level
+from service.motion.field import Hyper
 from service.motion.skeleton import Skeleton
 
 FORMAT = 2
@@ -48,7 +49,9 @@ class ModelCard:
     whose each is, by place among the performers, empty where they are not told apart. feet: indices
     of the joints that stand on the ground, empty where nobody said. diagnostics: what training
     measured. provenance: recipe, hashes of the data, versions, licence. roles: joints by the part
-    that each plays (service/motion/roles.py), empty where nobody said.
+    that each plays (service/motion/roles.py), empty where nobody said. sources (N,): file and
+    frames of each captured clip. kriging: what the weight of each of them hangs on; None, and no
+    sources, in files older than these.
     """
 
     name: str
@@ -69,6 +72,8 @@ class ModelCard:
     diagnostics: Mapping[str, Any]
     provenance: Mapping[str, Any]
     roles: Mapping[str, str] = field(default_factory=dict)
+    sources: tuple[str, ...] = ()
+    kriging: Hyper | None = None
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""
@@ -96,6 +101,8 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "diagnostics": dict(card.diagnostics),
         "provenance": dict(card.provenance),
         "roles": dict(card.roles),
+        "sources": list(card.sources),
+        "kriging": _plain_hyper(card.kriging),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -109,6 +116,12 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
 
 def _plain_level(level: Level) -> dict[str, Any]:
     return {**asdict(level), "ranks": list(level.ranks), "joints": list(level.joints)}
+
+
+def _plain_hyper(hyper: Hyper | None) -> dict[str, Any] | None:
+    if hyper is None:
+        return None
+    return {**asdict(hyper), "drifts": list(hyper.drifts), "scales": hyper.scales.tolist()}
 
 
 _AS_THEY_ARE = ("name", "description", "cyclic", "root", "rate", "frames", "samples")
@@ -159,7 +172,16 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         diagnostics=plain["diagnostics"],
         provenance=plain["provenance"],
         roles=_roles(plain),
+        sources=tuple(plain.get("sources", ())),
+        kriging=_hyper(plain.get("kriging")),
     )
+
+
+def _hyper(plain: Mapping[str, Any] | None) -> Hyper | None:
+    if plain is None:
+        return None
+    scales = np.array(plain["scales"], dtype=float)
+    return Hyper(**{**plain, "drifts": tuple(plain["drifts"]), "scales": scales})
 
 
 def _roles(plain: Mapping[str, Any]) -> dict[str, str]:

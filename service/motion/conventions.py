@@ -18,4 +18,6 @@ Singles = npt.NDArray[np.float32]
 
 Indices = npt.NDArray[np.int64]
 
+Truths = npt.NDArray[np.bool_]
+
 UP = np.array([0.0, 1.0, 0.0])

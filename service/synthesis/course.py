@@ -47,14 +47,14 @@ def times(asked: ClipQuestion, duration: float) -> Floats:
     return np.minimum(start + np.arange(frames) / rate, duration)
 
 
-def in_place(answer: PoseAnswer, way: Strides) -> PoseAnswer:
+def in_place(answer: PoseAnswer[np.float64], way: Strides) -> PoseAnswer[np.float64]:
     """The poses in the frame that goes along the way, which stays where the clip begins."""
     poses = stride.beside(way, answer.times / way.durations, answer.rotations, answer.root_position)
     root = plane.at_height(way.starts + poses.places, poses.heights)
     return replace(answer, rotations=poses.rotations, root_position=root)
 
 
-def closed(answer: PoseAnswer, way: Strides | None) -> PoseAnswer:
+def closed(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswer[np.float64]:
     """The poses and the first of them again, carried along the way if there is one."""
     rotations, root = answer.rotations[:1], answer.root_position[:1]
     if way is not None:

@@ -3,10 +3,10 @@
 import numpy as np
 
 from service.motion.card import Control, ModelCard
-from service.motion.conventions import Floats, Singles
+from service.motion.conventions import Floats, Singles, Truths
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits
-from service.synthesis.crowd_question import CrowdQuestion, Truths
+from service.synthesis.crowd_question import CrowdQuestion
 
 
 def controls(card: ModelCard, question: CrowdQuestion) -> tuple[Floats, tuple[str, ...]]:

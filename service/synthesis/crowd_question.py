@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from service.motion.conventions import Floats, Indices, Singles
+from service.motion.conventions import Floats, Indices, Singles, Truths
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
 from service.synthesis import limits
 from service.synthesis.question import Root
 from service.synthesis.view import FARTHEST, View
-
-Truths = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

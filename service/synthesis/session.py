@@ -1,7 +1,9 @@
 """A model file opened in onnxruntime, checked once so that it can be trusted afterwards."""
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +11,11 @@ import numpy as np
 import onnxruntime
 
 from service.motion import card as cards
+from service.motion import field
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Singles
 from service.motion.errors import ModelError
+from service.motion.field import Weigher
 from service.synthesis import freeze
 
 INPUTS = {"controls": 2, "time": 2}
@@ -25,19 +29,47 @@ OUTPUTS = {
     "travel": 3,
 }
 
+# Measured on models of 114 kB to 1.6 MB, all levels asked.
+OWN_MEMORY, COPIES = 1 << 20, 8
+
+
+class Runtimes(Sequence[Any]):
+    """onnxruntime's sessions, one for each level of detail, each opened when it is first wanted.
+
+    Two threads that want one at once open two, of which one stays.
+    """
+
+    def __init__(self, opened: Callable[[int], Any], count: int) -> None:
+        self._opened = opened
+        self._held: list[Any] = [None] * count
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    # Of one level at a time: nobody slices them.
+    def __getitem__(self, level: Any) -> Any:
+        held = self._held[level]
+        if held is None:
+            held = self._held[level] = self._opened(level)
+        return held
+
 
 @dataclass(frozen=True)
 class Session:
     """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
 
     runtimes: onnxruntime's sessions, one for each level of detail; clocks: the same of the graphs
-    that tell the duration alone.
+    that tell the duration alone, and gauges of the one that tells the finest level's sigma. size:
+    bytes of the file. golden: what it answers in the middle.
     """
 
     card: ModelCard
     digest: str
-    runtimes: tuple[Any, ...]
-    clocks: tuple[Any, ...]
+    runtimes: Sequence[Any]
+    clocks: Sequence[Any]
+    gauges: Sequence[Any]
+    size: int
+    golden: bytes = b""
 
     def run(
         self,
@@ -64,6 +96,34 @@ class Session:
         answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
         return answers[0]
 
+    def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
+        """Sigmas (B,), m, as `run` gives them at level 0, in half of its time."""
+        answers: list[Singles] = self.gauges[0].run(["sigma"], self._feed(controls, labels))
+        return answers[0]
+
+    @cached_property
+    def weigher(self) -> Weigher:
+        """What the captured clips count for; only of a card that says what that hangs on."""
+        own = self.card
+        assert own.kriging is not None
+        low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
+        points = field.half_ranges(np.array(own.examples), low, high)
+        who = np.array(own.moved_by or [0] * len(points))
+        labels = np.eye(max(len(own.performers), 1), len(own.performers))[who]
+        return Weigher(own.kriging, np.hstack([points, labels]))
+
+    @property
+    def memory(self) -> int:
+        """Bytes that this takes about, with all levels open."""
+        return OWN_MEMORY + COPIES * self.size
+
+    def trial(self) -> bytes:
+        """Answer in the middle of the controls, asked anew: always `golden` of a sound model."""
+        answers = self.run(_middle(self.card), np.zeros((1, 1)), *OUTPUTS)
+        return b"".join(
+            answer.tobytes() for answer in (*answers, self.durations(_middle(self.card)))
+        )
+
     def _feed(
         self, controls: Floats | Singles, labels: Floats | Singles | None
     ) -> dict[str, Singles]:
@@ -86,6 +146,11 @@ def read(path: Path) -> bytes:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
 
 
+def digest(content: bytes) -> str:
+    """What a model file is told by."""
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
 def open_bytes(content: bytes, source: str) -> Session:
     """Session on the bytes of a model; `source` names them in errors."""
     runtime = _start(content, source)
@@ -94,17 +159,29 @@ def open_bytes(content: bytes, source: str) -> Session:
     except ValueError as fault:
         raise ModelError(source, str(fault)) from fault
     _check_ports(runtime, card, source)
-    levels = range(len(card.levels))
-    try:
-        frozen = [freeze.at_level(content, level) for level in levels]
-    except (ValueError, LookupError) as fault:
-        raise ModelError(source, f"no protocol buffer: {fault}") from fault
-    runtimes = tuple(_start(own, source) for own in frozen)
-    clocks = tuple(_start(freeze.for_output(own, "duration"), source) for own in frozen)
-    session = Session(card, hashlib.sha256(content).hexdigest()[:16], runtimes, clocks)
-    for level in levels:
-        _check_answer(session, source, level)
-    return session
+    for level in range(len(card.levels)):
+        _check_answer(runtime, card, source, level)
+    return _levelled(card, content, source)
+
+
+def _levelled(card: ModelCard, content: bytes, source: str) -> Session:
+    """Session of a file that has been checked, with what most questions need already open."""
+
+    def level(number: int) -> bytes:
+        try:
+            return freeze.at_level(content, number)
+        except (ValueError, LookupError) as fault:
+            raise ModelError(source, f"no protocol buffer: {fault}") from fault
+
+    def telling(output: str) -> Callable[[int], Any]:
+        return lambda number: _start(freeze.for_output(level(number), output), source)
+
+    count = len(card.levels)
+    runtimes = Runtimes(lambda number: _start(level(number), source), count)
+    clocks, gauges = Runtimes(telling("duration"), count), Runtimes(telling("sigma"), 1)
+    session = Session(card, digest(content), runtimes, clocks, gauges, len(content))
+    # Asks the finest level and its clock, and so opens them.
+    return replace(session, golden=session.trial())
 
 
 def _start(content: bytes, source: str) -> Any:
@@ -112,6 +189,8 @@ def _start(content: bytes, source: str) -> Any:
     # A pose takes microseconds: threads would cost more than they bring.
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
+    # An arena keeps what the longest clip took, for each session, and gains no time on one thread.
+    options.enable_cpu_mem_arena = False
     try:
         return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as fault:  # onnxruntime's exceptions share no base of their own
@@ -140,15 +219,20 @@ def _check_options(runtime: Any, card: ModelCard, source: str) -> None:
         raise ModelError(source, f"optional inputs (name: width) {found}, expected {expected}")
 
 
-def _check_answer(session: Session, source: str, level: int) -> None:
+def _check_answer(runtime: Any, card: ModelCard, source: str, level: int) -> None:
     """Ask for the pose in the middle: a file whose weights are damaged shows here."""
-    middle = np.array([[control.default for control in session.card.controls]])
+    feed = {"controls": _middle(card).astype(np.float32), "time": np.zeros((1, 1), np.float32)}
     try:
-        answers = session.run(middle, np.zeros((1, 1)), *OUTPUTS, level=level)
+        answers = runtime.run([*OUTPUTS], {**feed, LEVEL: np.array(level)})
     except Exception as fault:
         raise ModelError(source, f"does not run: {str(fault).splitlines()[0]}") from fault
-    joints = len(session.card.skeleton)
+    joints = len(card.skeleton)
     if answers[0].shape != (1, 1, joints, 4):
         raise ModelError(source, f"rotations {answers[0].shape}, expected (1, 1, {joints}, 4)")
     if not all(np.isfinite(answer).all() for answer in answers):
         raise ModelError(source, "answers with numbers that are not finite")
+
+
+def _middle(card: ModelCard) -> Floats:
+    """Controls (1, d) in the middle of what was sampled."""
+    return np.array([[control.default for control in card.controls]])

@@ -3,19 +3,20 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 
 from service.motion import roles
 from service.motion.answer import ClipAnswer, PoseAnswer, Trust
-from service.motion.card import Control
 from service.motion.clip import assemble
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Singles
 from service.motion.errors import InvalidField, OutsideSamples
 from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
+from service.synthesis.door import Door, Question
 from service.synthesis.question import ClipQuestion, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
@@ -25,17 +26,23 @@ ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 
 @dataclass(frozen=True)
-class _Question:
-    """What has passed the door: controls, in the card's order, and performer as they were given,
-    and as the graph takes them, point (1, d) and labels (1, p); a warning for each control outside
-    its sampled range."""
+class Moments:
+    """A question for poses that has passed the door, and its times (S,), s."""
 
-    controls: dict[str, float]
-    performer: str | None
-    level: int
-    point: Floats
-    labels: Floats
-    warnings: tuple[str, ...]
+    question: Question
+    when: Floats
+
+    @property
+    def level(self) -> int:
+        """Level of detail."""
+        return self.question.level
+
+
+SAMPLE = 17
+"""Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
+
+Row = tuple[Singles, ...]
+"""ANSWERED of one question: (S, J, 4), (S, 3), (J, 3), and two numbers."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +52,17 @@ class Synthesizer:
     name: str
     session: Session
 
-    @property
+    @cached_property
     def identity(self) -> str:
         """name@contenthash: what an answer under this name will always be."""
         return f"{self.name}@{self.session.digest}"
+
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """Digest of the model's file and of what it answers here: machines that round otherwise
+        differ in it."""
+        parts = self.identity.encode() + self.session.golden
+        return blake2b(parts, digest_size=16).digest()
 
     @cached_property
     def ladder(self) -> Ladder:
@@ -96,21 +110,87 @@ class Synthesizer:
         extrapolate: Policy,
         performer: str | None = None,
         level: int = 0,
-    ) -> PoseAnswer:
+    ) -> PoseAnswer[np.float32]:
         """Poses at times (S,), s from the start of the clip, as a performer of the card moves, or
         somebody who was never seen, at a level of detail.
 
         Raises InvalidField for a control, time, performer or level that cannot be used,
         OutsideSamples where `extrapolate` is "refuse" and a control lies outside its sampled range.
         """
-        question = self._door(controls, extrapolate, performer, level)
+        asked = self.moments(controls, times, extrapolate, performer, level)
+        return self.posed(asked, self.poses([asked])[0])
+
+    def moments(
+        self,
+        controls: Mapping[str, float],
+        times: Sequence[float],
+        extrapolate: Policy,
+        performer: str | None = None,
+        level: int = 0,
+    ) -> Moments:
+        """The question of `pose` as far as it can be checked before the model is asked."""
+        question = self._door.question(controls, extrapolate, performer, level)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
         when = np.array([limits.number(f"times/{i}", value) for i, value in enumerate(times)])
-        duration = self._duration(question)
-        for index, value in enumerate(when):
-            limits.within(f"times/{index}", value, 0.0, duration, "s")
-        return self._answer(question, when)
+        return Moments(question, when)
+
+    def poses(self, asked: Sequence[Moments]) -> list[Row]:
+        """What the graph says to questions of as many times and of one level, in one call.
+
+        Where `session.exact`, a question gets the same bytes whatever it is asked with.
+        """
+        first = asked[0].question
+        if len(asked) == 1 and len(asked[0].when) == 1:
+            # A product with one row is summed in another order: nobody is asked for alone.
+            arrays = (first.point, first.labels, asked[0].when[None])
+            points, labels, when = (array.repeat(2, axis=0) for array in arrays)
+        else:
+            points = np.concatenate([each.question.point for each in asked])
+            labels = np.concatenate([each.question.labels for each in asked])
+            when = np.array([each.when for each in asked])
+        answers = self.session.run(points, when, *ANSWERED, labels=labels, level=first.level)
+        return [tuple(answer[row] for answer in answers) for row in range(len(asked))]
+
+    def exact(self, level: int) -> bool:
+        """Whether `poses` gives each of many questions the bytes that it gets alone, as a sample of
+        questions says; files of old versions sum by where a question stands among others."""
+        if level not in self._exact:
+            asked = [self._sample(share, level) for share in np.linspace(0.0, 1.0, SAMPLE)]
+            alone = (self.poses([each])[0] for each in asked)
+            both = zip(self.poses(asked), alone, strict=True)
+            self._exact[level] = all(
+                np.array_equal(a, b) for row, own in both for a, b in zip(row, own, strict=True)
+            )
+        return self._exact[level]
+
+    @cached_property
+    def _door(self) -> Door:
+        return Door(self.session.card)
+
+    @cached_property
+    def _durations(self) -> tuple[float, float]:
+        return limits.durations(self.session.card)
+
+    @cached_property
+    def _exact(self) -> dict[int, bool]:
+        return {}
+
+    def _sample(self, share: float, level: int) -> Moments:
+        """A question at a share of each control's range, and of the shortest clip."""
+        card = self.session.card
+        controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
+        return self.moments(controls, [share * card.durations[0]], "warn", None, level)
+
+    def posed(self, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
+        """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
+        rotations, root, offsets, length, sigma = row
+        duration = self._sensible(float(length))
+        if not (asked.when.min() >= 0.0 and asked.when.max() <= duration):
+            for index, value in enumerate(asked.when):
+                limits.within(f"times/{index}", value, 0.0, duration, "s")
+        trust = self._trust(asked.question, duration, float(sigma))
+        return PoseAnswer(asked.when, rotations, root, offsets, trust)
 
     def clip(self, asked: ClipQuestion) -> ClipAnswer:
         """Clip of the question; frame i is the pose at start + i / fps.
@@ -118,7 +198,9 @@ class Synthesizer:
         The N steps of a loop share the duration evenly, but are played at fps. Raises as `pose`
         does, and InvalidField for a loop of what is no cycle and names that no role leads to.
         """
-        question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        question = self._door.question(
+            asked.controls, asked.extrapolate, asked.performer, asked.level
+        )
         joints = self._joints(asked)
         answer = self._answer(question, course.times(asked, self._duration(question)))
         if asked.loop or asked.root == "in_place":
@@ -129,7 +211,7 @@ class Synthesizer:
     def check(self, asked: ClipQuestion) -> None:
         """Raise what `clip` would, as far as it can be said before anything is synthesised: how
         long the clip takes is not known yet."""
-        self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        self._asked(asked)
         self._joints(asked)
         course.window(asked, limits.durations(self.session.card)[1])
 
@@ -140,39 +222,32 @@ class Synthesizer:
         asked for at once, and a question whose end is the clip's own would pass here and be refused
         later. Raises as `clip` does.
         """
-        question = self._door(asked.controls, asked.extrapolate, asked.performer, asked.level)
+        question = self._door.question(
+            asked.controls, asked.extrapolate, asked.performer, asked.level
+        )
         self._joints(asked)
         times = course.times(asked, self._duration(question))
         # A loop ends with its first frame again.
         return Prospect(len(times) + asked.loop, question.warnings)
 
-    def _door(
-        self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
-    ) -> _Question:
-        card = self.session.card
-        limits.check_names(card, controls)
-        labels, coarsest = _labels(card.performers, performer), len(card.levels) - 1
-        if not 0 <= level <= coarsest:
-            raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-        point = np.array([[_required(control, controls) for control in card.controls]])
-        warnings = tuple(_outside(c, v) for c, v in zip(card.controls, point[0], strict=True))
-        said = tuple(filter(None, warnings))
-        if said and extrapolate == "refuse":
-            raise OutsideSamples("controls", "; ".join(said))
-        # However they are put: the same question has the same bytes.
-        given = {control.name: float(controls[control.name]) for control in card.controls}
-        return _Question(given, performer, level, point, labels, said)
+    def _asked(self, asked: ClipQuestion) -> Question:
+        who, level = asked.performer, asked.level
+        return self._door.question(asked.controls, asked.extrapolate, who, level)
 
-    def _duration(self, question: _Question) -> float:
+    def _duration(self, question: Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
         durations = self.session.durations(question.point, question.labels, question.level)
-        duration = float(durations[0])
-        low, high = limits.durations(self.session.card)
+        return self._sensible(float(durations[0]))
+
+    def _sensible(self, duration: float) -> float:
+        low, high = self._durations
         if not low <= duration <= high:
             raise OutsideSamples("controls", limits.senseless(self.session.card, duration))
         return duration
 
-    def _routed(self, question: _Question, answer: PoseAnswer, asked: ClipQuestion) -> PoseAnswer:
+    def _routed(
+        self, question: Question, answer: PoseAnswer[np.float64], asked: ClipQuestion
+    ) -> PoseAnswer[np.float64]:
         """The answer in place, or closed, as asked for."""
         card = self.session.card
         measure = stride.strides if card.cyclic else stride.straight
@@ -181,50 +256,17 @@ class Synthesizer:
         answer = course.in_place(answer, way) if stays else answer
         return course.closed(answer, None if stays else way) if asked.loop else answer
 
-    def _answer(self, question: _Question, when: Floats) -> PoseAnswer:
+    def _answer(self, question: Question, when: Floats) -> PoseAnswer[np.float64]:
         answers = self._run(question, when[None], *ANSWERED)
         rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
-        trust = Trust(
-            self.identity,
-            question.controls,
-            float(duration),
-            float(sigma),
-            question.warnings,
-            question.performer,
-            question.level,
-        )
+        trust = self._trust(question, float(duration), float(sigma))
         return PoseAnswer(when, rotations, root, offsets, trust)
 
-    def _run(self, question: _Question, when: Floats, *outputs: str) -> list[Any]:
+    def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
+        controls, warnings = question.controls, question.warnings
+        who, level = question.performer, question.level
+        return Trust(self.identity, controls, duration, sigma, warnings, who, level)
+
+    def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level
         return self.session.run(question.point, when, *outputs, labels=labels, level=level)
-
-
-def _labels(performers: tuple[str, ...], asked: str | None) -> Floats:
-    """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
-    if asked is not None and asked not in performers:
-        raise InvalidField("performer", f"{asked!r}, expected {limits.known(performers)}")
-    return np.array([[float(name == asked) for name in performers]])
-
-
-def _required(control: Control, controls: Mapping[str, float]) -> float:
-    field = f"controls/{control.name}"
-    if control.name not in controls:
-        raise InvalidField(
-            field,
-            f"missing; give a number in {control.unit}, "
-            f"sampled from {control.minimum:g} to {control.maximum:g}",
-        )
-    value = limits.number(field, controls[control.name])
-    limits.within(field, value, *limits.reach(control), control.unit)
-    return value
-
-
-def _outside(control: Control, value: float) -> str | None:
-    low, high = limits.sampled(control)
-    if low <= value <= high:
-        return None
-    return (
-        f"{control.name} = {value:g} {control.unit} lies outside what was sampled, "
-        f"{control.minimum:g} to {control.maximum:g} {control.unit}"
-    )

@@ -21,12 +21,17 @@ def document(content: Any) -> Response:
 
 def models(library: Library) -> dict[str, Any]:
     """Schema ModelList of the contract."""
-    return {"models": [_summary(model) for model in library.models.values()]}
+    return {"models": [_summary(library.versions(name)) for name in library.models]}
 
 
-def _summary(model: Synthesizer) -> dict[str, str]:
-    description = model.session.card.description
-    return {"name": model.name, "identity": model.identity, "description": description}
+def _summary(versions: Sequence[Synthesizer]) -> dict[str, Any]:
+    newest = versions[0]
+    return {
+        "name": newest.name,
+        "identity": newest.identity,
+        "versions": [model.identity for model in versions],
+        "description": newest.session.card.description,
+    }
 
 
 def card(model: Synthesizer) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """The contract: api/openapi.yaml as the service reads it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,9 @@ class Operation:
     """One operation of the contract.
 
     query: names of its query parameters. open_query: whether the query may hold other names too,
-    because an exploded object (the controls of a model) stands among the parameters.
+    because an exploded object (the controls of a model) stands among the parameters. media_types:
+    of what it answers with when all is well. responses: statuses. tags: under which it is listed.
+    scope: what a key must allow, where the service asks for keys; None where it never does.
     """
 
     id: str
@@ -24,6 +27,25 @@ class Operation:
     path: str
     query: frozenset[str]
     open_query: bool
+    media_types: tuple[str, ...] = ()
+    responses: frozenset[str] = frozenset()
+    tags: frozenset[str] = frozenset()
+    scope: str | None = None
+
+    @cached_property
+    def negotiated(self) -> bool:
+        """Whether Accept chooses among the media types."""
+        return "406" in self.responses
+
+    @cached_property
+    def sheds(self) -> bool:
+        """Whether it is refused when there is too much to do; what watches the service is not."""
+        return "service" not in self.tags
+
+    @cached_property
+    def pure(self) -> bool:
+        """Whether its answer follows from the model and the request's line alone."""
+        return "304" in self.responses
 
 
 @dataclass(frozen=True)
@@ -58,7 +80,24 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 path=path,
                 query=frozenset(p["name"] for p in query) - set(exploded),
                 open_query=bool(exploded),
+                media_types=_media_types(document, item[method]["responses"]),
+                responses=frozenset(item[method]["responses"]),
+                tags=frozenset(item[method].get("tags", ())),
+                scope=_scope(item[method].get("security", document.get("security", []))),
             )
+
+
+def _media_types(document: Mapping[str, Any], responses: Mapping[str, Any]) -> tuple[str, ...]:
+    well = (_resolve(document, node) for code, node in responses.items() if code.startswith("2"))
+    return tuple(name for node in well for name in node.get("content", ()))
+
+
+def _scope(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
+    """The one scope of a security requirement; its other alternative is a service without keys."""
+    scopes = [scope for alternative in security for of in alternative.values() for scope in of]
+    if len(scopes) > 1:
+        raise ValueError(f"scopes {scopes}, expected one at most")
+    return scopes[0] if scopes else None
 
 
 def _resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:

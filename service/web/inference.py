@@ -17,6 +17,7 @@ from service.web import answers, body, inference_query, problems
 from service.web import tensors as wire
 from service.web.problems import RequestFault
 from service.web.service import CROWDS, Handler, Service
+from service.web.service import model as find
 from service.web.tensors import Received
 
 HEADER = "Inference-Header-Content-Length"
@@ -42,13 +43,14 @@ async def get_live(service: Service, request: Request) -> Response:
 
 async def get_ready(service: Service, request: Request) -> Response:
     """That its models answer."""
+    service.readiness.document(request.scope["principal"].may_read)
     return answers.document({"ready": True})
 
 
 async def get_model(service: Service, request: Request) -> Response:
-    """A model's inputs and outputs."""
-    model = _model(service, request)
-    card = model.session.card
+    """A model's inputs and outputs; its versions are the hashes of its files."""
+    model = find(service, request)
+    card, versions = model.session.card, request.scope["library"].versions(model.name)
     inputs = [
         _port("controls", "FP32", [-1, len(card.controls)]),
         _port("time", "FP32", [-1, -1]),
@@ -58,7 +60,9 @@ async def get_model(service: Service, request: Request) -> Response:
     return answers.document(
         {
             "name": model.name,
-            "versions": [model.session.digest],
+            "versions": [
+                each.session.digest for each in request.scope["library"].versions(model.name)
+            ],
             "platform": "onnxruntime_onnx",
             "inputs": inputs,
             "outputs": [_port(name, "FP32", s) for name, s in _outputs(len(card.skeleton)).items()],
@@ -68,12 +72,12 @@ async def get_model(service: Service, request: Request) -> Response:
 
 async def get_model_ready(service: Service, request: Request) -> Response:
     """That a model answers."""
-    return answers.document({"name": _model(service, request).name, "ready": True})
+    return answers.document({"name": find(service, request).name, "ready": True})
 
 
 async def infer(service: Service, request: Request) -> Response:
     """Outputs of a model's graph for tensors."""
-    model = _model(service, request)
+    model = find(service, request)
     length = _length(request)
     content = await _content(request, service.settings.inference_body_limit)
     make = partial(_inferred, model, content, length, service.settings.inference_poses)
@@ -98,12 +102,6 @@ OPERATIONS: dict[str, Handler] = {
     "inferVersion": infer,
 }
 """Handler of each operationId."""
-
-
-def _model(service: Service, request: Request) -> Synthesizer:
-    """The model of a path; its version is the hash of its file."""
-    name, version = request.path_params["model"], request.path_params.get("version")
-    return service.library.find(name if version is None else f"{name}@{version}")
 
 
 def _port(name: str, datatype: str, shape: list[int]) -> dict[str, Any]:

@@ -7,14 +7,14 @@ from anyio import to_thread
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.encode import CROWD_ENCODERS, ENCODERS, CrowdEncoder, Encoder, poses
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, CrowdEncoder, Encoder, poses
 from service.encode import crowd as crowd_usd
+from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS, Pack
 from service.export import pack as packing
-from service.motion.answer import PoseAnswer
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
-from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.synthesizer import Moments, Row, Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
     answers,
@@ -23,9 +23,14 @@ from service.web import (
     contract,
     crowd_query,
     inference,
+    metrics,
+    negotiation,
+    pose_operations,
     query,
     sending,
+    sigma_operations,
     walk_query,
+    why_operations,
 )
 from service.web.query import FileQuestion, PoseQuestion
 from service.web.service import CLIPS, CROWDS, Handler, Service, made
@@ -38,7 +43,7 @@ INLINE_POSES = 200
 
 async def list_models(service: Service, request: Request) -> Response:
     """Which models there are."""
-    return answers.document(answers.models(service.library))
+    return answers.document(answers.models(request.scope["library"]))
 
 
 async def get_model(service: Service, request: Request) -> Response:
@@ -49,21 +54,21 @@ async def get_model(service: Service, request: Request) -> Response:
 async def get_pose(service: Service, request: Request) -> Response:
     """Poses asked for by query parameters."""
     model = _model(service, request)
-    question = query.pose_of_pairs(request.query_params.multi_items())
-    return await _pose(model, question)
+    question = query.pose_of_pairs(query.pairs(request.scope["query_string"]))
+    return await _pose(service, model, question)
 
 
 async def query_pose(service: Service, request: Request) -> Response:
     """Poses asked for by a body."""
     model = _model(service, request)
     content = await body.read(request, service.settings.body_limit)
-    return await _pose(model, query.pose_of_body(content))
+    return await _pose(service, model, query.pose_of_body(content))
 
 
 async def get_clip(encoder: Encoder, service: Service, request: Request) -> Response:
     """A clip in the encoder's format, asked for by query parameters."""
     model = _model(service, request)
-    question = query.file_of_pairs(request.query_params.multi_items())
+    question = query.file_of_pairs(query.pairs(request.scope["query_string"]))
     return await _clip(model, question, encoder)
 
 
@@ -89,7 +94,7 @@ def _crowd(model: Synthesizer, encoder: CrowdEncoder, content: bytes, most: floa
 
 async def get_crowd(ending: str, service: Service, request: Request) -> Response:
     """A crowd that walks, as USD that is sent while it is made."""
-    model, pairs = _model(service, request), request.query_params.multi_items()
+    model, pairs = _model(service, request), query.pairs(request.scope["query_string"])
     question = walk_query.of_pairs(pairs, service.settings)
     made, pieces = await to_thread.run_sync(_walking, model, question, ending, limiter=CROWDS)
     name, media_type = f"{model.name}.{ending}", ENCODERS[ending].media_type
@@ -131,9 +136,16 @@ async def live(service: Service, request: Request) -> Response:
 
 
 async def ready(service: Service, request: Request) -> Response:
-    """Which models answer: they were loaded and asked once before the service listened."""
-    identities = [model.identity for model in service.library.models.values()]
-    return answers.document({"status": "ready", "models": identities})
+    """Which models answer, each having been asked just now.
+
+    Whoever is not known hears that they do, and no names.
+    """
+    return answers.document(service.readiness.document(request.scope["principal"].may_read))
+
+
+async def get_metrics(service: Service, request: Request) -> Response:
+    """What is counted, for Prometheus."""
+    return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
 
 
 async def get_contract(service: Service, request: Request) -> Response:
@@ -141,34 +153,63 @@ async def get_contract(service: Service, request: Request) -> Response:
     return Response(service.source, media_type=contract.MEDIA_TYPE)
 
 
-OPERATIONS: dict[str, Handler] = {
+_FIXED: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
-    "getPose": get_pose,
-    "queryPose": query_pose,
+    "getPoseJson": get_pose,
+    "queryPoseJson": query_pose,
+    **pose_operations.OPERATIONS,
+    **sigma_operations.OPERATIONS,
+    **why_operations.OPERATIONS,
+    **inference.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
     **{f"getCrowd{n.capitalize()}": partial(get_crowd, n) for n in crowd_usd.STREAMS},
     **{f"queryClips{n.capitalize()}": partial(query_clips, ENCODERS, p) for n, p in PACKS.items()},
+    "getMetrics": get_metrics,
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,
-    **inference.OPERATIONS,
+}
+
+
+def _negotiated(stem: str, formats: Mapping[str, negotiation.Format]) -> Handler:
+    """Handler of an operation whose formats, the usual one first, have operations of their own."""
+    offers = {name: found.media_type for name, found in formats.items()}
+    handlers = {name: _FIXED[f"{stem}{name.capitalize()}"] for name in formats}
+    return negotiation.negotiated(offers, handlers)
+
+
+_USD = {name: ENCODERS[name] for name in ("usdc", "usda", "usdz")}
+_CLIP = _USD | ENCODERS
+OPERATIONS: dict[str, Handler] = {
+    **_FIXED,
+    "getPose": _negotiated("getPose", POSE_ENCODERS),
+    "queryPose": _negotiated("queryPose", POSE_ENCODERS),
+    "getClip": _negotiated("getClip", _CLIP),
+    "queryClip": _negotiated("queryClip", _CLIP),
+    "queryClips": _negotiated("queryClips", PACKS),
+    "getCrowd": _negotiated("getCrowd", _USD),
+    "queryCrowd": _negotiated("queryCrowd", CROWD_ENCODERS),
+    "getSigma": _negotiated("getSigma", GRID_ENCODERS),
+    "querySigma": _negotiated("querySigma", GRID_ENCODERS),
 }
 """Handler of each operationId."""
 
 
-async def _pose(model: Synthesizer, question: PoseQuestion) -> Response:
-    answer: PoseAnswer = model.pose(
-        question.controls,
-        question.times,
-        question.extrapolate,
-        question.performer,
-        question.level,
-    )
-    content = await made(len(answer.times) <= INLINE_POSES, partial(poses.json, answer))
+async def _pose(service: Service, model: Synthesizer, question: PoseQuestion) -> Response:
+    controls, times, policy = question.controls, question.times, question.extrapolate
+    asked = model.moments(controls, times, policy, question.performer, question.level)
+    if len(times) > INLINE_POSES:
+        content = await to_thread.run_sync(_posed, model, asked, None)
+    else:
+        content = _posed(model, asked, await service.batcher.row(model, asked))
     return Response(content, media_type="application/json")
+
+
+def _posed(model: Synthesizer, asked: Moments, row: Row | None) -> bytes:
+    return poses.json(model.posed(asked, row or model.poses([asked])[0]))
 
 
 async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) -> Response:

@@ -34,13 +34,38 @@ class Kind:
 
 BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
 BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
+MALFORMED = Kind(400, "malformed-request", "This is not HTTP as the service reads it")
+UNAUTHENTICATED = Kind(401, "unauthenticated", "Nobody known asks")
+FORBIDDEN = Kind(403, "forbidden", "Whoever asks may not")
 NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
+NOT_ACCEPTABLE = Kind(406, "not-acceptable", "Nothing that is accepted is there")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
+TOO_SLOW = Kind(408, "request-too-slow", "The request took too long to arrive")
+URL_TOO_LONG = Kind(414, "url-too-long", "The URL is too long")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
+OVERLOADED = Kind(503, "overloaded", "The service has too much to do; ask again soon")
+LATE = Kind(503, "late", "The answer took too long")
+NOT_READY = Kind(503, "not-ready", "The service should not be sent requests now")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
-OF_REQUEST = (BAD_PARAMETER, BAD_BODY, NO_SUCH_PATH, METHOD_NOT_ALLOWED, BODY_TOO_LARGE, NOT_JSON)
+HEAD_TOO_LARGE = Kind(431, "head-too-large", "The request's head is too large")
+NO_CONNECTION_LEFT = Kind(503, "no-connection-left", "The service has no connection left")
+
+OF_WIRE = (MALFORMED, TOO_SLOW, URL_TOO_LONG, HEAD_TOO_LARGE, NO_CONNECTION_LEFT)
+"""What service/web/protocol.py refuses before any operation is known."""
+OF_LOAD = (OVERLOADED, LATE, NOT_READY)
+OF_REQUEST = (
+    BAD_PARAMETER,
+    BAD_BODY,
+    UNAUTHENTICATED,
+    FORBIDDEN,
+    NO_SUCH_PATH,
+    METHOD_NOT_ALLOWED,
+    NOT_ACCEPTABLE,
+    BODY_TOO_LARGE,
+    NOT_JSON,
+)
 
 TABLE: dict[type[QueryError], Kind] = {
     UnknownModel: Kind(404, "unknown-model", "No model of that name"),
@@ -72,16 +97,14 @@ class RequestFault(Exception):
         self.headers = headers
 
 
-async def of_fault(request: Request, fault: Exception) -> Response:
+def of_fault(request: Request, fault: RequestFault) -> Response:
     """Answer to a request that breaks the contract."""
-    assert isinstance(fault, RequestFault)
     errors = [{**fault.place, "detail": fault.detail}] if fault.place else []
     return _answer(request, fault.kind, fault.detail, errors, fault.headers)
 
 
-async def of_query_error(request: Request, error: Exception) -> Response:
+def of_query_error(request: Request, error: QueryError) -> Response:
     """Answer to a question that has none."""
-    assert isinstance(error, QueryError)
     place = _place(error, in_body=request.method == "POST")
     errors = [{**place, "detail": error.message}]
     return _answer(request, TABLE[type(error)], str(error), errors)

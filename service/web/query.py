@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast, get_args
+from urllib.parse import parse_qsl
 
 import msgspec
 
@@ -86,6 +87,11 @@ _FILE = msgspec.json.Decoder(FileBody)
 _FLOAT = msgspec.json.Decoder(float)
 
 
+def pairs(query_string: bytes) -> list[tuple[str, str]]:
+    """Names and values of a query string."""
+    return parse_qsl(query_string.decode("latin-1"), keep_blank_values=True)
+
+
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
     """Question of query parameters: `time` once or more, extrapolate, performer, level, and one
     per control."""
@@ -93,9 +99,9 @@ def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
     if not times:
         raise bad_parameter("time", "missing; give seconds from the start of the clip")
     single = unique([pair for pair in pairs if pair[0] != "time"])
-    policy, performer = _policy(single), single.pop("performer", None)
+    policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
-    return PoseQuestion(_numbers(single), times, policy, performer, level)
+    return PoseQuestion(numbers_of(single), times, policy, performer, level)
 
 
 def file_of_pairs(pairs: Pairs) -> FileQuestion:
@@ -108,12 +114,12 @@ def file_of_pairs(pairs: Pairs) -> FileQuestion:
 
 def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
     """Question of texts by name, of which none is left over: what is no option is a control."""
-    policy, performer = _policy(single), single.pop("performer", None)
+    policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
     names = _word(single, "names", get_args(Names), NAMES)
     root = _word(single, "root", get_args(Root), ROOT)
     loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
-    numbers = _numbers(single)
+    numbers = numbers_of(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
         start=numbers.pop("start", 0.0),
@@ -131,7 +137,7 @@ def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
 def pose_of_body(content: bytes) -> PoseQuestion:
     """Question of a JSON body."""
     body = decoding.decoded(_POSE, content)
-    controls = _controls(body.controls)
+    controls = controls_of(body.controls)
     level = _level(body.level)
     return PoseQuestion(controls, body.times, body.extrapolate, body.performer, level)
 
@@ -145,7 +151,7 @@ def file_of_body(content: bytes) -> FileQuestion:
 def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
     """Question of a part of a JSON body; within: keys and indices that lead to it."""
     return ClipQuestion(
-        _controls(body.controls, *within),
+        controls_of(body.controls, *within),
         body.fps,
         body.extrapolate,
         body.start,
@@ -168,7 +174,8 @@ def unique(pairs: Pairs) -> dict[str, str]:
     return single
 
 
-def _policy(single: dict[str, str]) -> Policy:
+def policy_of(single: dict[str, str]) -> Policy:
+    """What is said of `extrapolate`, which is taken out, or the usual."""
     return _word(single, "extrapolate", get_args(Policy), POLICY)
 
 
@@ -181,7 +188,8 @@ def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Wo
     return cast(Word, text)
 
 
-def _numbers(texts: dict[str, str]) -> dict[str, float]:
+def numbers_of(texts: dict[str, str]) -> dict[str, float]:
+    """Finite numbers of texts by name; RequestFault where one is none."""
     return {name: number(name, text) for name, text in texts.items()}
 
 
@@ -194,9 +202,14 @@ def number(name: str, text: str) -> float:
 
 
 def _level(given: float, *within: str) -> int:
+    return whole_number("level", given, *within)
+
+
+def whole_number(name: str, given: float, *within: str) -> int:
+    """Whole number of a body's field; RequestFault where it is none."""
     # JSON has one kind of number: 1.0 is a whole one.
     if not given.is_integer():
-        raise decoding.bad_body(f"{given:g}, expected a whole number", pointer(*within, "level"))
+        raise decoding.bad_body(f"{given:g}, expected a whole number", pointer(*within, name))
     return int(given)
 
 
@@ -213,7 +226,7 @@ def bad_parameter(name: str, detail: str) -> RequestFault:
     return RequestFault(BAD_PARAMETER, f"{name}: {detail}", {"parameter": name})
 
 
-def _controls(raw: dict[str, msgspec.Raw], *within: str) -> dict[str, float]:
+def controls_of(raw: dict[str, msgspec.Raw], *within: str) -> dict[str, float]:
     """Values of the controls; decoded one by one because msgspec does not name a key at fault."""
     values = {}
     for name, text in raw.items():

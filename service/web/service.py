@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from anyio import CapacityLimiter
 from starlette.concurrency import run_in_threadpool
@@ -11,6 +11,11 @@ from starlette.responses import Response
 
 from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
+from service.web import caching
+from service.web.access.policy import Policy
+from service.web.batching import Batcher
+from service.web.log import Lines
+from service.web.readiness import Readiness
 from service.web.settings import Settings
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
@@ -22,17 +27,31 @@ CLIPS = CapacityLimiter(os.cpu_count() or 1)
 class Service:
     """What every operation may use."""
 
-    library: Library
+    readiness: Readiness
     settings: Settings
     source: bytes
+    rules: Policy
+    lines: Lines | None = None
+    code: bytes = field(default_factory=caching.code)
+    batcher: Batcher = field(default_factory=Batcher)
+
+    def lifetime(self, model: str) -> bytes:
+        """How long an answer may be used unasked, by the model's name in its path."""
+        return caching.lifetime(model, self.settings.alias_seconds, self.rules.closed)
+
+    @property
+    def library(self) -> Library:
+        """The models as they are now: to be taken once a request."""
+        return self.readiness.models.library
 
 
 Handler = Callable[[Service, Request], Awaitable[Response]]
 
 
 def model(service: Service, request: Request) -> Synthesizer:
-    """The model that a path names."""
-    return service.library.find(request.path_params["model"])
+    """The model that a path names, which was found before the operation began."""
+    found: Synthesizer = request.scope["model"]
+    return found
 
 
 async def made(quick: bool, make: Callable[[], bytes]) -> bytes:

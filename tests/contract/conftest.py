@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import yaml
 from asking import Ask, asker
-from starlette.applications import Starlette
+from starlette.types import ASGIApp
 
 from service.synthesis import library
 from service.synthesis.library import Library
@@ -33,7 +33,7 @@ def loaded(models) -> Library:
 
 
 @pytest.fixture(scope="session")
-def app(loaded) -> Starlette:
+def app(loaded) -> ASGIApp:
     return create_app(loaded, Settings())
 
 

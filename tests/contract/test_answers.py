@@ -17,7 +17,7 @@ from service.web.operations import OPERATIONS
 from service.web.settings import Settings
 
 CLIP = "/v1/models/reach/clip"
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz")
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack")
 
 
 def url(path, controls, **more):

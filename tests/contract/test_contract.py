@@ -6,7 +6,9 @@ import openapi_spec_validator
 import pytest
 from asking import asker
 
-from service.encode import ENCODERS
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
+from service.encode.grids import GRID_ENCODERS
+from service.encode.packs import PACKS
 from service.synthesis.library import Library
 from service.web import contract, problems
 from service.web.app import build, create_app
@@ -25,8 +27,9 @@ def test_routes_and_operations_are_the_same_set(spec, app):
         for method in item
         if method in contract.METHODS
     }
-    # Starlette answers HEAD wherever GET is, and the contract says so in its introduction.
-    served = {(m, route.path) for route in app.routes for m in route.methods if m != "HEAD"}
+    # HEAD is answered wherever GET is, and the contract says so in its introduction.
+    places = app.site.places.places
+    served = {(m, place.template) for place in places for m in place.routes if m != "HEAD"}
     assert served == agreed
 
 
@@ -50,6 +53,38 @@ def test_each_format_has_the_media_type_of_its_encoder(spec, extension):
     assert list(answer["content"]) == [ENCODERS[extension].media_type]
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "formats"),
+    [
+        ("get", "pose", POSE_ENCODERS),
+        ("post", "pose", POSE_ENCODERS),
+        ("get", "clip", ENCODERS),
+        ("post", "clip", ENCODERS),
+        ("post", "clips", PACKS),
+        ("get", "crowd", {name: ENCODERS[name] for name in ("usda", "usdc", "usdz")}),
+        ("post", "crowd", CROWD_ENCODERS),
+        ("get", "sigma", GRID_ENCODERS),
+        ("post", "sigma", GRID_ENCODERS),
+    ],
+)
+def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats, spec):
+    every = spec["paths"][f"/v1/models/{{model}}/{path}"][method]["responses"]["200"]["$ref"]
+    contents = spec["components"]["responses"][every.rpartition("/")[2]]["content"]
+    assert set(contents) == {found.media_type for found in formats.values()}
+    assert len(contents) == len(formats)
+    for name, found in formats.items():
+        own = spec["paths"][f"/v1/models/{{model}}/{path}.{name}"][method]["responses"]["200"]
+        answer = spec["components"]["responses"][own["$ref"].rpartition("/")[2]]
+        assert answer["content"] == {found.media_type: contents[found.media_type]}
+
+
+OPEN = {"/livez", "/readyz", "/v2/health/live", "/v2/health/ready", "/openapi.yaml"}
+
+
+def test_only_these_operations_never_ask_for_a_key():
+    assert {o.path for o in contract.load().operations if o.scope is None} == OPEN
+
+
 def test_every_operation_documents_the_errors_it_can_give(spec):
     for path, item in spec["paths"].items():
         for method in item.keys() & set(contract.METHODS):
@@ -58,15 +93,27 @@ def test_every_operation_documents_the_errors_it_can_give(spec):
 
 def expected_statuses(path, method):
     statuses = {"200", "400", "405", "500"}
+    if path not in OPEN:
+        statuses |= {"401", "403"}
     if "{model}" in path:
         statuses.add("404")
-    if any(word in path for word in ("/pose", "/clip", "/crowd", "/infer")):
+        # Other engines' clients ask what is there now.
+        if method == "get" and path.startswith("/v1"):
+            statuses.add("304")
+    if path not in OPEN - {"/readyz", "/v2/health/ready"} | {"/metrics"}:
+        statuses.add("503")
+    if path.endswith("/infer"):
         statuses.add("422")
+    elif path.startswith("/v1") and path.count("/") > 3:
+        statuses.add("422")
+        # A path that names no format asks which is accepted.
+        statuses |= set() if "." in path or path.endswith("/why") else {"406"}
     return statuses | ({"413", "415"} if method == "post" else set())
 
 
 def test_the_contract_lists_every_problem_type(spec):
-    kinds = {*problems.OF_REQUEST, *problems.TABLE.values(), problems.INTERNAL}
+    known = (*problems.OF_REQUEST, *problems.OF_WIRE, *problems.OF_LOAD, *problems.TABLE.values())
+    kinds = {*known, problems.INTERNAL}
     listed = spec["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
     assert set(listed) == {problems.TYPE_PREFIX + kind.name for kind in kinds}
 

@@ -19,7 +19,7 @@ from service.web.problems import RequestFault
 
 API = Path(__file__).parents[2] / "api"
 EXAMPLES = API / "examples"
-NAMES = ("queryCrowdArrow", "queryCrowdNpz", "queryCrowdJson")
+NAMES = ("queryCrowdArrow", "queryCrowdNpz", "queryCrowdMsgpack", "queryCrowdJson")
 
 
 def checker(spec, name):

@@ -22,7 +22,7 @@ def test_the_example_is_answered_as_it_says(name, ask, spec, loaded):
     given = {"json": request["body"]} if "body" in request else {}
     # No two machines need train the same bytes.
     path = request["path"].replace("{version}", loaded.find("reach").session.digest)
-    answer = ask(request["method"], path, **given)
+    answer = ask(request["method"], path, headers=request.get("headers"), **given)
     expected = read(name, "response")
     assert answer.status_code == expected["status"], answer.text
     assert dict(answer.headers).items() >= expected["headers"].items()
@@ -40,7 +40,13 @@ def test_the_example_body_matches_the_schema(name, spec):
 
 
 @pytest.mark.parametrize(
-    "name", ["Pose", *(f"Clip{e}" for e in ("Usda", "Usdc", "Json", "Bvh", "Glb", "Npz"))]
+    "name",
+    [
+        *(f"Pose{e}" for e in ("", "Json", "Msgpack", "Npz", "Arrow")),
+        "Why",
+        *(f"Sigma{e}" for e in ("", "Json", "Msgpack", "Npz", "Arrow")),
+        *(f"Clip{e}" for e in ("Usda", "Usdc", "Json", "Bvh", "Glb", "Npz", "Arrow", "Msgpack")),
+    ],
 )
 def test_both_ways_to_ask_give_the_same_answer(name, ask):
     get, post = read(f"get{name}", "request"), read(f"query{name}", "request")

@@ -264,7 +264,14 @@ def test_an_unknown_format_names_the_formats_there_are(refuse):
     assert problem["errors"][0]["parameter"] == "format"
 
 
-@pytest.mark.parametrize("path", ["/", "/v1", "/v1/models/", "/v1/models/reach/clip", "/livez/"])
+def test_what_nobody_makes_is_not_acceptable(ask, refuse, controls):
+    asked, headers = f"{POSE}?{urlencode({**controls, 'time': 0})}", {"accept": "text/html"}
+    problem = refuse(406, "not-acceptable", "GET", asked, headers=headers)
+    assert "'text/html', expected one of application/json, application/vnd.m" in problem["detail"]
+    assert ask("GET", asked, headers=headers).headers["vary"] == "Accept"
+
+
+@pytest.mark.parametrize("path", ["/", "/v1", "/v1/models/", "/v1/models/reach/clip/", "/livez/"])
 def test_an_unknown_path_is_refused(path, refuse):
     refuse(404, "no-such-path", "GET", path)
 
@@ -274,11 +281,21 @@ def test_a_strange_host_is_no_failure(host, refuse):
     refuse(404, "no-such-path", "GET", "/nowhere", headers={"host": host})
 
 
-@pytest.mark.parametrize(("path", "allow"), [(POSE, "GET, HEAD, POST"), ("/livez", "GET, HEAD")])
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS"])
+@pytest.mark.parametrize(
+    ("path", "allow"), [(POSE, "GET, HEAD, OPTIONS, POST"), ("/livez", "GET, HEAD, OPTIONS")]
+)
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "TRACE"])
 def test_another_method_is_told_which_are_allowed(path, allow, method, ask, refuse):
     refuse(405, "method-not-allowed", method, path)
     assert ask(method, path).headers["allow"] == allow
+
+
+@pytest.mark.parametrize(
+    ("path", "allow"), [(POSE, "GET, HEAD, OPTIONS, POST"), ("/livez", "GET, HEAD, OPTIONS")]
+)
+def test_options_says_what_is_allowed(path, allow, ask):
+    answer = ask("OPTIONS", path)
+    assert (answer.status_code, answer.content, answer.headers["allow"]) == (204, b"", allow)
 
 
 def test_too_many_times_are_refused(refuse, controls):

@@ -1,6 +1,7 @@
 """The real process on a real socket: it answers, ends when told to, and refuses bad models."""
 
 import contextlib
+import json
 import os
 import signal
 import socket
@@ -107,7 +108,9 @@ def test_told_to_end_it_ends_well(ending, models):
         assert httpx.get(address(child) + "/readyz").status_code == 200
         child.send_signal(ending)
         assert child.wait(20) == 0
-        assert child.stdout.read() == child.stderr.read() == b""
+        assert child.stdout.read() == b""
+        (line,) = map(json.loads, child.stderr)
+        assert (line["operation"], line["status"]) == ("getReadiness", 200)
 
 
 def test_open_requests_are_answered_before_the_end(models, controls):

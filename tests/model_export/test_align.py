@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from model_export import align, dtw, fields, ingest
-from model_export.field_bank import half_ranges
 from model_export.ingest import Example
 from model_export.recipe import Kriging
 from model_export.samples import Samples
@@ -15,6 +14,7 @@ from model_export.table import Row
 from model_export.warp import DENSE, WarpBasis
 from service.motion import clip, quat
 from service.motion.conventions import UP
+from service.motion.field import half_ranges
 from service.motion.skeleton import Skeleton
 
 PARENTS = (-1, 0, 1, 2)

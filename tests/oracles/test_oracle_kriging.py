@@ -8,6 +8,7 @@ from scipy.interpolate import RBFInterpolator
 
 from model_export import covariance, kriging
 from model_export.kriging import Hyper
+from service.motion.covariance import RATE52
 
 TOLERANCE = 1e-9
 NUGGET = 0.05
@@ -54,7 +55,7 @@ MODELS = {
     "gaussian": (gstools.Gaussian, {}, 1.0 / np.sqrt(3.0)),
     "spherical": (gstools.Spherical, {}, 1.0),
     "matern32": (gstools.Matern, {"nu": 1.5}, np.sqrt(1.5) / covariance.RATE32),
-    "matern52": (gstools.Matern, {"nu": 2.5}, np.sqrt(2.5) / covariance.RATE52),
+    "matern52": (gstools.Matern, {"nu": 2.5}, np.sqrt(2.5) / RATE52),
 }
 
 

@@ -6,6 +6,7 @@ import json
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
+import msgpack
 import numpy as np
 import orjson
 import pyarrow as pa
@@ -79,7 +80,17 @@ def by_json(poses):
     return {name: np.array(rows, types[name]) for name, rows in content.items()}, facts
 
 
-READERS = {"arrow": by_arrow, "npz": by_npz, "json": by_json}
+def by_msgpack(poses):
+    content = msgpack.unpackb(CROWD_ENCODERS["msgpack"].encode(poses))
+    facts = {name: content.pop(name) for name in ("model", "names", "parents", "units", "warnings")}
+    columns = {
+        name: np.frombuffer(packed["data"], packed["dtype"]).reshape(packed["shape"])
+        for name, packed in content.items()
+    }
+    return columns, facts
+
+
+READERS = {"arrow": by_arrow, "npz": by_npz, "json": by_json, "msgpack": by_msgpack}
 
 
 def test_every_format_has_a_reader_here():

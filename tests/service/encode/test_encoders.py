@@ -14,12 +14,14 @@ from service.motion import bvh, skeleton
 def test_the_table_names_each_format_once():
     assert {key: found.media_type for key, found in ENCODERS.items()} == {
         "usda": "model/vnd.usda",
-        "usdc": "application/octet-stream",
+        "usdc": "model/vnd.usdc",
         "usdz": "model/vnd.usdz+zip",
         "json": "application/json",
         "bvh": "application/x-bvh",
         "glb": "model/gltf-binary",
-        "npz": "application/octet-stream",
+        "npz": "application/x-npz",
+        "arrow": "application/vnd.apache.arrow.stream",
+        "msgpack": "application/vnd.msgpack",
     }
     assert all(found.extension == key for key, found in ENCODERS.items())
 

@@ -9,6 +9,7 @@ import pytest
 from service.motion import card
 from service.motion.card import Control, ModelCard
 from service.motion.detail import Level
+from service.motion.field import Hyper
 from service.motion.skeleton import Skeleton
 
 CARD = ModelCard(
@@ -42,6 +43,8 @@ CARD = ModelCard(
     diagnostics={"truncation_rms_m": 0.005, "notes": ["one"], "explained": {"pose": 0.9}},
     provenance={"licence": "CC0", "clips": 92},
     roles={"hips": "hips", "upperChest": "chest"},
+    sources=("a.bvh", "b.bvh, frames 3 to 90", "c.bvh"),
+    kriging=Hyper("matern52", (0, 1), np.array([0.3, 0.1 + 0.2]), 1e-3, 0.7),
 )
 
 
@@ -57,12 +60,16 @@ def same_skeleton(a, b):
 def test_card_read_is_the_card_written():
     read = card.load(card.dump(CARD))
     assert same_skeleton(read.skeleton, CARD.skeleton)
-    assert replace(read, skeleton=CARD.skeleton) == CARD
+    # Every bit of them: who asks why computes with these.
+    assert np.array_equal(read.kriging.scales, CARD.kriging.scales)
+    assert replace(read.kriging, scales=CARD.kriging.scales) == CARD.kriging
+    assert replace(read, skeleton=CARD.skeleton, kriging=CARD.kriging) == CARD
 
 
-@pytest.mark.parametrize(
-    "field", [f.name for f in fields(ModelCard) if f.name not in ("performers", "roles")]
-)
+OPTIONAL = ("performers", "roles", "sources", "kriging")
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(ModelCard) if f.name not in OPTIONAL])
 def test_card_without_one_of_its_fields_is_refused_by_name(field):
     metadata = card.dump(CARD)
     del metadata[f"posefield.{field}"]
@@ -75,6 +82,17 @@ def test_a_card_that_says_nothing_of_roles_has_none():
     metadata = card.dump(CARD)
     del metadata["posefield.roles"]
     assert card.load(metadata).roles == {}
+
+
+def test_a_card_older_than_sources_has_none():
+    metadata = card.dump(CARD)
+    del metadata["posefield.sources"], metadata["posefield.kriging"]
+    read = card.load(metadata)
+    assert (read.sources, read.kriging) == ((), None)
+    assert card.dump(read) == metadata | {
+        "posefield.sources": "[]",
+        "posefield.kriging": "null",
+    }
 
 
 @pytest.mark.parametrize(

@@ -49,8 +49,11 @@ def test_a_hash_alone_or_too_short_is_no_name(place):
 def test_a_folder_gives_all_its_models_and_nothing_else(place):
     place("set/b.onnx")
     folder = place("set/a.onnx").parent
-    place("set/deeper/c.onnx")
     (folder / "notes.txt").write_text("not a model")
+    # What begins with a point is somebody's: a copy under way, Kubernetes' ..data.
+    place("set/.c.onnx")
+    place("set/..data/c.onnx")
+    place("set/deeper/still/c.onnx")
     assert list(library.load([folder]).models) == ["a", "b"]
 
 

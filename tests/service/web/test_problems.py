@@ -1,6 +1,5 @@
 """Every error of the domain that a client can cause has a status, and no two kinds one name."""
 
-import asyncio
 import json
 
 import pytest
@@ -47,5 +46,5 @@ def test_pointers_escape_what_rfc_6901_says(parts, expected):
 )
 def test_one_of_many_is_pointed_at(error, where):
     request = Request({"type": "http", "method": "POST", "path": "/", "state": {"request_id": "x"}})
-    answer = asyncio.run(problems.of_query_error(request, error))
+    answer = problems.of_query_error(request, error)
     assert json.loads(answer.body)["errors"][0]["pointer"] == where

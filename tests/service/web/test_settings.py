@@ -27,11 +27,23 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_INFERENCE_BODY_LIMIT": "60",
         "POSEFIELD_INFERENCE_POSES": "7",
         "POSEFIELD_GRACE": "0",
+        "POSEFIELD_OPEN": "1",
+        "POSEFIELD_KEYS_FILE": "keys",
+        "POSEFIELD_JWT_LEEWAY": "0",
+        "POSEFIELD_DRAIN": "5",
+        "POSEFIELD_WORKERS": "4",
+        "POSEFIELD_RELOAD": "0",
+        "POSEFIELD_VERSIONS": "7",
+        "POSEFIELD_VERSIONS_MEMORY": "1000",
     }
     crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
     clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
     tensors = {"inference_body_limit": 60, "inference_poses": 7}
-    expected = Settings("::1", 9000, body_limit=10, **crowds, **clips, **tensors, grace=0)
+    ends = {"grace": 0, "drain": 5, "workers": 4}
+    follows = {"reload": 0, "versions": 7, "versions_memory": 1000}
+    access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
+    others = {**crowds, **clips, **tensors, **ends, **follows, **access}
+    expected = Settings("::1", 9000, body_limit=10, **others)
     assert settings.read(environ=given) == expected
 
 
@@ -39,7 +51,8 @@ def test_the_readme_lists_every_setting_and_its_default():
     readme = (Path(__file__).parents[3] / "README.md").read_text()
     for setting in fields(Settings):
         name = f"POSEFIELD_{setting.name.upper()}"
-        assert f"| `{name}` | `{setting.default}` |" in readme
+        default = int(setting.default) if setting.type is bool else setting.default
+        assert f"| `{name}` | `{default}` |".replace(" `` ", " ") in readme
 
 
 @pytest.mark.parametrize(
@@ -55,6 +68,14 @@ def test_the_readme_lists_every_setting_and_its_default():
         ("PORT", "65536"),
         ("BODY_LIMIT", "0"),
         ("GRACE", "1.5"),
+        ("DRAIN", "601"),
+        ("WORKERS", "257"),
+        ("RELOAD", "-1"),
+        ("VERSIONS", "all"),
+        ("VERSIONS_MEMORY", "64M"),
+        ("OPEN", "yes"),
+        ("JWT_REFRESH", "9"),
+        ("JWT_LEEWAY", "-1"),
     ],
 )
 def test_a_variable_that_cannot_be_used_is_named(name, text):

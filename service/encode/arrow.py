@@ -1,4 +1,4 @@
-"""Crowd poses as an Arrow IPC stream of one record batch, one row a character.
+"""A table as an Arrow IPC stream of one record batch.
 
 Rows hold tensors by the canonical extension `arrow.fixed_shape_tensor`: a reader has each column as
 one array (N, ...) without parsing. The schema's metadata are JSON texts under keys like the card's.
@@ -8,29 +8,38 @@ import json
 from typing import Any
 
 import nanoarrow
+import numpy as np
+import orjson
 from nanoarrow.ipc import StreamWriter
 
-from service.encode import crowd_poses
-from service.encode.crowd_poses import Column
+from service.encode.tables import Column, Table
 from service.motion.card import PREFIX
-from service.motion.crowd import CrowdPoses
 
-_TYPES = {"float32": nanoarrow.float32, "int8": nanoarrow.int8}
+_TYPES = {
+    "float32": nanoarrow.float32,
+    "float64": nanoarrow.float64,
+    "int8": nanoarrow.int8,
+    "bool": nanoarrow.bool_,
+}
 
 
-def arrow(poses: CrowdPoses) -> bytes:
-    """Arrow IPC stream; the same poses always give the same bytes."""
-    table = crowd_poses.columns(poses)
-    rows = nanoarrow.struct({n: _field(c) for n, c in table.items()}, nullable=False)
-    metadata = {PREFIX + key: value for key, value in crowd_poses.fact_texts(poses).items()}
-    schema = nanoarrow.c_schema(rows).modify(metadata=metadata)
+def arrow(table: Table) -> bytes:
+    """Arrow IPC stream; the same table always gives the same bytes."""
+    rows = nanoarrow.struct({n: _field(c) for n, c in table.columns.items()}, nullable=False)
+    schema = nanoarrow.c_schema(rows).modify(metadata=_metadata(table))
     batch = nanoarrow.c_array_from_buffers(
-        schema, len(poses), [None], children=[_array(c) for c in table.values()]
+        schema, len(table), [None], children=[_array(c) for c in table.columns.values()]
     )
     pieces = _Pieces()
     with StreamWriter.from_writable(pieces) as writer:
         writer.write_stream(batch)
     return b"".join(pieces)
+
+
+def _metadata(table: Table) -> dict[str, str]:
+    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_SORT_KEYS
+    said = {**table.facts, **table.fixed}
+    return {PREFIX + key: orjson.dumps(said[key], option=options).decode() for key in said}
 
 
 class _Pieces(list[bytes]):
@@ -54,10 +63,18 @@ def _field(column: Column) -> Any:
 
 def _array(column: Column) -> Any:
     """Column as Arrow holds it, on the same memory."""
+    if column.dtype == bool:
+        return _truths(column)
     numbers = nanoarrow.c_array(column.reshape(-1), _type(column))
     if column.ndim == 1:
         return numbers
     return nanoarrow.c_array_from_buffers(_rows(column), len(column), [None], children=[numbers])
+
+
+def _truths(column: Column) -> Any:
+    """A bit each, where nanoarrow would take NumPy's bytes for bits."""
+    bits = np.packbits(column, bitorder="little")
+    return nanoarrow.c_array_from_buffers(_type(column), len(column), [None, bits])
 
 
 def _rows(column: Column) -> Any:

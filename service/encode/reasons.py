@@ -1,0 +1,43 @@
+"""Reasons for an answer as plain values, and as a table to read."""
+
+from typing import Any
+
+from service.motion.answer import Captured, Reasons
+
+DECIMALS = 9
+"""Further ones hang on the machine that inverted the system."""
+
+
+def plain(found: Reasons) -> dict[str, Any]:
+    """Schema Reasons of the contract."""
+    return {
+        "model": found.model,
+        "controls": found.controls,
+        "performer": found.performer,
+        "warnings": list(found.warnings),
+        "nearest": [_clip(clip) for clip in found.nearest],
+        "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
+    }
+
+
+def _clip(clip: Captured) -> dict[str, Any]:
+    rounded = {name: round(getattr(clip, name), DECIMALS) for name in ("distance", "weight")}
+    return {**vars(clip), **rounded}
+
+
+def text(found: Reasons) -> str:
+    """A line for each clip, the nearest first, and one for all others."""
+    wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
+    lines = [f"{'clip':{wide}}  distance   weight  "]
+    lines += [
+        f"{clip.source:{wide}}  {clip.distance:8.3f}  {100 * clip.weight:6.1f} %  {_said(clip)}"
+        for clip in found.nearest
+    ]
+    others = f"{found.others} others"
+    lines.append(f"{others:{wide}}  {'':8}  {100 * found.others_weight:6.1f} %")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _said(clip: Captured) -> str:
+    values = ", ".join(f"{name} {value:g}" for name, value in clip.controls.items())
+    return f"{clip.performer}, {values}" if clip.performer else values

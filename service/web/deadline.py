@@ -1,0 +1,67 @@
+"""How long an answer may take to begin."""
+
+import asyncio
+import re
+from asyncio import Task
+from collections.abc import Awaitable
+from typing import Any, TypeVar
+
+from service.web.problems import LATE, RequestFault
+
+Answer = TypeVar("Answer")
+
+LOOK = 0.1
+"""Seconds between two looks: a timer for each request would cost a tenth of a pose."""
+
+# RFC 7240, 4.3: a client that has no use for an answer after so many seconds.
+_WAIT = re.compile(rb"(?:^|[,;\s])wait\s*=\s*([0-9]{1,6})(?![0-9])", re.IGNORECASE)
+
+
+def seconds(prefer: bytes | None, most: float) -> float:
+    """The client's own patience, of a Prefer header, but never more than the service's."""
+    found = _WAIT.search(prefer) if prefer else None
+    return min(most, float(found[1])) if found else most
+
+
+class Watch:
+    """The tasks of an event loop that have to end in time."""
+
+    def __init__(self) -> None:
+        self._until: dict[Task[Any], float] = {}
+        self._late: set[Task[Any]] = set()
+        self._looks = False
+
+    async def within(self, limit: float, answer: Awaitable[Answer]) -> Answer:
+        """What is awaited; RequestFault where it takes longer than so many seconds.
+
+        What runs in a thread goes on to its end, and holds its place there until then.
+        """
+        task, loop = asyncio.current_task(), asyncio.get_running_loop()
+        assert task is not None
+        self._until[task] = loop.time() + limit
+        if not self._looks:
+            self._looks = True
+            loop.call_later(LOOK, self._look)
+        try:
+            return await answer
+        except asyncio.CancelledError:
+            if task not in self._late:
+                raise
+            task.uncancel()
+            detail = f"no answer within {limit:g} s"
+            raise RequestFault(LATE, detail, headers={"Retry-After": "1"}) from None
+        finally:
+            del self._until[task]
+            self._late.discard(task)
+
+    def _look(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._looks = bool(self._until)
+        if self._looks:
+            loop.call_later(LOOK, self._look)
+        now = loop.time()
+        late = [task for task, until in self._until.items() if until < now]
+        for task in late:
+            if task not in self._late:
+                self._late.add(task)
+                task.cancel()

@@ -1,0 +1,223 @@
+"""One request on its way to its answer, and what surrounds every answer."""
+
+import logging
+import os
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+from starlette.types import Message, Receive, Scope, Send
+
+from service.motion.errors import QueryError
+from service.web import caching, compression, deadline, log, metrics, problems, protocol
+from service.web.access import door
+from service.web.access.audit import Call
+from service.web.access.principal import EVERYONE
+from service.web.contract import Operation
+from service.web.deadline import Watch
+from service.web.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
+from service.web.routing import Map, Place, Route
+from service.web.service import Service
+
+faults = logging.getLogger(__name__)
+
+REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
+COMMON = ((b"x-content-type-options", b"nosniff"),)
+# A prefix of this process and a number: a random number for each would take four times as long.
+_PROCESS, _NUMBERS = os.urandom(12).hex(), count(1)
+
+
+@dataclass
+class Site:
+    """What lies at which path, what all of it may use, and how many requests are being answered;
+    missing: the fault of a path at which nothing lies."""
+
+    places: Map
+    service: Service
+    missing: Callable[[str], Exception]
+    open: int = 0
+    watch: Watch = field(default_factory=Watch)
+
+
+class Exchange:
+    """A request, how far its answer is, and what will be noted of it."""
+
+    def __init__(self, site: Site, scope: Scope, receive: Receive, send: Send) -> None:
+        self._begun = time.perf_counter()
+        self._site, self._scope, self._send = site, scope, send
+        self._headers: dict[bytes, bytes] = dict(scope["headers"])
+        self._identity = _request_id(self._headers)
+        scope.setdefault("state", {})["request_id"] = self._identity
+        self._request = Request(scope, receive)
+        self._route: Route | None = None
+        self._coding: str | None = None
+        self._tag: str | None = None
+        self._status = self._size = 0
+
+    async def run(self) -> None:
+        """Answer, whatever happens, and note it."""
+        self._site.open += 1
+        metrics.opened(1)
+        try:
+            await self._finish(await self._response())
+        except ClientDisconnect:
+            faults.info("request %s: the client went away", self._identity)
+        except Exception:
+            if self._status:
+                faults.error("request %s failed, and its answer breaks off", self._identity)
+                raise
+            await self._fail()
+        finally:
+            self._site.open -= 1
+            metrics.opened(-1)
+            self._note()
+
+    async def _fail(self) -> None:
+        faults.exception("request %s failed", self._identity)
+        self._coding = self._tag = None
+        await self._finish(problems.internal(self._request))
+
+    async def _response(self) -> Response:
+        try:
+            return await self._answer()
+        except RequestFault as fault:
+            return problems.of_fault(self._request, fault)
+        except QueryError as error:
+            return problems.of_query_error(self._request, error)
+        except caching.NotModified:
+            return Response(status_code=304)
+
+    async def _answer(self) -> Response:
+        site, scope = self._site, self._scope
+        if protocol.FAULT in scope:
+            raise scope[protocol.FAULT]
+        found = site.places.find(scope["path"])
+        if found is None:
+            raise site.missing(scope["path"])
+        place, scope["path_params"] = found
+        route = place.routes.get(scope["method"])
+        if route is None:
+            return _other_method(scope["method"], place)
+        self._route = route
+        self._prepare(route)
+        limit = deadline.seconds(self._headers.get(b"prefer"), site.service.settings.deadline)
+        return await site.watch.within(limit, route.endpoint(self._request))
+
+    def _prepare(self, route: Route) -> None:
+        """Refuse what needs no model, find the model, and see whether the client has the answer."""
+        operation, site, scope = route.operation, self._site, self._scope
+        if "version" in scope["path_params"]:
+            # Elsewhere a version is a part of the model's name.
+            scope["path_params"]["model"] += "@" + scope["path_params"]["version"]
+        if site.open > site.service.settings.concurrency and operation.sheds:
+            detail = f"{site.open - 1} requests are being answered"
+            raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
+        if scope["query_string"] and not operation.open_query:
+            _check_parameters(self._request, operation)
+        self._let_in(operation)
+        if route.compresses and b"accept-encoding" in self._headers:
+            self._coding = compression.preferred(self._headers[b"accept-encoding"])
+        if "model" in scope["path_params"]:
+            scope["model"] = scope["library"].find(scope["path_params"]["model"])
+            if operation.pure:
+                self._check_held(route)
+
+    def _let_in(self, operation: Operation) -> None:
+        """Who asks, and the library as they may see it; RequestFault 401 or 403."""
+        scope, service = self._scope, self._site.service
+        scope["library"], scope["principal"] = service.library, EVERYONE
+        if service.rules.closed:
+            call = Call(self._identity, scope["method"], operation.path)
+            known = door.check(service.rules, scope["headers"], operation.scope, call)
+            scope["principal"] = known
+            if operation.scope is not None:
+                asked = scope["path_params"].get("model")
+                scope["library"] = door.seen(service.library, known, asked, call)
+
+    def _check_held(self, route: Route) -> None:
+        scope, accepted = self._scope, b""
+        if route.operation.negotiated:
+            accepted = b",".join(value for name, value in scope["headers"] if name == b"accept")
+        model, code = scope["model"], self._site.service.code
+        parts = code, model.fingerprint, route.name, scope["query_string"], accepted
+        self._tag = caching.tag(*parts, coding=self._coding)
+        given = self._headers.get(b"if-none-match")
+        if given is not None and caching.held(given.decode("latin-1"), self._tag):
+            raise caching.NotModified
+
+    async def _finish(self, response: Response) -> None:
+        if self._coding is not None and response.status_code == 200:
+            await compression.apply(response, self._coding)
+        response.raw_headers += self._surrounding(response)
+        await response(self._scope, self._request.receive, self._sent)
+
+    def _surrounding(self, response: Response) -> list[tuple[bytes, bytes]]:
+        """Headers that every answer has, or every answer of its kind."""
+        headers = [(b"x-request-id", self._identity.encode()), *COMMON]
+        held = response.status_code in (200, 304)
+        if held and self._route and self._route.vary:
+            headers.append((b"vary", self._route.vary))
+        if held and self._tag:
+            lifetime = self._site.service.lifetime(self._scope["path_params"]["model"])
+            headers += [(b"etag", self._tag.encode()), (b"cache-control", lifetime)]
+        elif "cache-control" not in response.headers:
+            headers.append((b"cache-control", caching.ALWAYS_NEW))
+        return headers
+
+    async def _sent(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self._status = message["status"]
+        else:
+            self._size += len(message.get("body", b""))
+        await self._send(message)
+
+    def _note(self) -> None:
+        """Count the request, and say it in one line."""
+        took = time.perf_counter() - self._begun
+        operation = self._route.operation.id if self._route else "none"
+        metrics.answered(operation, self._status, took, self._size)
+        if (lines := self._site.service.lines) is not None:
+            lines.add(self._line(operation, took))
+
+    def _line(self, operation: str, took: float) -> dict[str, Any]:
+        model = self._scope.get("model")
+        return {
+            "time": log.moment(time.time()),
+            "request": self._identity,
+            "method": self._scope["method"],
+            "operation": operation,
+            "model": model.identity if model else None,
+            "who": self._scope["principal"].name if "principal" in self._scope else None,
+            "tag": self._tag,
+            "status": self._status,
+            "bytes": self._size,
+            "milliseconds": round(took * 1e3, 3),
+        }
+
+
+def _request_id(headers: dict[bytes, bytes]) -> str:
+    given = headers.get(b"x-request-id", b"")
+    known = REQUEST_ID.fullmatch(given)
+    return given.decode() if known else f"{_PROCESS}{next(_NUMBERS):08x}"
+
+
+def _check_parameters(request: Request, operation: Operation) -> None:
+    if unknown := request.query_params.keys() - operation.query:
+        name = min(unknown)
+        detail = f"{name}: no such query parameter; there are {sorted(operation.query) or 'none'}"
+        raise RequestFault(problems.BAD_PARAMETER, detail, {"parameter": name})
+
+
+def _other_method(method: str, place: Place) -> Response:
+    """Answer to OPTIONS, or the fault of a method that the path does not take."""
+    allow = {"Allow": place.allow}
+    if method == "OPTIONS":
+        return Response(status_code=204, headers=allow)
+    raise RequestFault(
+        METHOD_NOT_ALLOWED, f"{method}, expected one of {place.allow}", headers=allow
+    )

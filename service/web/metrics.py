@@ -1,0 +1,98 @@
+"""What an operator watches, in Prometheus' text format.
+
+Several worker processes write files in one folder, PROMETHEUS_MULTIPROC_DIR, and any of them
+answers for all; prometheus_client reads that variable when it is imported.
+"""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import prometheus_client as prometheus
+from prometheus_client import multiprocess
+
+from service import __version__
+
+MEDIA_TYPE = prometheus.CONTENT_TYPE_LATEST
+FOLDER = "PROMETHEUS_MULTIPROC_DIR"
+
+SECONDS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+ROWS = (1, 2, 4, 8, 16, 32, 64)
+
+_LATENCY = prometheus.Histogram(
+    "posefield_request_seconds",
+    "Time from a request's head to the end of its answer",
+    ("operation", "status"),
+    buckets=SECONDS,
+)
+_BYTES = prometheus.Counter("posefield_sent_bytes", "Bytes of bodies of answers", ("operation",))
+_HELD = prometheus.Counter(
+    "posefield_not_modified", "Answers that clients had already: no model was asked", ("operation",)
+)
+_BATCH = prometheus.Histogram(
+    "posefield_batch_rows", "Poses that one call of a graph answered together", buckets=ROWS
+)
+_OPEN = prometheus.Gauge(
+    "posefield_open_requests", "Requests that are being answered", multiprocess_mode="livesum"
+)
+_MODEL = prometheus.Gauge(
+    "posefield_model", "1 for each version that answers", ("model", "hash"), multiprocess_mode="max"
+)
+_BUILD = prometheus.Gauge(
+    "posefield_build", "1; which version serves", ("version",), multiprocess_mode="max"
+)
+_BUILD.labels(__version__).set(1)
+
+# Looking a child up takes a lock and a tuple; there are some hundred of them.
+_latency = lru_cache(None)(_LATENCY.labels)
+_bytes = lru_cache(None)(_BYTES.labels)
+_held = lru_cache(None)(_HELD.labels)
+
+
+def answered(operation: str, status: int, seconds: float, size: int) -> None:
+    """Count a request that has been answered."""
+    _latency(operation, status).observe(seconds)
+    _bytes(operation).inc(size)
+    if status == 304:
+        _held(operation).inc()
+
+
+def batched(rows: int) -> None:
+    """Count a call of a graph for so many poses."""
+    _BATCH.observe(rows)
+
+
+def opened(change: int) -> None:
+    """Count a request that begins, 1, or ends, -1."""
+    _OPEN.inc(change)
+
+
+def model(name: str, digest: str, answers: bool) -> None:
+    """Note that a version of a model answers, or no longer does."""
+    _MODEL.labels(name, digest).set(answers)
+
+
+def page() -> bytes:
+    """All of it as text, of all processes that share a folder."""
+    if FOLDER not in os.environ:
+        return prometheus.generate_latest()
+    registry = prometheus.CollectorRegistry()
+    multiprocess.MultiProcessCollector(registry)
+    return prometheus.generate_latest(registry)
+
+
+@contextmanager
+def shared() -> Iterator[str]:
+    """A folder for the counters of several processes, gone with this one."""
+    with TemporaryDirectory(prefix="posefield-metrics-") as folder:
+        os.environ[FOLDER] = folder
+        yield folder
+
+
+def gone(process: int) -> None:
+    """Forget what is counted of a living process alone, once it has ended."""
+    if Path(os.environ.get(FOLDER, "")).is_dir():
+        multiprocess.mark_process_dead(process)

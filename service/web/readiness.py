@@ -1,0 +1,79 @@
+"""Whether the service should be sent requests: its models answer as they did, and it is not ending.
+
+A new file that cannot be used is shown, and changes nothing: the version before it answers.
+"""
+
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Any
+
+from service.synthesis.intake import Fault
+from service.synthesis.library import Library
+from service.synthesis.shelf import Models, Reloads
+from service.synthesis.synthesizer import Synthesizer
+from service.web import problems
+from service.web.problems import RequestFault
+
+HELD = 1.0
+"""Seconds that a trial of the models is good for, however often one asks."""
+
+
+class Readiness:
+    """Tries the newest model of each name with the question that it was checked with when it was
+    opened, whose answer must be the same to the byte. draining: the process is about to end."""
+
+    def __init__(self, models: Models) -> None:
+        self.models = models
+        self.draining = False
+        self._tried: tuple[Library, float] | None = None
+        self._wrong: list[str] = []
+
+    def document(self, may_read: Callable[[str], bool]) -> dict[str, Any]:
+        """What answers, and what became of newer files, of the models whose names may be read;
+        RequestFault 503 when not ready."""
+        library = self.models.library
+        if self.draining:
+            raise RequestFault(problems.NOT_READY, "the service is ending")
+        if not library.models:
+            raise RequestFault(problems.NOT_READY, "there is no model")
+        if wrong := self._tested(library):
+            known = ", ".join(name for name in wrong if may_read(name.partition("@")[0]))
+            detail = f"not as when opened answers {known or 'a model'}"
+            raise RequestFault(problems.NOT_READY, detail)
+        return {
+            "status": "ready",
+            "models": [m.identity for m in library.models.values() if may_read(m.name)],
+            "reload": _told(self.models.reloads, may_read),
+        }
+
+    def _tested(self, library: Library) -> list[str]:
+        """Identities of the models that answer otherwise than they did."""
+        now = time.monotonic()
+        if self._tried is None or self._tried[0] is not library or now > self._tried[1] + HELD:
+            self._wrong = [m.identity for m in library.models.values() if not _answers(m)]
+            self._tried = library, now
+        return self._wrong
+
+
+def _answers(model: Synthesizer) -> bool:
+    try:
+        return model.session.trial() == model.session.golden
+    except Exception:  # onnxruntime's exceptions share no base of their own
+        return False
+
+
+def _told(reloads: Reloads, may_read: Callable[[str], bool]) -> dict[str, Any]:
+    return {
+        "looks": reloads.looks,
+        "opened": reloads.opened,
+        "failed": reloads.failed,
+        "changed": datetime.fromtimestamp(reloads.changed, UTC).isoformat(timespec="seconds"),
+        "faults": [_fault(fault) for fault in reloads.faults if may_read(fault.name)],
+    }
+
+
+def _fault(fault: Fault) -> dict[str, str]:
+    # After a colon stand others' words, which may name paths: they are in the log.
+    detail = fault.error.message.partition(": ")[0]
+    return {"model": fault.name, "version": fault.version, "detail": detail}

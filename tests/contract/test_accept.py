@@ -1,0 +1,71 @@
+"""Paths without a format answer as those with one do, in the format that is accepted."""
+
+from urllib.parse import urlencode
+
+import pytest
+
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
+from service.encode.grids import GRID_ENCODERS
+from service.encode.packs import PACKS
+
+REACH = "/v1/models/reach"
+WALK = "/v1/models/walk/crowd"
+
+
+def questions(controls):
+    """Method, path, content and formats, the usual one first, of all that is negotiated."""
+    once, columns = {**controls, "time": 0.3}, {n: [v, v] for n, v in controls.items()}
+    usd = {name: ENCODERS[name] for name in ("usdc", "usda", "usdz")}
+    body = {"controls": controls}
+    many = {"format": "bvh", "clips": [body]}
+    crowd = {"controls": columns, "time": 0.1}
+    return [
+        ("GET", f"{REACH}/pose", f"?{urlencode(once)}", None, POSE_ENCODERS),
+        ("POST", f"{REACH}/pose", "", {**body, "times": [0.3]}, POSE_ENCODERS),
+        ("GET", f"{REACH}/clip", f"?{urlencode({**controls, 'end': 0.2})}", None, usd | ENCODERS),
+        ("POST", f"{REACH}/clip", "", {**body, "end": 0.2}, usd | ENCODERS),
+        ("POST", f"{REACH}/clips", "", many, PACKS),
+        ("POST", f"{REACH}/crowd", "", crowd, CROWD_ENCODERS),
+        ("GET", f"{REACH}/sigma", "?across=turn&along=stature&rows=3", None, GRID_ENCODERS),
+        ("POST", f"{REACH}/sigma", "", {"across": "turn", "along": "stature"}, GRID_ENCODERS),
+        ("GET", WALK, "?count=2&seconds=0.2", None, usd),
+    ]
+
+
+@pytest.mark.parametrize("which", range(9))
+def test_each_format_is_had_by_its_media_type(which, ask, controls):
+    method, path, query, body, formats = questions(controls)[which]
+    for name, found in formats.items():
+        own = ask(method, f"{path}.{name}{query}", json=body)
+        answer = ask(method, f"{path}{query}", json=body, headers={"accept": found.media_type})
+        assert (own.status_code, answer.status_code) == (200, 200), answer.text
+        assert answer.headers["content-type"] == own.headers["content-type"] == found.media_type
+        assert answer.headers["vary"] == "Accept" and "vary" not in own.headers
+        assert answer.content == own.content
+        for header in ("content-disposition", "posefield-sigma"):
+            assert answer.headers.get(header) == own.headers.get(header)
+    first = next(iter(formats.values()))
+    for headers in ({}, {"accept": "text/html, */*;q=0.1"}):
+        answer = ask(method, f"{path}{query}", json=body, headers=headers)
+        assert answer.headers["content-type"] == first.media_type
+    refused = ask(method, f"{path}{query}", json=body, headers={"accept": "image/png"})
+    assert refused.status_code == 406 and first.media_type in refused.json()["detail"]
+
+
+def test_lines_of_a_header_are_one_header(ask, controls):
+    path = f"{REACH}/clip?{urlencode({**controls, 'end': 0.1})}"
+    lines = [("accept", "application/json;q=0.2"), ("accept", "application/x-bvh;q=0.3")]
+    assert ask("GET", path, headers=lines).headers["content-type"] == "application/x-bvh"
+    assert ask("GET", path, headers=lines[:1]).headers["content-type"] == "application/json"
+
+
+def test_a_path_with_a_format_does_not_ask(ask, controls):
+    path = f"{REACH}/clip.bvh?{urlencode({**controls, 'end': 0.1})}"
+    answer = ask("GET", path, headers={"accept": "application/json"})
+    assert answer.headers["content-type"] == "application/x-bvh"
+
+
+def test_what_is_accepted_is_asked_before_anything_else(ask):
+    path = f"{REACH}/clip?turn=never"
+    assert ask("GET", path, headers={"accept": "image/png"}).status_code == 406
+    assert ask("GET", path).status_code == 400

@@ -1,0 +1,291 @@
+"""Who may ask: what each key sees, what it does not, and what is said of those refused."""
+
+import json
+import logging
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import jsonschema
+import jwt
+import pytest
+from asking import asker
+from cryptography.hazmat.primitives.asymmetric import rsa
+
+from service.motion.errors import FileError, InvalidField
+from service.synthesis.library import Library
+from service.web import contract
+from service.web.access import keys
+from service.web.app import create_app
+from service.web.settings import Settings
+
+SCOPES = {
+    "every": ["read:*"],
+    "reach": ["read:reach"],
+    "gone": ["read:elsewhere"],
+    "metrics": ["metrics"],
+}
+
+
+@pytest.fixture(scope="module")
+def issued():
+    return {name: keys.make() for name in SCOPES}
+
+
+@pytest.fixture(scope="module")
+def lines(issued):
+    return "\n".join(keys.line(name, SCOPES[name], key) for name, key in issued.items())
+
+
+@pytest.fixture(scope="module")
+def guarded(loaded, lines):
+    """The service with keys."""
+    return create_app(loaded, Settings(keys=lines))
+
+
+@pytest.fixture(scope="module")
+def signed(tmp_path_factory):
+    """Settings that trust an issuer, and a token of it for some scope."""
+    private = rsa.generate_private_key(65537, 2048)
+    entry = json.loads(jwt.algorithms.RSAAlgorithm.to_jwk(private.public_key()))
+    path = tmp_path_factory.mktemp("issuer") / "jwks.json"
+    path.write_text(json.dumps({"keys": [{**entry, "kid": "one"}]}))
+    trusted = {"jwt_keys": str(path), "jwt_issuer": "https://issuer", "jwt_audience": "posefield"}
+
+    def token(scope, seconds=60):
+        claims = {"iss": "https://issuer", "aud": "posefield", "exp": time.time() + seconds}
+        return jwt.encode({**claims, "scope": scope}, private, "RS256", {"kid": "one"})
+
+    return trusted, token
+
+
+@pytest.fixture
+def as_(guarded, issued):
+    """Ask as somebody, by the name of their key."""
+    ask = asker(guarded)
+    bearer = {name: {"Authorization": f"Bearer {key}"} for name, key in issued.items()}
+    return lambda who, method, url, **content: ask(method, url, headers=bearer[who], **content)
+
+
+def names(answer):
+    return [model["name"] for model in answer.json()["models"]]
+
+
+def test_a_key_reads_what_its_scopes_say(as_, controls):
+    assert names(as_("every", "GET", "/v1/models")) == ["reach", "walk"]
+    assert names(as_("reach", "GET", "/v1/models")) == ["reach"]
+    assert names(as_("gone", "GET", "/v1/models")) == []
+    asked = {"json": {"controls": controls, "times": [0]}}
+    for who, status in (("every", 200), ("reach", 200), ("gone", 404)):
+        assert as_(who, "POST", "/v1/models/reach/pose", **asked).status_code == status
+    assert as_("every", "GET", "/v1/models/walk").status_code == 200
+    assert as_("every", "HEAD", "/v1/models/walk").status_code == 200
+
+
+def test_what_a_key_may_not_read_does_not_exist_for_it(as_, loaded):
+    def heard(who, key):
+        problem = as_(who, "GET", f"/v1/models/{key}").json()
+        return {**problem, "instance": ""}
+
+    identity = loaded.find("walk").identity
+    for hidden in ("walk", identity, "walk@0000000000000000"):
+        told = heard("reach", hidden)
+        unknown = heard("reach", "nobody")
+        assert told["status"] == 404
+        assert json.dumps(told).replace(hidden, "X") == json.dumps(unknown).replace("nobody", "X")
+    # Negative control: who may read it is told that there is one, and which.
+    assert identity in heard("every", "walk@0000000000000000")["detail"]
+    assert "walk" not in heard("reach", "reach@0000000000000000")["detail"]
+
+
+def test_nobody_gets_in_without_a_key(guarded, issued, spec):
+    ask = asker(guarded)
+    schema = {"$ref": "#/components/schemas/Problem", "components": spec["components"]}
+    key = issued["every"]
+    wrong = [
+        {},
+        {"Authorization": ""},
+        {"Authorization": key},
+        {"Authorization": "Bearer"},
+        {"Authorization": "Bearer "},
+        {"Authorization": f"Basic {key}"},
+        {"Authorization": f"Bearer {key}x"},
+        {"Authorization": f"Bearer {key}, Bearer {key}"},
+        {"Authorization": "Bearer \xff".encode("latin-1")},
+        [("Authorization", f"Bearer {key}"), ("Authorization", f"Bearer {key}")],
+        {"X-API-Key": key},
+        {"Cookie": f"Authorization=Bearer {key}"},
+    ]
+    for headers in wrong:
+        answer = ask("GET", "/v1/models", headers=headers)
+        assert answer.status_code == 401, headers
+        assert answer.headers["www-authenticate"].startswith('Bearer realm="posefield"')
+        problem = answer.json()
+        jsonschema.validate(problem, schema, jsonschema.Draft202012Validator)
+        assert problem["type"] == "urn:posefield:problem:unauthenticated"
+        assert key not in answer.text
+    assert ask("GET", f"/v1/models?access_token={key}").status_code == 401
+    assert ask("GET", "/v1/models", headers={"authorization": f"bearer {key}"}).status_code == 200
+
+
+def test_the_challenge_names_an_error_only_where_something_was_sent(guarded):
+    ask = asker(guarded)
+    bare = ask("GET", "/v1/models").headers["www-authenticate"]
+    assert bare == 'Bearer realm="posefield"'
+    sent = ask("GET", "/v1/models", headers={"Authorization": "Bearer pf_x"})
+    assert sent.headers["www-authenticate"].endswith('error="invalid_token"')
+
+
+def test_every_operation_with_a_scope_refuses_who_is_unknown_and_who_lacks_it(guarded, as_):
+    """401 and 403 are what the contract says of each, and of no other."""
+    ask, tried = asker(guarded), 0
+    for operation in contract.load().operations:
+        path = operation.path.replace("{model}", "reach")
+        unknown = ask(operation.method, path).status_code
+        if operation.scope is None:
+            assert unknown == 200
+            continue
+        tried += 1
+        assert unknown == 401, operation.id
+        other = {"read": "metrics", "metrics": "every"}[operation.scope]
+        lacking = as_(other, operation.method, path)
+        assert lacking.status_code == 403, operation.id
+        assert lacking.json()["type"] == "urn:posefield:problem:forbidden"
+        assert 'error="insufficient_scope"' in lacking.headers["www-authenticate"]
+    assert tried > 20
+
+
+def test_who_is_not_let_in_is_told_nothing_of_the_request(guarded):
+    """The door comes before parameters, bodies and models are looked at."""
+    ask = asker(guarded)
+    for path in ("/v1/models/nobody", "/v1/models/reach?x=1", "/v1/models/reach/pose"):
+        assert ask("GET", path).status_code == 401
+    assert ask("POST", "/v1/models/reach/pose", content=b"{").status_code == 401
+
+
+def test_probes_need_no_key_and_name_no_model(guarded, loaded, ask):
+    probed = asker(guarded)
+    assert probed("GET", "/livez").status_code == 200
+    ready = probed("GET", "/readyz").json()
+    assert ready == {"status": "ready", "models": []}
+    assert len(ask("GET", "/readyz").json()["models"]) == len(loaded.models) > 0
+
+
+def test_without_keys_nothing_is_asked_for(ask):
+    assert names(ask("GET", "/v1/models")) == ["reach", "walk"]
+    headers = {"Authorization": "Bearer anything"}
+    assert names(ask("GET", "/v1/models", headers=headers)) == ["reach", "walk"]
+
+
+def test_a_token_reads_what_its_scopes_say(loaded, signed):
+    trusted, token = signed
+    ask = asker(create_app(loaded, Settings(**trusted)))
+
+    def seen(scope, **more):
+        headers = {"Authorization": f"Bearer {token(scope, **more)}"}
+        return ask("GET", "/v1/models", headers=headers)
+
+    assert names(seen("openid read:walk")) == ["walk"]
+    assert seen("openid profile").status_code == 403
+    late = seen("read:*", seconds=-100)
+    assert late.status_code == 401 and "expired" in late.json()["detail"]
+
+
+def test_keys_and_tokens_go_together(loaded, signed, lines, issued):
+    trusted, token = signed
+    ask = asker(create_app(loaded, Settings(keys=lines, **trusted)))
+    for secret, status in [(token("read:*"), 200), (issued["every"], 200), ("pf_no", 401)]:
+        headers = {"Authorization": f"Bearer {secret}"}
+        assert ask("GET", "/v1/models", headers=headers).status_code == status
+
+
+def test_each_refusal_is_one_line_without_secrets(guarded, as_, issued, caplog):
+    ask = asker(guarded)
+    with caplog.at_level(logging.INFO):
+        wrong = {"Authorization": "Bearer pf_wrong-secret", "X-Request-Id": "r1"}
+        ask("GET", "/v1/models/reach/pose?turn=secret-control", headers=wrong)
+        as_("metrics", "GET", "/v1/models")
+        as_("reach", "GET", "/v1/models/walk")
+        as_("reach", "GET", "/v1/models/anna-from-accounts")
+        as_("reach", "GET", "/v1/models/reach")
+    said = [r.getMessage() for r in caplog.records if r.name == "service.web.access.audit"]
+    assert said[0] == (
+        "refused 401 request=r1 GET /v1/models/{model}/pose who=nobody why='no such key'"
+    )
+    assert "refused 403 " in said[1] and "who=metrics why='has no scope read'" in said[1]
+    assert "refused 404 " in said[2] and "who=reach why='may not read model walk'" in said[2]
+    assert "who=reach why='may not read model unknown'" in said[3]
+    assert len(said) == 4
+    everything = "\n".join(r.getMessage() for r in caplog.records if "httpx" not in r.name)
+    for secret in ("wrong-secret", "secret-control", "anna", *issued.values()):
+        assert secret not in everything
+
+
+@pytest.mark.parametrize(
+    "host", ["0.0.0.0", "::", "192.0.2.1", "service.example", "localhost.evil"]
+)
+def test_an_open_service_on_an_open_address_does_not_start(host, lines):
+    with pytest.raises(InvalidField, match=r"POSEFIELD_HOST: .*POSEFIELD_OPEN=1"):
+        create_app(Library({}), Settings(host=host))
+    assert create_app(Library({}), Settings(host=host, open=True))
+    assert create_app(Library({}), Settings(host=host, keys=lines))
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.10", "::1", "localhost"])
+def test_on_this_machine_alone_no_keys_are_needed(host):
+    assert create_app(Library({}), Settings(host=host))
+
+
+def test_a_file_without_keys_lets_nobody_start(tmp_path):
+    empty = tmp_path / "keys"
+    empty.write_text("# none yet\n")
+    with pytest.raises(InvalidField, match="POSEFIELD_HOST"):
+        create_app(Library({}), Settings(host="0.0.0.0", keys_file=str(empty)))
+    with pytest.raises(FileError, match="no file of keys"):
+        create_app(Library({}), Settings(keys_file=str(tmp_path / "nowhere")))
+
+
+@pytest.mark.parametrize("missing", ["jwt_keys", "jwt_issuer", "jwt_audience"])
+def test_half_of_what_tokens_need_is_refused(missing, signed):
+    trusted = {**signed[0], missing: ""}
+    with pytest.raises(InvalidField, match=f"POSEFIELD_{missing.upper()}: missing"):
+        create_app(Library({}), Settings(**trusted))
+
+
+def test_an_algorithm_of_shared_secrets_is_refused(signed):
+    for algorithm in ("HS256", "none", "rs256"):
+        with pytest.raises(InvalidField, match="POSEFIELD_JWT_ALGORITHM"):
+            create_app(Library({}), Settings(**signed[0], jwt_algorithm=algorithm))
+
+
+def test_the_command_refuses_with_code_2(models):
+    posefield = Path(sys.executable).with_name("posefield")
+    command = [posefield, "serve", models, "--host", "0.0.0.0", "--port", "0"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1 and "POSEFIELD_OPEN=1" in done.stderr
+
+
+def test_the_command_makes_a_key_whose_line_lets_it_in(loaded, tmp_path):
+    posefield = Path(sys.executable).with_name("posefield")
+    command = [posefield, "key", "blender", "--model", "walk", "--metrics"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    file, key = tmp_path / "keys", done.stderr.split()[-1]
+    file.write_text(done.stdout)
+    assert key not in done.stdout and done.stdout.endswith(" read:walk metrics\n")
+    ask = asker(create_app(loaded, Settings(keys_file=str(file))))
+    answer = ask("GET", "/v1/models", headers={"Authorization": f"Bearer {key}"})
+    assert names(answer) == ["walk"]
+    told = subprocess.run([*command, "--json"], capture_output=True, text=True, check=True)
+    made = json.loads(told.stdout)
+    assert keys.read(made["line"], "KEYS").find(made["key"]).name == "blender"
+
+
+@pytest.mark.parametrize(("name", "model"), [("a b", "walk"), ("a", "Walk"), ("a", "../walk")])
+def test_a_key_of_no_name_or_model_is_not_made(name, model):
+    posefield = Path(sys.executable).with_name("posefield")
+    command = [posefield, "key", name, "--model", model]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "expected" in done.stderr and "pf_" not in done.stderr

@@ -1,0 +1,120 @@
+"""Too much to do, and answers that take too long: refused in time, by the one shape of errors."""
+
+import asyncio
+import threading
+import time
+
+import httpx
+import pytest
+from asking import asker
+from starlette.responses import Response
+
+from service.synthesis.library import Library
+from service.web import contract, deadline
+from service.web.app import build
+from service.web.operations import OPERATIONS
+from service.web.settings import Settings
+
+SOON = {"prefer": "respond-async, wait=1"}
+
+
+def app_with(**handlers):
+    settings = Settings(concurrency=2, deadline=60)
+    return build(contract.load(), {**OPERATIONS, **handlers}, Library({}), settings)
+
+
+async def ask_many(app, paths, **headers):
+    transport = httpx.ASGITransport(app)
+    async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+        return await asyncio.gather(*(client.get(path, headers=headers) for path in paths))
+
+
+async def slow(service, request):
+    await asyncio.sleep(0.3)
+    return Response("done")
+
+
+def test_more_requests_than_can_be_answered_are_turned_away():
+    answers = asyncio.run(ask_many(app_with(listModels=slow), ["/v1/models"] * 5 + ["/livez"]))
+    *asked, alive = answers
+    assert sorted(a.status_code for a in asked) == [200, 200, 503, 503, 503]
+    refused = asked[-1]
+    assert refused.json()["type"] == "urn:posefield:problem:overloaded"
+    assert refused.headers["retry-after"] == "1"
+    # Whoever watches the service learns that it lives.
+    assert alive.status_code == 200
+
+
+def test_room_is_made_when_answers_end():
+    app = app_with(listModels=slow)
+    for _ in range(3):
+        both = asyncio.run(ask_many(app, ["/v1/models"] * 2))
+        assert [a.status_code for a in both] == [200, 200]
+    assert app.site.open == 0
+
+
+async def stuck(service, request):
+    await asyncio.sleep(100)
+
+
+def test_an_answer_that_takes_too_long_is_given_up():
+    begun = time.monotonic()
+    (answer,) = asyncio.run(ask_many(app_with(listModels=stuck), ["/v1/models"], **SOON))
+    assert time.monotonic() - begun < 30, "the client's patience counts, not the service's"
+    assert answer.status_code == 503
+    assert answer.json()["type"] == "urn:posefield:problem:late"
+    assert answer.json()["detail"] == "no answer within 1 s"
+    assert answer.headers["retry-after"] == "1"
+
+
+def test_others_are_answered_meanwhile():
+    async def first_stuck(service, request):
+        await asyncio.sleep(100 if "slow" in request.headers else 0.15)
+        return Response("done")
+
+    async def both(app):
+        late = asyncio.create_task(ask_many(app, ["/v1/models"], slow="1", **SOON))
+        prompt = [await ask_many(app, ["/v1/models"]) for _ in range(3)]
+        return (await late)[0], [answer.status_code for (answer,) in prompt]
+
+    late, prompt = asyncio.run(both(app_with(listModels=first_stuck)))
+    assert (late.status_code, prompt) == (503, [200, 200, 200])
+
+
+@pytest.mark.parametrize(
+    ("prefer", "expected"),
+    [
+        (None, 30.0),
+        (b"wait=5", 5.0),
+        (b"respond-async, Wait = 7", 7.0),
+        (b"wait=99", 30.0),
+        (b"wait=abc", 30.0),
+        (b"await=3", 30.0),
+    ],
+)
+def test_a_client_may_have_less_patience_but_not_more(prefer, expected):
+    assert deadline.seconds(prefer, 30.0) == expected
+
+
+def test_a_task_cancelled_by_others_is_not_late():
+    async def cancelled():
+        watch = deadline.Watch()
+        task = asyncio.create_task(watch.within(30.0, asyncio.sleep(60)))
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(cancelled())
+
+
+def test_a_thread_that_is_given_up_goes_on_and_the_service_too():
+    ended = threading.Event()
+
+    async def in_a_thread(service, request):
+        await asyncio.to_thread(lambda: (time.sleep(1.5), ended.set()))
+
+    ask = asker(app_with(listModels=in_a_thread))
+    answer = ask("GET", "/v1/models", headers=SOON)
+    assert answer.status_code == 503
+    assert ended.wait(5)

@@ -1,0 +1,133 @@
+"""Ready is a service whose models answer as they did when they were opened, and that goes on."""
+
+import dataclasses
+import shutil
+
+import pytest
+from asking import asker
+
+from service.synthesis import library
+from service.synthesis.library import Bounds, Library
+from service.synthesis.shelf import Fixed, Shelf
+from service.web import readiness
+from service.web.app import create_app
+from service.web.readiness import Readiness
+from service.web.settings import Settings
+
+
+@pytest.fixture
+def told():
+    """Function that gives what /readyz answers of models."""
+
+    def of(models):
+        return asker(create_app(models, Settings()))("GET", "/readyz")
+
+    return of
+
+
+def refused(answer):
+    assert answer.status_code == 503
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    assert problem["type"] == "urn:posefield:problem:not-ready"
+    return problem["detail"]
+
+
+def changed(model, **values):
+    """The model with a session of which something is otherwise."""
+    return dataclasses.replace(model, session=dataclasses.replace(model.session, **values))
+
+
+def test_models_that_answer_are_ready(told, loaded):
+    answer = told(loaded)
+    assert answer.status_code == 200
+    assert answer.json()["models"] == [m.identity for m in loaded.models.values()]
+
+
+def test_a_model_that_answers_otherwise_than_it_did_is_not(told, loaded):
+    models = dict(loaded.models)
+    golden = models["walk"].session.golden
+    models["walk"] = changed(models["walk"], golden=golden[:-1] + bytes([golden[-1] ^ 1]))
+    assert refused(told(Library(models))) == (
+        f"not as when opened answers {models['walk'].identity}"
+    )
+
+
+def test_a_model_that_no_longer_answers_at_all_is_not(told, loaded):
+    model = loaded.models["reach"]
+    broken = changed(model, runtimes=(model.session.clocks[0],))
+    assert model.identity in refused(told(Library({"reach": broken})))
+
+
+def test_no_model_is_not_ready(told):
+    assert refused(told(Library({}))) == "there is no model"
+
+
+def test_a_service_that_ends_is_not(told, loaded):
+    ending = Readiness(Fixed(loaded))
+    assert told(ending).status_code == 200
+    ending.draining = True
+    assert refused(told(ending)) == "the service is ending"
+    assert asker(create_app(ending, Settings()))("GET", "/livez").status_code == 200
+
+
+def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkeypatch):
+    model = loaded.models["reach"]
+    asked, runtime = [], model.session.runtimes[0]
+
+    class Counted:
+        def run(self, *question):
+            asked.append(question)
+            return runtime.run(*question)
+
+    counted = changed(model, runtimes=(Counted(),))
+    clock = [100.0]
+    monkeypatch.setattr(readiness.time, "monotonic", lambda: clock[0])
+    fixed = Fixed(Library({"reach": counted}))
+    ready = Readiness(fixed)
+    for moment, times in ((100.0, 1), (100.9, 1), (101.1, 2)):
+        clock[0] = moment
+        ready.document()
+        assert len(asked) == times
+    fixed.library = Library({"other": counted})
+    ready.document()
+    assert len(asked) == 3
+
+
+def test_a_broken_new_file_is_told_and_the_old_one_is_ready(told, models, tmp_path, caplog):
+    shutil.copy(models / "reach.onnx", tmp_path)
+    shelf = Shelf([tmp_path], Bounds())
+    identity = shelf.library.find("reach").identity
+    (tmp_path / "reach.onnx").write_bytes(b"half a mod")
+    shelf.look()
+    shelf.look()
+    answer = told(Readiness(shelf))
+    assert answer.status_code == 200
+    assert answer.json()["models"] == [identity]
+    told_of = answer.json()["reload"]
+    assert (told_of["looks"], told_of["opened"], told_of["failed"]) == (3, 1, 1)
+    # No more than that: a message may name paths.
+    detail = "onnxruntime cannot load it"
+    assert told_of["faults"] == [{"model": "reach", "version": "", "detail": detail}]
+    assert str(tmp_path) not in answer.text and str(tmp_path) in caplog.text
+
+
+def test_versions_are_listed_and_each_answers_under_its_hash(models, tmp_path):
+    content = (models / "reach.onnx").read_bytes()
+    # The same model but for its description in the file's own words.
+    for version, more in (("1", b""), ("2", b"\x32\x01x")):
+        (tmp_path / "reach").mkdir(exist_ok=True)
+        (tmp_path / f"reach/{version}.onnx").write_bytes(content + more)
+    ask = asker(create_app(Readiness(Shelf([tmp_path], Bounds())), Settings()))
+    (listed,) = ask("GET", "/v1/models").json()["models"]
+    assert listed["identity"] == listed["versions"][0] and len(listed["versions"]) == 2
+    for key in ("reach", *listed["versions"]):
+        card = ask("GET", f"/v1/models/{key}").json()
+        assert card["identity"] == (listed["identity"] if key == "reach" else key)
+    gone = ask("GET", f"/v1/models/reach@{'0' * 16}/pose")
+    assert gone.status_code == 404
+    assert gone.json()["detail"].endswith(", ".join(listed["versions"]))
+
+
+def test_a_library_of_files_is_ready_at_once(told, models):
+    assert told(library.load([models])).status_code == 200

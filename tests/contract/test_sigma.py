@@ -1,0 +1,102 @@
+"""Grids of sigma over HTTP: one grid in every format, and refusals that tell."""
+
+import io
+import json
+
+import msgpack
+import numpy as np
+import pyarrow as pa
+import pytest
+from asking import asker
+
+from service.web.app import create_app
+from service.web.settings import Settings
+
+SIGMA = "/v1/models/reach/sigma"
+ASKED = "across=turn&along=target_height&columns=5&rows=3&margin=0.5&hip_height=0.9"
+
+
+def test_every_format_holds_the_same_grid(ask):
+    plain, packed, archive, stream = (
+        ask("GET", f"{SIGMA}.{e}?{ASKED}").content for e in ("json", "msgpack", "npz", "arrow")
+    )
+    plain, packed, archive = (
+        json.loads(plain),
+        msgpack.unpackb(packed),
+        np.load(io.BytesIO(archive)),
+    )
+    (batch,) = pa.ipc.open_stream(stream)
+    sigma = np.array(plain["sigma"], np.float32)
+    assert sigma.shape == (3, 5) and np.ptp(sigma) > 1e-3
+    raw = packed["sigma"]
+    assert np.array_equal(np.frombuffer(raw["data"], raw["dtype"]).reshape(raw["shape"]), sigma)
+    assert np.array_equal(archive["sigma"], sigma)
+    assert np.array_equal(np.asarray(batch.column("sigma")).reshape(3, 5), sigma)
+    assert archive["inside"].tolist() == plain["inside"]
+    assert batch.column("inside").to_pylist() == np.ravel(plain["inside"]).tolist()
+    assert batch.column("across_values").to_pylist() == plain["across_values"] * 3
+    assert batch.column("along_values").to_pylist()[::5] == plain["along_values"]
+    assert archive["across_values"].tolist() == plain["across_values"]
+    facts = {k.decode()[10:]: json.loads(v) for k, v in batch.schema.metadata.items()}
+    for name in ("model", "across", "along", "controls", "performer", "units"):
+        assert facts[name] == packed[name] == plain[name]
+    assert (str(archive["across"]), json.loads(str(archive["controls"]))) == (
+        "turn",
+        plain["controls"],
+    )
+
+
+REFUSED = [
+    ("along=turn", 400, "across"),
+    ("across=turn", 400, "along"),
+    ("across=turn&along=turn", 422, "along"),
+    ("across=turn&along=spin", 422, "along"),
+    (f"{ASKED}&rows=3", 400, "rows"),
+    ("across=turn&along=stature&rows=2.5", 400, "rows"),
+    ("across=turn&along=stature&rows=1", 422, "rows"),
+    ("across=turn&along=stature&rows=1024&columns=1024", 422, "rows"),
+    ("across=turn&along=stature&margin=2", 422, "margin"),
+    ("across=turn&along=stature&margin=x", 400, "margin"),
+    ("across=turn&along=stature&turn=3", 422, "turn"),
+    ("across=turn&along=stature&spin=3", 422, "spin"),
+    ("across=turn&along=stature&performer=me", 422, "performer"),
+]
+
+
+@pytest.mark.parametrize(("query", "status", "parameter"), REFUSED)
+def test_a_wrong_parameter_is_named(query, status, parameter, ask):
+    answer = ask("GET", f"{SIGMA}?{query}")
+    assert answer.status_code == status, answer.text
+    assert answer.json()["errors"][0]["parameter"] == parameter
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "pointer"),
+    [
+        ({"across": None}, 400, "/across"),
+        ({"rows": 2.5}, 400, "/rows"),
+        ({"rows": True}, 400, "/rows"),
+        ({"rows": 1e30}, 422, "/rows"),
+        ({"margin": None}, 400, "/margin"),
+        ({"controls": {"stature": "x"}}, 400, "/controls/stature"),
+        ({"controls": {"turn": 1}}, 422, "/controls/turn"),
+        ({"level": 1}, 400, "/level"),
+    ],
+)
+def test_a_wrong_body_is_pointed_at(change, status, pointer, ask):
+    answer = ask("POST", SIGMA, json={"across": "turn", "along": "stature", **change})
+    assert answer.status_code == status, answer.text
+    assert answer.json()["errors"][0]["pointer"] == pointer
+
+
+def test_a_whole_number_may_be_written_with_a_point(ask):
+    body = {"across": "turn", "along": "stature", "rows": 3.0}
+    answer = ask("POST", SIGMA, json=body)
+    assert len(answer.json()["sigma"]) == 3 and len(answer.json()["sigma"][0]) == 32
+
+
+def test_how_large_a_grid_may_be_is_a_setting(loaded):
+    small = asker(create_app(loaded, Settings(grid_limit=15)))
+    assert small("GET", f"{SIGMA}?{ASKED}").status_code == 200
+    refused = small("GET", f"{SIGMA}?across=turn&along=stature&rows=4&columns=4")
+    assert refused.status_code == 422 and "expected at most 15" in refused.json()["detail"]

@@ -1,0 +1,124 @@
+"""What an operator sees: counters for Prometheus and one line for each request."""
+
+import json
+import os
+from urllib.parse import urlencode
+
+import pytest
+from asking import asker
+from prometheus_client.parser import text_string_to_metric_families
+
+from service.web import log
+from service.web.app import create_app
+from service.web.settings import Settings
+
+
+def value(page, name, **labels):
+    """A sample of a page of metrics; zero where it was never counted."""
+    for family in text_string_to_metric_families(page):
+        for sample in family.samples:
+            if sample.name == name and labels.items() <= sample.labels.items():
+                return sample.value
+    return 0.0
+
+
+@pytest.fixture
+def page(ask):
+    return lambda: ask("GET", "/metrics").text
+
+
+def pose(ask, controls, **headers):
+    asked = urlencode({**controls, "time": 0.25})
+    return ask("GET", f"/v1/models/reach/pose?{asked}", headers=headers)
+
+
+def test_requests_are_counted_by_operation_and_status(ask, controls, page):
+    def counted(status):
+        labels = {"operation": "getPose", "status": status}
+        return value(now, "posefield_request_seconds_count", **labels)
+
+    now = page()
+    before = [counted(status) for status in ("200", "304", "422")]
+    held = value(now, "posefield_not_modified_total", operation="getPose")
+    size = value(now, "posefield_sent_bytes_total", operation="getPose")
+    first = pose(ask, controls)
+    pose(ask, controls, **{"if-none-match": first.headers["etag"]})
+    refused = pose(ask, {**controls, "spin": 1.0})
+    now = page()
+    assert [counted(s) for s in ("200", "304", "422")] == [n + 1 for n in before]
+    assert value(now, "posefield_not_modified_total", operation="getPose") == held + 1
+    sent = int(first.headers["content-length"]) + len(refused.content)
+    assert value(now, "posefield_sent_bytes_total", operation="getPose") == size + sent
+
+
+def test_paths_of_clients_are_no_labels(ask, page):
+    ask("GET", "/nowhere/a1b2c3")
+    assert "a1b2c3" not in page()
+    assert value(page(), "posefield_request_seconds_count", operation="none", status="404") > 0
+
+
+def test_the_page_itself_is_an_open_request(page):
+    assert value(page(), "posefield_open_requests") == 1.0
+
+
+@pytest.fixture
+def told(loaded):
+    """Ask a service, and get the line that it writes of the request."""
+
+    def asked(*args, **given):
+        source, target = os.pipe()
+        lines = log.Lines(target)
+        answer = asker(create_app(loaded, Settings(), lines))(*args, **given)
+        lines.flush()
+        os.close(target)
+        with os.fdopen(source, "rb") as found:
+            written = [json.loads(line) for line in found]
+        return answer, written
+
+    return asked
+
+
+def test_a_request_is_one_line(told, loaded, controls):
+    url = f"/v1/models/reach/clip.usdc?{urlencode(controls)}"
+    answer, (line,) = told("GET", url, headers={"x-request-id": "mine"})
+    assert line["request"] == "mine" and line["operation"] == "getClipUsdc"
+    assert line["model"] == loaded.find("reach").identity
+    assert (line["method"], line["status"]) == ("GET", 200)
+    assert line["bytes"] == len(answer.content)
+    assert line["tag"] == answer.headers["etag"]
+    assert 0 < line["milliseconds"] < 60_000
+    assert set(line) == {*LINE}
+
+
+LINE = (
+    "time",
+    "request",
+    "method",
+    "operation",
+    "model",
+    "who",
+    "tag",
+    "status",
+    "bytes",
+    "milliseconds",
+)
+
+
+def test_a_line_holds_nothing_that_a_client_wrote_but_its_id(told):
+    _, (line,) = told("GET", "/secret/path?token=12345", headers={"authorization": "Bearer abc"})
+    text = json.dumps(line)
+    assert line["status"] == 404 and line["operation"] == "none"
+    assert not any(word in text for word in ("secret", "token", "12345", "abc"))
+
+
+def test_a_moment_is_a_time_of_day():
+    assert log.moment(0.25) == "1970-01-01T00:00:00.250Z"
+    assert log.moment(1_763_742_000.999) == "2025-11-21T16:20:00.999Z"
+
+
+def test_lines_are_written_whole():
+    short, long = [b"x" * 100] * 100, [b"y" * 9000]
+    pieces = log._pieces([*short, *long, *short])
+    assert b"".join(pieces) == b"".join([*short, *long, *short])
+    assert [len(p) for p in pieces if b"y" not in p] == [4000, 4000, 2000] * 2
+    assert b"y" * 9000 in pieces

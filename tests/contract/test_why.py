@@ -1,0 +1,66 @@
+"""What an answer is made of, over HTTP."""
+
+from urllib.parse import urlencode
+
+import pytest
+
+WHY = "/v1/models/reach/why"
+
+
+def test_the_nearest_and_all_others_add_up_to_one(ask, controls, loaded):
+    asked = urlencode({**controls, "performer": "tall", "nearest": 4})
+    found = ask("GET", f"{WHY}?{asked}").json()
+    model = loaded.find("reach")
+    assert (found["model"], found["performer"]) == (model.identity, "tall")
+    assert found["controls"] == controls
+    distances = [clip["distance"] for clip in found["nearest"]]
+    assert distances == sorted(distances) and len(distances) == 4
+    weights = [clip["weight"] for clip in found["nearest"]]
+    assert abs(sum(weights) + found["others"]["weight"] - 1.0) < 1e-7
+    assert found["others"]["count"] == model.session.card.samples - 4
+    assert {clip["source"] for clip in found["nearest"]} <= set(model.session.card.sources)
+
+
+def test_all_are_listed_where_so_many_are_asked_for(ask, controls, loaded):
+    found = ask("POST", WHY, json={"controls": controls, "nearest": 10000}).json()
+    assert len(found["nearest"]) == loaded.find("reach").session.card.samples
+    assert found["others"] == {"count": 0, "weight": 0.0}
+
+
+def test_who_is_asked_for_is_made_more_of_his_own_clips(ask, controls):
+    weights = {}
+    for who in ("tall", None):
+        body = {"controls": controls, "performer": who, "nearest": 1000}
+        clips = ask("POST", WHY, json=body).json()["nearest"]
+        weights[who] = sum(clip["weight"] for clip in clips if clip["performer"] == "tall")
+    assert weights["tall"] > weights[None] + 0.01
+
+
+def test_what_lies_outside_is_warned_of_or_refused(ask, controls):
+    body = {"controls": {**controls, "turn": 1e3}}
+    assert "turn = 1000" in ask("POST", WHY, json=body).json()["warnings"][0]
+    refused = ask("POST", WHY, json={**body, "extrapolate": "refuse"})
+    assert refused.json()["type"] == "urn:posefield:problem:outside-samples"
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "pointer"),
+    [
+        ({"nearest": 0}, 422, "/nearest"),
+        ({"nearest": 1.5}, 400, "/nearest"),
+        ({"nearest": "all"}, 400, "/nearest"),
+        ({"performer": "nobody"}, 422, "/performer"),
+        ({"time": 0}, 400, "/time"),
+        ({"controls": {}}, 422, "/controls/stature"),
+    ],
+)
+def test_a_wrong_body_is_pointed_at(change, status, pointer, ask, controls):
+    answer = ask("POST", WHY, json={"controls": controls, **change})
+    assert answer.status_code == status, answer.text
+    assert answer.json()["errors"][0]["pointer"] == pointer
+
+
+def test_a_wrong_parameter_is_named(ask, controls):
+    answer = ask("GET", f"{WHY}?{urlencode({**controls, 'nearest': '-1'})}")
+    assert answer.status_code == 400
+    assert answer.json()["errors"][0]["parameter"] == "nearest"

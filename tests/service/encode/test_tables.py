@@ -1,0 +1,119 @@
+"""Poses and clips as tables, read back by the readers that clients have."""
+
+import dataclasses
+import io
+import json
+
+import msgpack
+import numpy as np
+import orjson
+import pyarrow as pa
+import pytest
+
+from service.encode import ENCODERS, POSE_ENCODERS, tables
+from service.encode.arrow import arrow
+from service.encode.tables import Table
+from service.motion.answer import PoseAnswer
+
+ROWS = ("times", "rotations", "root_position")
+
+
+@pytest.fixture(scope="module")
+def posed(walk) -> PoseAnswer:
+    clip = walk.clip
+    turns = clip.rotations[:7].astype(np.float32).astype(float)
+    path = clip.root_path[:7].astype(np.float32).astype(float)
+    bones = clip.translations[0].astype(np.float32).astype(float)
+    return PoseAnswer(np.linspace(0.0, 0.7, 7), turns, path, bones, walk.trust)
+
+
+def by_json(content):
+    return orjson.loads(content)
+
+
+def by_msgpack(content):
+    found = msgpack.unpackb(content)
+    for name, value in found.items():
+        if isinstance(value, dict) and value.keys() == {"dtype", "shape", "data"}:
+            found[name] = np.frombuffer(value["data"], value["dtype"]).reshape(value["shape"])
+    return found
+
+
+def by_npz(content):
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        found = dict(archive)
+    texts = {n: json.loads(str(found[n])) for n in ("trust", "units") if n in found}
+    return found | texts
+
+
+def by_arrow(content):
+    (batch,) = pa.ipc.open_stream(content)
+    batch.validate(full=True)
+    metadata = batch.schema.metadata.items()
+    found = {k.decode().removeprefix("posefield."): json.loads(text) for k, text in metadata}
+    for name in batch.schema.names:
+        column = batch.column(name)
+        tensor = isinstance(column.type, pa.FixedShapeTensorType)
+        found[name] = column.to_numpy_ndarray() if tensor else np.asarray(column)
+    return found
+
+
+READERS = {"json": by_json, "msgpack": by_msgpack, "npz": by_npz, "arrow": by_arrow}
+
+
+@pytest.mark.parametrize("extension", READERS)
+def test_every_number_of_a_pose_comes_back(extension, posed):
+    found = READERS[extension](POSE_ENCODERS[extension].encode(posed))
+    for name in (*ROWS, "bone_offsets"):
+        # What JSON spells with the fewest digits is the same number only as float32.
+        read = np.array(found[name], np.float64 if name == "times" else np.float32)
+        assert np.array_equal(read, getattr(posed, name)), name
+    assert found["trust"] == posed.trust.facts()
+    other = dataclasses.replace(posed, rotations=posed.rotations[::-1])
+    changed = READERS[extension](POSE_ENCODERS[extension].encode(other))
+    assert not np.array_equal(np.array(changed["rotations"]), np.array(found["rotations"]))
+
+
+def test_every_format_of_poses_has_a_reader_here():
+    assert POSE_ENCODERS.keys() == READERS.keys()
+    assert all(encoder.extension == key for key, encoder in POSE_ENCODERS.items())
+
+
+@pytest.mark.parametrize("extension", ["msgpack", "arrow", "npz"])
+def test_a_clip_holds_what_its_json_does(extension, walk):
+    plain = by_json(ENCODERS["json"].encode(walk))
+    found = READERS[extension](ENCODERS[extension].encode(walk))
+    assert found.keys() == plain.keys() - {"frames"}
+    for name in (*ROWS, "bone_offsets"):
+        np.testing.assert_allclose(np.array(found[name], float), plain[name], atol=2e-6)
+    assert np.array_equal(found["names"], plain["names"])
+    assert np.array_equal(found["parents"], plain["parents"])
+    assert (found["rate"], found["units"], found["trust"]) == (
+        plain["rate"],
+        plain["units"],
+        plain["trust"],
+    )
+    # Negative control: another frame is farther than rounding.
+    assert np.abs(np.array(found["rotations"])[1] - plain["rotations"][0]).max() > 1e-4
+
+
+def test_msgpack_is_little_endian_whatever_the_array(walk):
+    column = np.arange(3, dtype=">f4")
+    found = msgpack.unpackb(tables.msgpack(Table({"a": column}, {})))["a"]
+    assert (found["dtype"], found["shape"]) == ("<f4", [3])
+    assert np.frombuffer(found["data"], "<f4").tolist() == [0.0, 1.0, 2.0]
+
+
+FORMS = {"json": tables.json, "msgpack": tables.msgpack, "npz": tables.npz, "arrow": arrow}
+
+
+@pytest.mark.parametrize("extension", FORMS)
+def test_truths_are_truths(extension):
+    table = Table({"inside": np.array([True, False, True])}, {"model": "a@b"})
+    found = READERS[extension](FORMS[extension](table))
+    assert np.array(found["inside"]).tolist() == [True, False, True]
+
+
+def test_binary_is_smaller_than_json(posed):
+    sizes = {name: len(encoder.encode(posed)) for name, encoder in POSE_ENCODERS.items()}
+    assert max(sizes["msgpack"], sizes["npz"], sizes["arrow"]) < sizes["json"]

@@ -1,0 +1,93 @@
+"""Sigma on a grid is what each answer of its points says of itself."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from service.motion.errors import InvalidField
+from service.synthesis import library
+from service.synthesis.grid import BATCH, GridQuestion, grid
+
+ASKED = GridQuestion("turn", "target_height", 7, 5, {"stature": 1.7}, "tall", 0.3)
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return library.load([labelled_path]).find("labelled")
+
+
+def test_each_point_is_the_sigma_of_an_answer(model):
+    found = grid(model, ASKED)
+    fixed = {**found.controls}
+    for row, along in enumerate(found.along.values):
+        for column, across in enumerate(found.across.values):
+            controls = {**fixed, "turn": across, "target_height": along}
+            trust = model.pose(controls, [0.0], "warn", "tall").trust
+            # One row of a product is summed in another order than many.
+            assert abs(found.sigma[row, column] - trust.sigma) < 1e-6
+            assert found.inside[row, column] == (not trust.warnings)
+    # Negative control: neighbours differ by more.
+    assert np.abs(np.diff(found.sigma, axis=0)).min() > 2e-6
+    assert found.inside.any() and not found.inside.all()
+
+
+def test_the_whole_graph_says_the_same(model):
+    asked = dataclasses.replace(ASKED, columns=60, rows=40)
+    assert len(asked) > 2 * BATCH
+    found, card = grid(model, asked), model.session.card
+    points = np.zeros((len(asked), len(card.controls)))
+    for index, control in enumerate(card.controls):
+        points[:, index] = found.controls.get(control.name, 0.0)
+        if control.name == "turn":
+            points[:, index] = np.tile(found.across.values, 40)
+        if control.name == "target_height":
+            points[:, index] = np.repeat(found.along.values, 60)
+    labels = np.array([[float(name == "tall") for name in card.performers]])
+    whole = model.session.run(points, np.zeros((len(points), 1)), "sigma", labels=labels)[0]
+    np.testing.assert_allclose(found.sigma.ravel(), whole, atol=1e-6)
+    assert np.abs(found.sigma.ravel()[::-1] - whole).max() > 1e-4
+
+
+def test_axes_go_as_far_as_was_sampled_and_no_farther(model):
+    found = grid(model, dataclasses.replace(ASKED, margin=0.0))
+    for axis in (found.across, found.along):
+        ends = axis.control.minimum, axis.control.maximum
+        assert (axis.values[0], axis.values[-1]) == ends
+    assert found.inside.all()
+
+
+def test_what_is_not_said_is_the_default(model):
+    found, card = grid(model, ASKED), model.session.card
+    hips = next(c for c in card.controls if c.name == "hip_height")
+    assert found.controls == {"stature": 1.7, "hip_height": hips.default}
+
+
+def test_nobody_is_surer_of_who_was_never_seen(model):
+    """A performer who is known is nearer to his own clips."""
+    known, nobody = (grid(model, dataclasses.replace(ASKED, performer=p)) for p in ("tall", None))
+    assert known.sigma.mean() < nobody.sigma.mean()
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "words"),
+    [
+        ({"across": "spin"}, "across", "'spin', expected one of this model's controls, stature"),
+        ({"along": "spin"}, "along", "expected one of this model's controls"),
+        ({"along": "turn"}, "along", "expected another control than across"),
+        ({"columns": 1}, "columns", "1 values, expected 2 to 1024"),
+        ({"rows": 1025}, "rows", "expected 2 to 1024"),
+        ({"margin": -0.1}, "margin", "expected 0 to 1"),
+        ({"margin": float("nan")}, "margin", "expected 0 to 1"),
+        ({"controls": {"turn": 1.0}}, "controls/turn", "given, and across the grid too"),
+        ({"controls": {"spin": 1.0}}, "controls/spin", "no such control"),
+        ({"controls": {"stature": 1e9}}, "controls/stature", "expected"),
+        ({"controls": {"stature": float("inf")}}, "controls/stature", "expected a finite number"),
+        ({"performer": "nobody"}, "performer", "expected one of middle, short, tall"),
+    ],
+)
+def test_a_grid_that_cannot_be_is_refused_by_field(change, field, words, model):
+    with pytest.raises(InvalidField) as caught:
+        grid(model, dataclasses.replace(ASKED, **change))
+    assert caught.value.field == field
+    assert words in caught.value.message

@@ -1,0 +1,321 @@
+"""Models that follow their files: versions side by side, swapped whole, the old where new fail."""
+
+import os
+import shutil
+import time
+
+import pytest
+
+from service.motion.errors import ModelError, UnknownModel
+from service.synthesis import session
+from service.synthesis.library import Bounds
+from service.synthesis.shelf import SETTLING, Fixed, Shelf
+
+ROOM = Bounds()
+
+
+@pytest.fixture(scope="module")
+def content(model_path):
+    """Function that gives a model file of a number: each other bytes, and all the same answers."""
+    plain = model_path.read_bytes()
+    # The field doc_string of the model, once more.
+    return lambda number: plain + b"\x32\x02" + b"%02d" % number
+
+
+@pytest.fixture
+def put(content, tmp_path):
+    """Function that puts the model of a number in place of a file, in one step; its identity."""
+
+    def at(name, number):
+        path, aside = tmp_path / name, tmp_path / ".aside"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        aside.write_bytes(content(number))
+        aside.rename(path)
+        return session.digest(content(number))
+
+    return at
+
+
+def followed(shelf):
+    """The library once a change is settled."""
+    assert not shelf.look()
+    assert shelf.look()
+    return shelf.library
+
+
+def identities(shelf):
+    return [model.identity for model in shelf.library.models.values()]
+
+
+def test_a_file_that_was_replaced_is_newest_and_the_old_answers_under_its_hash(put, tmp_path):
+    old = put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    before = shelf.library
+    new = put("walk.onnx", 2)
+    after = followed(shelf)
+    assert after.find("walk").identity == f"walk@{new}" != f"walk@{old}"
+    assert after.find(f"walk@{old}") is before.find("walk")
+    assert [m.identity for m in after.versions("walk")] == [f"walk@{new}", f"walk@{old}"]
+
+
+def test_a_library_that_was_taken_stays_what_it_was(put, tmp_path):
+    old = put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    taken = shelf.library
+    put("walk.onnx", 2)
+    assert followed(shelf) is not taken
+    assert taken.find("walk").identity == f"walk@{old}"
+
+
+def test_nothing_new_leaves_the_very_same_library(put, tmp_path):
+    put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    taken = shelf.library
+    assert shelf.look()
+    assert shelf.library is taken
+    assert (shelf.reloads.looks, shelf.reloads.opened) == (2, 1)
+
+
+def test_a_file_is_read_only_when_two_looks_find_it_the_same(put, content, tmp_path):
+    put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    whole = content(2)
+    # A copy in progress, longer at every look.
+    for share in (0.3, 0.6, 1.0):
+        (tmp_path / "walk.onnx").write_bytes(whole[: int(share * len(whole))])
+        assert not shelf.look()
+        assert not shelf.reloads.faults
+    assert shelf.look()
+    assert shelf.library.find("walk").session.digest == session.digest(whole)
+    assert shelf.reloads.failed == 0
+
+
+@pytest.mark.parametrize("broken", [b"", b"not a model", None])
+def test_a_broken_file_leaves_the_old_one_and_is_told_until_it_changes(
+    broken, put, content, tmp_path, caplog
+):
+    old = put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    path = tmp_path / "walk.onnx"
+    path.write_bytes(content(2)[:-9000] if broken is None else broken)
+    for _ in range(4):
+        shelf.look()
+    assert identities(shelf) == [f"walk@{old}"]
+    (fault,) = shelf.reloads.faults
+    assert (fault.name, fault.version, fault.error.path) == ("walk", "", str(path))
+    assert (shelf.reloads.failed, shelf.reloads.opened) == (1, 1)
+    assert shelf.reloads.last_error == str(fault.error)
+    assert [record.getMessage() for record in caplog.records] == [str(fault.error)]
+    new = put("walk.onnx", 3)
+    followed(shelf)
+    assert identities(shelf) == [f"walk@{new}"]
+    assert shelf.reloads.faults == () and shelf.reloads.last_error == str(fault.error)
+
+
+def test_what_was_put_back_is_newest_again_and_not_opened_twice(put, tmp_path):
+    first = put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    model = shelf.library.find("walk")
+    put("walk.onnx", 2)
+    followed(shelf)
+    put("walk.onnx", 1)
+    assert followed(shelf).find("walk") is model
+    assert identities(shelf) == [f"walk@{first}"]
+    assert shelf.reloads.opened == 2
+
+
+def test_older_versions_are_bounded_and_the_oldest_goes(put, tmp_path):
+    digests = [put("walk.onnx", 0)]
+    shelf = Shelf([tmp_path], Bounds(older=2))
+    for number in (1, 2, 3):
+        digests.append(put("walk.onnx", number))
+        followed(shelf)
+    held = [m.session.digest for m in shelf.library.versions("walk")]
+    assert held == digests[:0:-1]
+    with pytest.raises(UnknownModel) as caught:
+        shelf.library.find(f"walk@{digests[0]}")
+    said = ", ".join(f"walk@{digest}" for digest in held)
+    assert caught.value.message == f"no model 'walk@{digests[0]}'; there are {said}"
+
+
+def test_older_versions_are_bounded_by_memory_the_furthest_from_newest_first(put, tmp_path):
+    for name in ("run.onnx", "walk.onnx"):
+        put(name, 0)
+    one = Shelf([tmp_path], ROOM).library.find("walk").session.memory
+    shelf = Shelf([tmp_path], Bounds(older=5, memory=3 * one))
+    for number in (1, 2):
+        runs, walks = put("run.onnx", number), put("walk.onnx", number)
+        followed(shelf)
+    assert len(shelf.library.older) == 3
+    assert [len(shelf.library.versions(name)) for name in ("run", "walk")] == [3, 2]
+    assert identities(shelf) == [f"run@{runs}", f"walk@{walks}"]
+    without = Shelf([tmp_path], Bounds(memory=0))
+    put("run.onnx", 3)
+    assert followed(without).older == ()
+
+
+def test_what_is_held_no_longer_is_freed(put, tmp_path):
+    put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], Bounds(older=0))
+    alive = shelf._intake._alive
+    assert len(alive) == 1
+    for number in (2, 3, 4):
+        put("walk.onnx", number)
+        followed(shelf)
+    assert len(alive) == 1
+
+
+def test_a_version_that_had_no_room_is_opened_when_it_is_the_newest(put, tmp_path):
+    old, new = put("walk/1.onnx", 1), put("walk/2.onnx", 2)
+    shelf = Shelf([tmp_path], Bounds(older=2, memory=0))
+    assert identities(shelf) == [f"walk@{new}"] and not shelf.library.older
+    for _ in range(3):
+        shelf.look()
+    assert shelf.reloads.opened == 2
+    (tmp_path / "walk/2.onnx").unlink()
+    followed(shelf)
+    assert identities(shelf) == [f"walk@{old}"]
+
+
+def test_a_folder_of_versions_answers_with_the_highest_and_holds_the_next(put, tmp_path):
+    digests = {n: put(f"walk/{n}.onnx", n) for n in (2, 10, 9, 1)}
+    shelf = Shelf([tmp_path], ROOM)
+    assert [m.session.digest for m in shelf.library.versions("walk")] == [
+        digests[n] for n in (10, 9, 2)
+    ]
+    digests[11] = put("walk/11.onnx", 11)
+    assert followed(shelf).find("walk").session.digest == digests[11]
+    (tmp_path / "walk/11.onnx").unlink()
+    after = followed(shelf)
+    assert after.find("walk").session.digest == digests[10]
+    # Whoever was told of it may ask for it.
+    assert after.find(f"walk@{digests[11]}")
+
+
+def test_versions_as_model_servers_lay_them_out(put, tmp_path):
+    old, new = put("walk/2/model.onnx", 2), put("walk/10/model.onnx", 10)
+    (tmp_path / "walk/config.pbtxt").write_text('name: "walk"')
+    shelf = Shelf([tmp_path], ROOM)
+    assert [m.session.digest for m in shelf.library.versions("walk")] == [new, old]
+
+
+def test_a_broken_newest_version_leaves_the_one_before(put, tmp_path):
+    good = put("walk/1.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    (tmp_path / "walk/2.onnx").write_bytes(b"broken")
+    followed(shelf)
+    assert identities(shelf) == [f"walk@{good}"]
+    (fault,) = shelf.reloads.faults
+    assert (fault.name, fault.version) == ("walk", "2")
+
+
+def test_a_new_file_is_a_new_model(put, tmp_path):
+    walk = put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    run = put("run.onnx", 2)
+    followed(shelf)
+    assert sorted(identities(shelf)) == [f"run@{run}", f"walk@{walk}"]
+
+
+def test_a_deleted_name_goes_with_all_its_versions(put, tmp_path):
+    walk, _, run = put("walk.onnx", 1), put("run.onnx", 1), put("run.onnx", 2)
+    shelf = Shelf([tmp_path], ROOM)
+    put("run.onnx", 3)
+    followed(shelf)
+    (tmp_path / "run.onnx").unlink()
+    assert not shelf.look()
+    assert shelf.library.find("run"), "it may be about to be put back"
+    shelf.look()
+    assert identities(shelf) == [f"walk@{walk}"]
+    for key in ("run", f"run@{run}"):
+        with pytest.raises(UnknownModel):
+            shelf.library.find(key)
+
+
+def test_a_source_without_any_model_left_keeps_what_it_had(put, tmp_path):
+    """A folder that is suddenly empty is a disk that was not mounted."""
+    walk = put("models/walk.onnx", 1)
+    shelf = Shelf([tmp_path / "models"], ROOM)
+    shutil.rmtree(tmp_path / "models")
+    for _ in range(3):
+        shelf.look()
+    assert identities(shelf) == [f"walk@{walk}"]
+    (fault,) = shelf.reloads.faults
+    assert fault.name == "" and "no .onnx file" in fault.error.message
+    assert shelf.reloads.failed == 1
+
+
+def test_a_file_given_by_itself_is_followed_too(put, tmp_path):
+    put("walk.onnx", 1)
+    shelf = Shelf([tmp_path / "walk.onnx"], ROOM)
+    new = put("walk.onnx", 2)
+    followed(shelf)
+    assert identities(shelf) == [f"walk@{new}"]
+
+
+def test_a_link_that_is_turned_is_a_change(put, tmp_path):
+    """As Kubernetes does it with what it mounts."""
+    put("..1/walk.onnx", 1)
+    new = put("..2/walk.onnx", 2)
+    for number in (1, 2):
+        os.utime(tmp_path / f"..{number}/walk.onnx", (0, 0))
+    (tmp_path / "..data").symlink_to("..1")
+    (tmp_path / "walk.onnx").symlink_to("..data/walk.onnx")
+    shelf = Shelf([tmp_path], ROOM)
+    (tmp_path / "..turned").symlink_to("..2")
+    (tmp_path / "..turned").rename(tmp_path / "..data")
+    followed(shelf)
+    assert identities(shelf) == [f"walk@{new}"]
+
+
+def test_two_places_of_one_name_are_refused_at_the_start(put, tmp_path):
+    put("walk.onnx", 1)
+    put("walk/1.onnx", 2)
+    with pytest.raises(ModelError, match="a second model named 'walk'"):
+        Shelf([tmp_path], ROOM)
+
+
+def test_a_second_place_of_a_name_leaves_the_first(put, tmp_path):
+    walk = put("walk/1.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    put("other/walk.onnx", 2)
+    put("walk/2.onnx", 3)
+    put("walk.onnx", 4)
+    followed(shelf)
+    assert {f.error.message for f in shelf.reloads.faults} == {"a second model named 'walk'"}
+    assert f"walk@{walk}" in {m.identity for m in shelf.library.versions("walk")}
+
+
+def test_a_broken_file_stops_the_start(put, tmp_path):
+    put("a.onnx", 1)
+    (tmp_path / "b.onnx").write_bytes(b"broken")
+    with pytest.raises(ModelError) as caught:
+        Shelf([tmp_path], ROOM)
+    assert caught.value.path == str(tmp_path / "b.onnx")
+
+
+def test_it_follows_by_itself_while_watched(put, tmp_path):
+    put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    with shelf.watched(0.05):
+        new = put("walk.onnx", 2)
+        until = time.monotonic() + 20
+        while identities(shelf) != [f"walk@{new}"] and time.monotonic() < until:
+            time.sleep(0.01)
+        assert identities(shelf) == [f"walk@{new}"]
+
+
+def test_it_does_not_follow_when_told_never_to(put, tmp_path):
+    put("walk.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM)
+    with shelf.watched(0):
+        put("walk.onnx", 2)
+        time.sleep(2 * SETTLING)
+        assert shelf.reloads.looks == 1
+
+
+def test_fixed_models_are_a_library_that_stays(put, tmp_path):
+    put("walk.onnx", 1)
+    library = Shelf([tmp_path], ROOM).library
+    assert Fixed(library).library is library
+    assert Fixed(library).reloads.looks == 0

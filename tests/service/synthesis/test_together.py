@@ -1,0 +1,63 @@
+"""Questions asked together get the bytes that each gets alone, at every level of every model."""
+
+import numpy as np
+import onnx
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from service.synthesis import session
+from service.synthesis.synthesizer import Synthesizer
+
+KINDS = ("model_path", "labelled_path", "walk_path")
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def model(request):
+    path = request.getfixturevalue(request.param)
+    return Synthesizer(path.stem, session.load(path))
+
+
+def question(model, place, level):
+    """A question at shares of the ranges and, if there are performers, as one of them."""
+    card, (shares, time, who) = model.session.card, place
+    ranges = [(c, c.minimum, c.maximum - c.minimum) for c in card.controls]
+    controls = {c.name: low + s * span for (c, low, span), s in zip(ranges, shares, strict=False)}
+    names = (None, *card.performers)
+    time *= card.durations[0]
+    return model.moments(controls, [time], "warn", names[who % len(names)], level)
+
+
+# Beyond what was sampled too.
+SHARE = st.floats(-0.2, 1.2)
+PLACE = st.tuples(st.tuples(*[SHARE] * 4), st.floats(0.0, 0.5), st.integers(0, 9))
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(places=st.lists(PLACE, min_size=2, max_size=40), data=st.data())
+def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, data):
+    level = data.draw(st.integers(0, len(model.session.card.levels) - 1))
+    asked = [question(model, place, level) for place in places]
+    for each, row in zip(asked, model.poses(asked), strict=True):
+        (own,) = model.poses([each])
+        assert [a.tobytes() for a in row] == [a.tobytes() for a in own]
+
+
+def test_every_level_is_known_to_be_exact(model):
+    assert all(model.exact(level) for level in range(len(model.session.card.levels)))
+
+
+def test_a_graph_that_sums_by_place_is_found_out(model_path, tmp_path):
+    """As graphs did before they summed rows by products with two columns."""
+    graph = onnx.load(model_path)
+    columns = [n for n in graph.graph.node if n.op_type == "MatMul" and n.input[1] == "warp_pairs"]
+    axes = onnx.numpy_helper.from_array(np.array([2]), "last_axis")
+    graph.graph.initializer.append(axes)
+    for node in columns:
+        node.op_type = "ReduceSum"
+        node.input[1] = "last_axis"
+    path = tmp_path / "reaching.onnx"
+    onnx.save(graph, path)
+    model = Synthesizer("reaching", session.load(path))
+    assert len(columns) == 1
+    assert not model.exact(0)

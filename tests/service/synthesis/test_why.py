@@ -1,0 +1,157 @@
+"""The weights that are told are those that made the answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import pytest
+
+from service.motion.answer import Reasons
+from service.motion.errors import InvalidField, OutsideSamples
+from service.motion.field import Weigher
+from service.synthesis import library, session
+from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.why import WhyQuestion, why
+
+EVERYTHING = 10_000
+
+
+@pytest.fixture(scope="module", params=["one", "labelled"])
+def case(request):
+    """A trained model and its file, with performers told apart and without."""
+    names = {"one": ("trained", "model_path"), "labelled": ("labelled", "labelled_path")}
+    made, path = (request.getfixturevalue(name) for name in names[request.param])
+    return made, library.load([path]).find(path.stem)
+
+
+def drawn(card, rng, count=20):
+    """Points inside what was sampled and around it."""
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    return rng.uniform(low - 0.1 * (high - low), high + 0.1 * (high - low), (count, len(low)))
+
+
+def asked(card, point, performer=None, nearest=EVERYTHING):
+    controls = {c.name: float(v) for c, v in zip(card.controls, point, strict=True)}
+    return WhyQuestion(controls, "warn", performer, nearest)
+
+
+def in_the_card_s_order(card, found: Reasons):
+    """Weights (N,) of an answer that lists all clips."""
+    at = {source: i for i, source in enumerate(card.sources)}
+    assert len(at) == len(card.sources) == len(found.nearest)
+    weights = np.zeros(len(at))
+    weights[[at[clip.source] for clip in found.nearest]] = [clip.weight for clip in found.nearest]
+    return weights
+
+
+def test_samples_and_weights_are_those_of_the_training(case, rng):
+    made, model = case
+    weigher, pose = model.session.weigher, made.model.bank.pose
+    assert np.array_equal(weigher.samples, pose.samples)
+    points = np.hstack([rng.uniform(-1, 1, (9, made.laid.controls)), pose.samples[:9, 4:]])
+    np.testing.assert_allclose(weigher.weights(points), pose.weights(points), atol=1e-9)
+
+
+def test_weights_add_up_to_one(case, rng):
+    card, model = case[1].session.card, case[1]
+    for performer in (None, *card.performers):
+        for point in drawn(card, rng, 5):
+            listed = in_the_card_s_order(card, why(model, asked(card, point, performer)))
+            assert abs(listed.sum() - 1.0) < 1e-9
+            # Negative control: without one of the clips they do not.
+            assert abs(np.delete(listed, np.argmax(np.abs(listed))).sum() - 1.0) > 1e-3
+            few = why(model, asked(card, point, performer, 3))
+            listed = sum(clip.weight for clip in few.nearest)
+            assert abs(listed + few.others_weight - 1.0) < 1e-9
+            assert len(few.nearest) + few.others == card.samples
+
+
+def test_the_file_s_poses_are_the_weighted_sum_of_the_captured_clips(case, rng):
+    """Through the file: its rotations are those of the captured coefficients, weighed."""
+    made, model = case
+    card, stages = model.session.card, made.model
+    captured = stages.decoder.reduced.bases[2]
+    labels = np.zeros((1, len(card.performers)))
+    for point in drawn(card, rng, 8).astype(np.float32).astype(float):
+        fields = stages.bank.numpy(stages.bank.points(point[None], labels))
+        time = np.array([[0.3, 0.7]])
+        _, place = stages.timing.numpy(fields["duration"], fields["warp"], time)
+        weights = in_the_card_s_order(card, why(model, asked(card, point)))
+        turns = model.session.run(point[None], time, "rotations")[0]
+        told, _ = stages.decoder.numpy((weights @ captured)[None], place)
+        np.testing.assert_allclose(told, turns, atol=1e-4)
+        # Negative control: the weights of another answer tell another pose.
+        other = in_the_card_s_order(card, why(model, asked(card, 0.98 * point)))
+        wrong, _ = stages.decoder.numpy((other @ captured)[None], place)
+        assert np.abs(wrong - turns).max() > 1e-3
+
+
+def test_without_a_nugget_a_clip_is_made_of_itself_alone(labelled_path):
+    weigher = session.load(labelled_path).weigher
+    exact = Weigher(replace(weigher.hyper, nugget=0.0), weigher.samples)
+    own = np.eye(len(weigher.samples))
+    np.testing.assert_allclose(exact.weights(weigher.samples), own, atol=1e-6)
+    assert np.abs(weigher.weights(weigher.samples) - own).max() > 1e-2
+
+
+def test_the_nearest_come_first_and_a_clip_is_nearest_to_itself(case):
+    model = case[1]
+    card = model.session.card
+    for index in (0, card.samples // 2, card.samples - 1):
+        performer = card.performers[card.moved_by[index]] if card.performers else None
+        found = why(model, asked(card, card.examples[index], performer)).nearest
+        distances = [clip.distance for clip in found]
+        assert distances == sorted(distances) and distances[0] < 1e-12 < distances[1]
+        assert found[0].source == card.sources[index]
+        assert found[0].performer == performer
+        assert tuple(found[0].controls.values()) == card.examples[index]
+
+
+def test_distance_is_that_of_scales_and_performers(labelled_path):
+    model = library.load([labelled_path]).find("labelled")
+    card = model.session.card
+    hyper = card.kriging
+    found = why(model, asked(card, card.examples[0], "tall"))
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    for clip in found.nearest:
+        gap = np.array([*clip.controls.values()]) - card.examples[0]
+        expected = np.sum(np.square(2.0 * gap / (high - low) * hyper.scales))
+        expected += hyper.label**2 * (clip.performer != "tall")
+        assert abs(clip.distance - np.sqrt(expected)) < 1e-9
+    assert {clip.performer for clip in found.nearest} == set(card.performers)
+
+
+def test_what_cannot_be_answered_is_refused(case):
+    model = case[1]
+    card = model.session.card
+    question = asked(card, card.examples[0])
+    outside = {**question.controls, "turn": 1e3}
+    assert len(why(model, replace(question, controls=outside)).warnings) == 1
+    with pytest.raises(OutsideSamples, match="turn = 1000"):
+        why(model, replace(question, controls=outside, extrapolate="refuse"))
+    for change, field in (
+        ({"nearest": 0}, "nearest"),
+        ({"performer": "nobody"}, "performer"),
+        ({"controls": {}}, f"controls/{card.controls[0].name}"),
+        ({"controls": {**question.controls, "spin": 1.0}}, "controls/spin"),
+    ):
+        with pytest.raises(InvalidField) as caught:
+            why(model, replace(question, **change))
+        assert caught.value.field == field
+
+
+def test_a_model_older_than_sources_still_loads_and_says_that_it_cannot_say(model_path):
+    graph = onnx.load(model_path)
+    kept = [p for p in graph.metadata_props if p.key not in ("posefield.sources", KRIGING)]
+    assert len(kept) == len(graph.metadata_props) - 2
+    del graph.metadata_props[:]
+    graph.metadata_props.extend(kept)
+    old = Synthesizer("old", session.open_bytes(graph.SerializeToString(), "old"))
+    point = [c.default for c in old.session.card.controls]
+    assert old.pose(asked(old.session.card, point).controls, [0.0], "warn").trust.sigma > 0.0
+    with pytest.raises(InvalidField, match="train it again") as caught:
+        why(old, asked(old.session.card, point))
+    assert caught.value.field == "model"
+
+
+KRIGING = "posefield.kriging"

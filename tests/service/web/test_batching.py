@@ -1,0 +1,131 @@
+"""Questions that arrive together are answered by one call, and as each would be alone."""
+
+import asyncio
+
+import numpy as np
+import pytest
+
+from service.motion.errors import InvalidField
+from service.synthesis import session
+from service.synthesis.synthesizer import Synthesizer
+from service.web.batching import MOST, Batcher
+
+HASTE = [3.0 + 0.125 * number for number in range(2 * MOST + 7)]
+
+
+@pytest.fixture(scope="module")
+def model(walk_path):
+    return Synthesizer("walk", session.load(walk_path))
+
+
+@pytest.fixture
+def calls(model, monkeypatch):
+    """How many questions each call of the graph answered."""
+    made, poses = [], Synthesizer.poses
+
+    def counted(self, asked):
+        made.append(len(asked))
+        return poses(self, asked)
+
+    monkeypatch.setattr(Synthesizer, "poses", counted)
+    return made
+
+
+def question(model, haste, time=0.1, level=0):
+    controls = {c.name: c.default for c in model.session.card.controls} | {"haste": haste}
+    return model.moments(controls, [time], "warn", None, level)
+
+
+def together(model, asked, rounds=1):
+    """Rows that a batcher gives to questions asked in one turn, after a turn that promises more."""
+
+    async def ask():
+        batcher = Batcher()
+        await asyncio.gather(*(batcher.row(model, asked[0]) for _ in range(2)))
+        for _ in range(rounds):
+            await asyncio.sleep(0)
+            rows = await asyncio.gather(*(batcher.row(model, each) for each in asked))
+        return rows
+
+    return asyncio.run(ask())
+
+
+def test_one_call_answers_all_of_a_turn(model, calls):
+    asked = [question(model, haste) for haste in HASTE]
+    model.exact(0)
+    calls.clear()
+    together(model, asked)
+    assert calls == [1, 1, MOST, MOST, 7]
+
+
+def test_each_gets_the_bytes_that_it_gets_alone(model):
+    asked = [question(model, haste) for haste in HASTE]
+    for each, row in zip(asked, together(model, asked), strict=True):
+        (own,) = model.poses([each])
+        assert all(np.array_equal(a, b) for a, b in zip(row, own, strict=True))
+
+
+def test_levels_are_not_mixed(model, calls):
+    levels = range(len(model.session.card.levels))
+    asked = [question(model, 4.0, level=level) for level in levels for _ in range(3)]
+    [model.exact(level) for level in levels]
+    calls.clear()
+    together(model, asked)
+    assert calls[2:] == [3] * len(levels)
+
+
+def test_whoever_asks_alone_is_answered_at_once(model):
+    async def alone():
+        batcher = Batcher()
+        for _ in range(3):
+            asking = batcher.row(model, question(model, 4.0))
+            with pytest.raises(StopIteration):
+                asking.send(None)
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+
+    asyncio.run(alone())
+
+
+def test_one_that_has_no_answer_harms_no_other(model):
+    asked = [question(model, 4.0, time) for time in (0.1, 99.0, 0.2)]
+    first, wrong, last = together(model, asked)
+    with pytest.raises(InvalidField, match="99 s, expected 0 to"):
+        model.posed(asked[1], wrong)
+    for each, row in ((asked[0], first), (asked[2], last)):
+        np.testing.assert_array_equal(model.posed(each, row).rotations, row[0])
+
+
+def test_a_fault_of_the_graph_reaches_everybody(model, monkeypatch):
+    def broken(self, asked):
+        if len(asked) > 1:
+            raise RuntimeError("broken")
+        return original(self, asked)
+
+    original = Synthesizer.poses
+    model.exact(0)
+    monkeypatch.setattr(Synthesizer, "poses", broken)
+    with pytest.raises(RuntimeError, match="broken"):
+        together(model, [question(model, 4.0)] * 3)
+
+
+def test_a_client_that_went_away_is_passed_over(model):
+    async def ask():
+        batcher = Batcher()
+        asked = question(model, 4.0)
+        await asyncio.gather(*(batcher.row(model, asked) for _ in range(2)))
+        await asyncio.sleep(0)
+        tasks = [asyncio.create_task(batcher.row(model, asked)) for _ in range(3)]
+        await asyncio.sleep(0)
+        tasks[1].cancel()
+        return await asyncio.gather(*tasks, return_exceptions=True)
+
+    first, gone, last = asyncio.run(ask())
+    assert isinstance(gone, asyncio.CancelledError)
+    assert all(np.array_equal(a, b) for a, b in zip(first, last, strict=True))
+
+
+def test_a_model_that_sums_by_place_is_asked_one_by_one(model, calls, monkeypatch):
+    monkeypatch.setattr(Synthesizer, "exact", lambda self, level: False)
+    together(model, [question(model, 4.0)] * 5)
+    assert set(calls) == {1}
