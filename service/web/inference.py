@@ -60,9 +60,7 @@ async def get_model(service: Service, request: Request) -> Response:
     return answers.document(
         {
             "name": model.name,
-            "versions": [
-                each.session.digest for each in request.scope["library"].versions(model.name)
-            ],
+            "versions": [each.session.digest for each in versions],
             "platform": "onnxruntime_onnx",
             "inputs": inputs,
             "outputs": [_port(name, "FP32", s) for name, s in _outputs(len(card.skeleton)).items()],
