@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import socket
 import sys
 import tempfile
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 import debian
 import httpx
 import image
+import running
 import trained
 from image import Image
 
@@ -88,7 +88,7 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
     models, temporary = _places(folder)
     model, content = trained.family()
     (models / "reaching.onnx").write_bytes(content)
-    port, key = str(_free_port()), keys.make()
+    port, key = str(running.ports(1)[0]), keys.make()
     told = {"POSEFIELD_PORT": port}
     health = built.config["Healthcheck"]["Test"][1:]
     command = [*built.config["Entrypoint"], *built.config["Cmd"]]
@@ -160,11 +160,6 @@ def _places(folder: Path) -> tuple[Path, Path]:
 def _first(unshare: int) -> int:
     """The container's first process, which unshare started, as it is numbered here."""
     return int(Path(f"/proc/{unshare}/task/{unshare}/children").read_text())
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as held:
-        return int(held.getsockname()[1])
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ process of their own: OpenVINO, and onnxruntime-web on Node.
 import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import sysconfig
@@ -18,6 +17,7 @@ from pathlib import Path
 
 import environment
 import numpy as np
+import running
 import trained
 
 from service.synthesis.session import OUTPUTS, Session
@@ -113,15 +113,15 @@ def _asked(python: Path, folder: Path, address: str, *options: str) -> Tensors:
 
 @contextmanager
 def _ours(folder: Path) -> Iterator[str]:
-    port = _ports(1)[0]
+    port = running.ports(1)[0]
     command = [Path(sys.executable).with_name("posefield"), "serve", folder]
-    with _started(command, folder, POSEFIELD_PORT=str(port)):
+    with running.started(command, folder / "said.txt", POSEFIELD_PORT=str(port)):
         yield f"127.0.0.1:{port}"
 
 
 @contextmanager
 def _mlserver(python: Path, folder: Path) -> Iterator[str]:
-    ports, own = _ports(3), folder / "mlserver"
+    ports, own = running.ports(3), folder / "mlserver"
     own.mkdir()
     names = ("http_port", "grpc_port", "metrics_port")
     told = dict(zip(names, ports, strict=True)) | {"host": "127.0.0.1", "parallel_workers": 0}
@@ -134,7 +134,7 @@ def _mlserver(python: Path, folder: Path) -> Iterator[str]:
     }
     (own / "model-settings.json").write_text(json.dumps(settings))
     command = [python.with_name("mlserver"), "start", own]
-    with _started(command, own, PYTHONPATH=str(HERE)):
+    with running.started(command, own / "said.txt", PYTHONPATH=str(HERE)):
         yield f"127.0.0.1:{ports[0]}"
 
 
@@ -153,7 +153,7 @@ def _triton(folder: Path) -> Iterator[str]:
         'name: "reaching"\nbackend: "python"\ninstance_group [{kind: KIND_CPU}]\n'
     )
     port, libraries = (
-        _ports(1)[0],
+        running.ports(1)[0],
         (sysconfig.get_config_var("LIBDIR"), packages / "nvidia_pytriton.libs"),
     )
     command = [
@@ -166,24 +166,10 @@ def _triton(folder: Path) -> Iterator[str]:
         "--allow-metrics=false",
     ]
     path = os.pathsep.join(map(str, libraries))
-    with _started(command, folder, LD_LIBRARY_PATH=path, PACKAGES=str(packages)):
+    with running.started(
+        command, folder / "said.txt", LD_LIBRARY_PATH=path, PACKAGES=str(packages)
+    ):
         yield f"127.0.0.1:{port}"
-
-
-@contextmanager
-def _started(command: list[str | Path], folder: Path, **told: str) -> Iterator[None]:
-    """A server as long as it is asked; what it says is shown where that fails."""
-    said = folder / "said.txt"
-    with said.open("wb") as out:
-        child = subprocess.Popen(command, env=os.environ | told, stdout=out, stderr=out)
-    try:
-        yield
-    except BaseException:
-        print(said.read_text()[-3000:])
-        raise
-    finally:
-        child.terminate()
-        child.wait(30)
 
 
 def _openvino(python: Path, folder: Path) -> Tensors:
@@ -211,14 +197,6 @@ def _call(*command: str | Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f"{command[1]} failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
-
-
-def _ports(count: int) -> list[int]:
-    held = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    found = [each.getsockname()[1] for each in held]
-    for each in held:
-        each.close()
-    return found
 
 
 if __name__ == "__main__":
