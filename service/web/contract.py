@@ -18,7 +18,7 @@ class Operation:
 
     query: names of its query parameters. open_query: whether the query may hold other names too,
     because an exploded object (the controls of a model) stands among the parameters. media_types:
-    of what it answers with when all is well. responses: statuses. tags: under which it is listed.
+    of what it answers with when all is well. responses: statuses.
     scope: what a key must allow, where the service asks for keys; None where it never does.
     """
 
@@ -29,7 +29,6 @@ class Operation:
     open_query: bool
     media_types: tuple[str, ...] = ()
     responses: frozenset[str] = frozenset()
-    tags: frozenset[str] = frozenset()
     scope: str | None = None
 
     @cached_property
@@ -40,7 +39,7 @@ class Operation:
     @cached_property
     def sheds(self) -> bool:
         """Whether it is refused when there is too much to do; what watches the service is not."""
-        return "service" not in self.tags
+        return self.scope == "read"
 
     @cached_property
     def pure(self) -> bool:
@@ -82,7 +81,6 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 open_query=bool(exploded),
                 media_types=_media_types(document, item[method]["responses"]),
                 responses=frozenset(item[method]["responses"]),
-                tags=frozenset(item[method].get("tags", ())),
                 scope=_scope(item[method].get("security", document.get("security", []))),
             )
 

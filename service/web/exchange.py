@@ -4,7 +4,7 @@ import logging
 import os
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
@@ -111,19 +111,16 @@ class Exchange:
     def _prepare(self, route: Route) -> None:
         """Refuse what needs no model, find the model, and see whether the client has the answer."""
         operation, site, scope = route.operation, self._site, self._scope
-        if "version" in scope["path_params"]:
-            # Elsewhere a version is a part of the model's name.
-            scope["path_params"]["model"] += "@" + scope["path_params"]["version"]
         if site.open > site.service.settings.concurrency and operation.sheds:
             detail = f"{site.open - 1} requests are being answered"
             raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
+        self._let_in(operation)
         if scope["query_string"] and not operation.open_query:
             _check_parameters(self._request, operation)
-        self._let_in(operation)
         if route.compresses and b"accept-encoding" in self._headers:
             self._coding = compression.preferred(self._headers[b"accept-encoding"])
         if "model" in scope["path_params"]:
-            scope["model"] = scope["library"].find(scope["path_params"]["model"])
+            scope["model"] = scope["library"].find(_key(scope["path_params"]))
             if operation.pure:
                 self._check_held(route)
 
@@ -163,7 +160,7 @@ class Exchange:
         if held and self._route and self._route.vary:
             headers.append((b"vary", self._route.vary))
         if held and self._tag:
-            lifetime = self._site.service.lifetime(self._scope["path_params"]["model"])
+            lifetime = self._site.service.lifetime(_key(self._scope["path_params"]))
             headers += [(b"etag", self._tag.encode()), (b"cache-control", lifetime)]
         elif "cache-control" not in response.headers:
             headers.append((b"cache-control", caching.ALWAYS_NEW))
@@ -204,6 +201,12 @@ def _request_id(headers: dict[bytes, bytes]) -> str:
     given = headers.get(b"x-request-id", b"")
     known = REQUEST_ID.fullmatch(given)
     return given.decode() if known else f"{_PROCESS}{next(_NUMBERS):08x}"
+
+
+def _key(parameters: Mapping[str, str]) -> str:
+    """Name of the model that a path leads to, or its name@contenthash."""
+    model = parameters["model"]
+    return f"{model}@{parameters['version']}" if "version" in parameters else model
 
 
 def _check_parameters(request: Request, operation: Operation) -> None:

@@ -17,7 +17,6 @@ from service.web import answers, body, inference_query, problems
 from service.web import tensors as wire
 from service.web.problems import RequestFault
 from service.web.service import CROWDS, Handler, Service
-from service.web.service import model as find
 from service.web.tensors import Received
 
 HEADER = "Inference-Header-Content-Length"
@@ -49,7 +48,7 @@ async def get_ready(service: Service, request: Request) -> Response:
 
 async def get_model(service: Service, request: Request) -> Response:
     """A model's inputs and outputs; its versions are the hashes of its files."""
-    model = find(service, request)
+    model = _model(request)
     card, versions = model.session.card, request.scope["library"].versions(model.name)
     inputs = [
         _port("controls", "FP32", [-1, len(card.controls)]),
@@ -70,12 +69,12 @@ async def get_model(service: Service, request: Request) -> Response:
 
 async def get_model_ready(service: Service, request: Request) -> Response:
     """That a model answers."""
-    return answers.document({"name": find(service, request).name, "ready": True})
+    return answers.document({"name": _model(request).name, "ready": True})
 
 
 async def infer(service: Service, request: Request) -> Response:
     """Outputs of a model's graph for tensors."""
-    model = find(service, request)
+    model = _model(request)
     length = _length(request)
     content = await _content(request, service.settings.inference_body_limit)
     make = partial(_inferred, model, content, length, service.settings.inference_poses)
@@ -100,6 +99,12 @@ OPERATIONS: dict[str, Handler] = {
     "inferVersion": infer,
 }
 """Handler of each operationId."""
+
+
+def _model(request: Request) -> Synthesizer:
+    """The model and version that a path names, found before the operation began."""
+    found: Synthesizer = request.scope["model"]
+    return found
 
 
 def _port(name: str, datatype: str, shape: list[int]) -> dict[str, Any]:

@@ -17,7 +17,6 @@ class Settings:
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
-    inference_body_limit: bytes of a body of tensors, and inference_poses: rows times times of one.
     grid_limit: points of a grid of sigma. grace: seconds that open requests get to finish after
     SIGTERM, and drain: seconds before that in which the service still listens, but says that it is
     not ready. workers: processes that share the port; 0 for as many as there are processors.
@@ -26,7 +25,8 @@ class Settings:
     concurrency: requests that a process answers at a time, and deadline: seconds until an answer
     has to begin. alias_seconds: how long caches may use an answer under a model's plain name
     without asking whether it is the newest's. log: whether each request is told on standard error,
-    in one line.
+    in one line. inference_body_limit: bytes of a body of tensors, and inference_poses: rows times
+    times of one.
 
     url_limit, head_limit: bytes of a URL, and of all header lines. head_time, body_time: seconds in
     which a request's head and body have to arrive; idle_time: seconds that an unused connection
@@ -51,10 +51,10 @@ class Settings:
     clips_body_limit: int = 8 * 1024 * 1024
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
-    inference_body_limit: int = 32 * 1024 * 1024
-    inference_poses: int = 100_000
     # 50 ms of work.
     grid_limit: int = 65_536
+    inference_body_limit: int = 32 * 1024 * 1024
+    inference_poses: int = 100_000
     grace: int = 10
     # A pose takes a tenth of a millisecond, a thousand in flight a tenth of a second.
     concurrency: int = 1000
@@ -96,9 +96,9 @@ class Settings:
         _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
         _within("inference_body_limit", self.inference_body_limit, 1, 1024 * 1024 * 1024)
         _within("inference_poses", self.inference_poses, 1, 10_000_000)
-        _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
         _within("grace", self.grace, 0, 600)
         _within("concurrency", self.concurrency, 1, 1_000_000)
         _within("deadline", self.deadline, 1, 3600)

@@ -122,7 +122,6 @@ def narrowed(spec, card, digest):
         for path, item in narrow["paths"].items()
         if not ("crowd" in path and "get" in item) and not path.endswith("/infer")
     }
-    parts["parameters"]["version"]["schema"] = {"enum": [digest]}
     # That a grid's axes differ, and are not among what is fixed, cannot be said either.
     axes = {"across": {"enum": [card.controls[0].name]}, "along": {"enum": [card.controls[1].name]}}
     others = {control.name: numbers[control.name] for control in card.controls[2:]}
@@ -132,6 +131,7 @@ def narrowed(spec, card, digest):
         parts["parameters"][name]["schema"] = only
     parts["parameters"]["fixedControls"]["schema"] = fixed
     parts["schemas"]["GridSteps"]["maximum"] = 100
+    parts["parameters"]["version"]["schema"] = {"enum": [digest]}
     parts["parameters"]["level"]["schema"] = parts["schemas"]["LevelNumber"] = level
     performers = list(card.performers)
     parts["parameters"]["performer"]["schema"] = {"enum": performers}

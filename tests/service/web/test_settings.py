@@ -38,10 +38,10 @@ def test_each_setting_has_a_variable():
     }
     crowds = {"crowd_body_limit": 30, "crowd_limit": 2}
     clips = {"clips_body_limit": 40, "clips_limit": 3, "clips_poses": 50}
-    tensors = {"inference_body_limit": 60, "inference_poses": 7}
     ends = {"grace": 0, "drain": 5, "workers": 4}
     follows = {"reload": 0, "versions": 7, "versions_memory": 1000}
     access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
+    tensors = {"inference_body_limit": 60, "inference_poses": 7}
     others = {**crowds, **clips, **tensors, **ends, **follows, **access}
     expected = Settings("::1", 9000, body_limit=10, **others)
     assert settings.read(environ=given) == expected
