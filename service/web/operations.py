@@ -145,6 +145,9 @@ async def ready(service: Service, request: Request) -> Response:
 
 async def get_metrics(service: Service, request: Request) -> Response:
     """What is counted, for Prometheus."""
+    reloads = service.readiness.models.reloads
+    counts = {"looks": reloads.looks, "opened": reloads.opened, "failed": reloads.failed}
+    metrics.models(service.library.identities, {**counts, "faults": len(reloads.faults)})
     return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
 
 
