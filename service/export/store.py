@@ -5,16 +5,15 @@ store's own tools take: AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID and the like in the 
 """
 
 import asyncio
-import os
 from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import obstore
 from obstore.exceptions import AlreadyExistsError, BaseError
-from obstore.store import from_url
 
 from service.motion.errors import FileError
+from service.synthesis import objects
 
 PIECE = 8 << 20
 """Bytes that a large file is sent in; S3 takes 10,000 of them at most, and none below 5 MiB."""
@@ -29,10 +28,8 @@ class Store:
 
     def __init__(self, url: str) -> None:
         self.url = url.rstrip("/")
-        # Servers of one's own often speak plain HTTP.
-        plain = os.environ.get("AWS_ENDPOINT_URL", "").startswith("http://")
         with _said(self.url):
-            self._store: Any = from_url(self.url, client_options={"allow_http": plain})
+            self._store: Any = objects.connect(self.url)
 
     def prepare(self) -> None:
         """Nothing: a store has no folders."""

@@ -42,12 +42,13 @@ class Door:
         Raises InvalidField for a control, performer or level that cannot be used, OutsideSamples
         where `extrapolate` is "refuse" and a control lies outside its sampled range.
         """
-        warnings: tuple[str, ...] = ()
-        if not self._plain(controls):
-            warnings = self._checked(controls, extrapolate)
+        if not controls.keys() <= self._names:
+            limits.check_names(self._card, controls)
         own, coarsest = labels(self._card.performers, performer), len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
+        plain = self._plain(controls)
+        warnings = () if plain else self._checked(controls, extrapolate)
         # However they are put: the same question has the same bytes.
         given = {name: float(controls[name]) for name, _, _ in self._ranges}
         point = np.array([list(given.values())])
@@ -62,7 +63,6 @@ class Door:
 
     def _checked(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:
         """What to warn of."""
-        limits.check_names(self._card, controls)
         values = np.array([required(control, controls) for control in self._card.controls])
         return outside(self._card.controls, values, extrapolate)
 

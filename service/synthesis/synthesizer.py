@@ -27,10 +27,12 @@ ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 @dataclass(frozen=True)
 class Moments:
-    """A question for poses that has passed the door, and its times (S,), s."""
+    """A question for poses that has passed the door, and its times (S,), s, as they were given and
+    as the graph is asked."""
 
     question: Question
     when: Floats
+    asked: Floats
 
     @property
     def level(self) -> int:
@@ -132,8 +134,13 @@ class Synthesizer:
         question = self._door.question(controls, extrapolate, performer, level)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
-        when = np.array([limits.number(f"times/{i}", value) for i, value in enumerate(times)])
-        return Moments(question, when)
+        when = [limits.number(f"times/{i}", value) for i, value in enumerate(times)]
+        # Whether a time is within the clip shows when the graph has said how long that is; what is
+        # within none of them might be more than a float32 holds.
+        longest = self._durations[1]
+        fits = 0.0 <= min(when) and max(when) <= longest
+        asked = np.array(when)
+        return Moments(question, asked, asked if fits else np.clip(asked, 0.0, longest))
 
     def poses(self, asked: Sequence[Moments]) -> list[Row]:
         """What the graph says to questions of as many times and of one level, in one call.
@@ -143,12 +150,12 @@ class Synthesizer:
         first = asked[0].question
         if len(asked) == 1 and len(asked[0].when) == 1:
             # A product with one row is summed in another order: nobody is asked for alone.
-            arrays = (first.point, first.labels, asked[0].when[None])
+            arrays = (first.point, first.labels, asked[0].asked[None])
             points, labels, when = (array.repeat(2, axis=0) for array in arrays)
         else:
             points = np.concatenate([each.question.point for each in asked])
             labels = np.concatenate([each.question.labels for each in asked])
-            when = np.array([each.when for each in asked])
+            when = np.array([each.asked for each in asked])
         answers = self.session.run(points, when, *ANSWERED, labels=labels, level=first.level)
         return [tuple(answer[row] for answer in answers) for row in range(len(asked))]
 

@@ -72,14 +72,15 @@ class Server(uvicorn.Server):
         self.handle_exit()
 
     def handle_exit(self, sig: int = signal.SIGTERM, frame: FrameType | None = None) -> None:
-        """Begin to end; from here on nothing is ready."""
+        """Begin to end: from here on nothing is ready, and every answer closes its connection."""
         self._hurried = self.should_exit
         self.should_exit = self._readiness.draining = True
+        # uvicorn puts these on each answer and heeds them; it makes the first of the second anew.
+        self.server_state.default_headers = [*self.server_state.default_headers, CLOSE]
+        self.config.encoded_headers = [CLOSE]
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell clients to go, stop listening, answer who was let in."""
-        # uvicorn puts these on every answer and closes its connection then.
-        self.config.encoded_headers.append(CLOSE)
         for connection in self._connections():
             if connection.cycle is not None:
                 connection.cycle.keep_alive = False

@@ -17,6 +17,7 @@ from service.web.problems import NOT_ACCEPTABLE, RequestFault
 from service.web.service import Handler, Service
 
 VARY = "Accept"
+LONG = 1000
 Offers = tuple[tuple[str, str], ...]
 """Names of formats and their media types, the usual one first."""
 
@@ -79,7 +80,9 @@ def format_of(request: Request, offers: Offers) -> str:
     if not lines:
         return offers[0][0]
     accept = ", ".join(lines)
-    found = preferred(accept, offers)
+    # A long one is not worth remembering: 256 of them would be megabytes.
+    find = preferred if len(accept) <= LONG else preferred.__wrapped__
+    found = find(accept, offers)
     if found is None:
         there = ", ".join(media_type for _, media_type in offers)
         detail = f"Accept {accept[:200]!r}, expected one of {there}"

@@ -161,6 +161,7 @@ _FIXED: dict[str, Handler] = {
     **pose_operations.OPERATIONS,
     **sigma_operations.OPERATIONS,
     **why_operations.OPERATIONS,
+    **inference.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
@@ -170,7 +171,6 @@ _FIXED: dict[str, Handler] = {
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,
-    **inference.OPERATIONS,
 }
 
 

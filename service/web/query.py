@@ -190,7 +190,12 @@ def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Wo
 
 def numbers_of(texts: dict[str, str]) -> dict[str, float]:
     """Finite numbers of texts by name; RequestFault where one is none."""
-    return {name: number(name, text) for name, text in texts.items()}
+    return sorted_by_name({name: number(name, text) for name, text in texts.items()})
+
+
+def sorted_by_name(values: dict[str, float]) -> dict[str, float]:
+    """The same in one order, so that the same question is written the same."""
+    return dict(sorted(values.items()))
 
 
 def number(name: str, text: str) -> float:
@@ -237,4 +242,4 @@ def controls_of(raw: dict[str, msgspec.Raw], *within: str) -> dict[str, float]:
             raise decoding.bad_body(
                 f"{fault} - at `{where}`, expected a finite number", where
             ) from None
-    return values
+    return sorted_by_name(values)

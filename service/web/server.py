@@ -35,12 +35,15 @@ def serve(places: Sequence[str | Path], settings: Settings, hooks: Hooks | None 
         sys.stdout.flush()
 
     work = Work(tuple(str(place) for place in places), settings, sockets)
-    if (count := settings.workers or workers.processors()) > 1:
-        with metrics.shared() as folder:
-            own = Hooks(lambda number: {metrics.FOLDER: folder}, metrics.gone)
-            workers.keep(count, work, listens, hooks or own)
-    else:
-        answer(work, listens)
+    try:
+        if (count := settings.workers or workers.processors()) > 1:
+            with metrics.shared() as folder:
+                own = Hooks(lambda number: {metrics.FOLDER: folder}, metrics.gone)
+                workers.keep(count, work, listens, hooks or own)
+        else:
+            answer(work, listens)
+    finally:
+        listening.close(sockets)
 
 
 def answer(

@@ -87,10 +87,10 @@ def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkey
     ready = Readiness(fixed)
     for moment, times in ((100.0, 1), (100.9, 1), (101.1, 2)):
         clock[0] = moment
-        ready.document()
+        ready.document(lambda name: True)
         assert len(asked) == times
     fixed.library = Library({"other": counted})
-    ready.document()
+    ready.document(lambda name: True)
     assert len(asked) == 3
 
 

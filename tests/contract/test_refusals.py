@@ -302,3 +302,12 @@ def test_too_many_times_are_refused(refuse, controls):
     body = {"controls": controls, "times": [0] * 10_001}
     problem = refuse(422, "invalid-field", "POST", POSE, json=body)
     assert problem["errors"][0]["pointer"] == "/times"
+
+
+@pytest.mark.parametrize("time", [1e300, -1e300, 3.5e38])
+def test_a_time_that_no_float32_holds_is_refused_like_any_other(time, refuse, controls):
+    problem = refuse(
+        422, "invalid-field", "POST", POSE, json={"controls": controls, "times": [time]}
+    )
+    assert problem["errors"][0]["pointer"] == "/times/0"
+    assert "expected 0 to" in problem["detail"]

@@ -1,42 +1,14 @@
 """The real process on a real socket: it answers, ends when told to, and refuses bad models."""
 
-import contextlib
 import json
-import os
 import signal
 import socket
-import subprocess
-import sys
 import threading
-from pathlib import Path
 
 import httpx
 import pytest
 from pxr import Usd
-
-ROOT = Path(__file__).parents[2]
-POSEFIELD = Path(sys.executable).with_name("posefield")
-
-
-@contextlib.contextmanager
-def process(*paths, **environ):
-    """The service as a process of its own; killed if the test leaves it running."""
-    command = [POSEFIELD, "serve", *map(str, paths)]
-    given = {**os.environ, "POSEFIELD_PORT": "0", **environ}
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, cwd=ROOT, env=given, stdout=pipe, stderr=pipe) as child:
-        watch = threading.Timer(60, child.kill)
-        watch.start()
-        try:
-            yield child
-        finally:
-            watch.cancel()
-            child.kill()
-
-
-def address(child) -> str:
-    """Where the service says it listens: the one line that it prints."""
-    return child.stdout.readline().decode().split()[-1]
+from serving import address, process
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +76,7 @@ def test_a_chunked_body_without_end_is_cut_off(client):
 
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
 def test_told_to_end_it_ends_well(ending, models):
-    with process(models) as child:
+    with process(models, POSEFIELD_LOG="on") as child:
         assert httpx.get(address(child) + "/readyz").status_code == 200
         child.send_signal(ending)
         assert child.wait(20) == 0

@@ -1,8 +1,8 @@
 """The image runs where it may write nothing, and answers there what the service answers here."""
 
+import json
 import os
 import signal
-import socket
 import sys
 import tempfile
 import time
@@ -12,12 +12,15 @@ from pathlib import Path
 import debian
 import httpx
 import image
+import running
 import trained
 from image import Image
 
 from service import __version__
 from service.encode import ENCODERS, poses
 from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+from service.web.access import keys
 
 # What the Dockerfile adds to its base: 334 MB were measured, 428 before anything was left out.
 BUDGET = 350_000_000
@@ -85,29 +88,35 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
     models, temporary = _places(folder)
     model, content = trained.family()
     (models / "reaching.onnx").write_bytes(content)
-    port = str(_free_port())
+    port, key = str(running.ports(1)[0]), keys.make()
     told = {"POSEFIELD_PORT": port}
     health = built.config["Healthcheck"]["Test"][1:]
     command = [*built.config["Entrypoint"], *built.config["Cmd"]]
     if _run(built, health, folder, **told)[2] == 0:
         yield "healthy before it was started"
+    if "POSEFIELD_KEYS" not in (said := _run(built, command, folder, **told)[1]):
+        yield f"without keys it says {said!r}"
+    told["POSEFIELD_KEYS"] = keys.line("somebody", ["read:*"], key)
     began = time.monotonic()
     with built.start(command, models, temporary, **told) as jail:
         line = jail.stdout.readline().decode() if jail.stdout else ""
         print(f"it answers after {time.monotonic() - began:.1f} s: {line}", end="")
         if line:
-            yield from _answers(f"http://127.0.0.1:{port}", model)
+            yield from _answers(f"http://127.0.0.1:{port}", key, model)
             if _run(built, health, folder, **told)[2]:
                 yield "not healthy while it answers"
             os.kill(_first(jail.pid), signal.SIGTERM)
         said, complaint = jail.communicate(timeout=PATIENCE)
-    if (jail.returncode, said, complaint) != (0, b"", b""):
+    if (jail.returncode, said) != (0, b""):
         yield f"SIGTERM ends it with {jail.returncode}, {said!r} {complaint!r}"
+    statuses = [json.loads(line)["status"] for line in complaint.splitlines()]
+    if set(statuses) != {httpx.codes.OK}:
+        yield f"requests of statuses {statuses}"
     if left := sorted(path.name for path in temporary.iterdir()):
         yield f"it leaves {left} in /tmp"
 
 
-def _answers(url: str, model: trained.Synthesizer) -> Iterator[str]:
+def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
     """Faults of answers, which have to be those of here to the last byte."""
     controls = {control.name: control.default for control in model.session.card.controls}
     clip = model.clip(ClipQuestion(controls))
@@ -117,7 +126,8 @@ def _answers(url: str, model: trained.Synthesizer) -> Iterator[str]:
             clip, ENCODERS["usdc"].convention(None, None)
         ),
     }
-    with httpx.Client(base_url=url, timeout=STILL) as client:
+    known = {"Authorization": f"Bearer {key}"}
+    with httpx.Client(base_url=url, timeout=STILL, headers=known) as client:
         for path in ("/livez", "/readyz"):
             if (status := client.get(path).status_code) != httpx.codes.OK:
                 yield f"{path} answers {status}"
@@ -150,11 +160,6 @@ def _places(folder: Path) -> tuple[Path, Path]:
 def _first(unshare: int) -> int:
     """The container's first process, which unshare started, as it is numbered here."""
     return int(Path(f"/proc/{unshare}/task/{unshare}/children").read_text())
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as held:
-        return int(held.getsockname()[1])
 
 
 if __name__ == "__main__":

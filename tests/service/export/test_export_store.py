@@ -1,14 +1,10 @@
 """Exports to an object store: a real server that speaks S3, in a process of its own."""
 
 import os
-import re
-import subprocess
-import sys
-import time
-import urllib.request
 
 import exporting
 import pytest
+import stores
 
 from service.export import crew, run
 from service.export.run import Shard
@@ -21,42 +17,22 @@ ROWS = 30
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
-    """Address of a store's server, and what tells of it in the environment."""
-    words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"]
-    # It says a line a request: a pipe that nobody reads would fill and stop it.
-    said = tmp_path_factory.mktemp("server") / "said"
-    with said.open("w") as file:
-        process = subprocess.Popen(words, stdout=file, stderr=subprocess.STDOUT)
-    try:
-        yield _address(process, said)
-    finally:
-        process.kill()
-        process.wait()
-
-
-def _address(process, said):
-    while process.poll() is None:
-        if found := re.search(r"http://[\d.:]+\d", said.read_text()):
-            return found.group()
-        time.sleep(0.05)
-    raise AssertionError(said.read_text())
+    """Address of a store's server."""
+    with stores.serving(tmp_path_factory.mktemp("server") / "said") as address:
+        yield address
 
 
 @pytest.fixture(autouse=True)
 def told(server, monkeypatch):
     """The environment that says where the store is and who asks."""
-    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
-    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "somebody")
-    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
-    monkeypatch.setenv("AWS_REGION", "us-east-1")
+    for name, value in stores.told(server).items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture
 def bucket(server, request):
     """URL of a place in a bucket of the test's own."""
-    name = re.sub("[^a-z0-9]+", "-", request.node.name.lower()).strip("-")[:60].strip("-")
-    urllib.request.urlopen(urllib.request.Request(f"{server}/{name}", method="PUT")).close()
-    return f"s3://{name}/exports/first"
+    return f"s3://{stores.bucket(server, request.node.name)}/exports/first"
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,174 @@
+"""What models cost the process that answers for them: start, memory, and waiting while one changes.
+
+.venv/bin/python benchmarks/serve_models.py [MODEL]
+
+MODEL defaults to build/models/reaching.onnx. Ten models are that one in ten contents. Requests wait
+behind a reload as long as the slowest of those says that run during it; beside it stand those of
+the same server when nothing is loaded.
+"""
+
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import httpx
+from rows import Row, table
+
+POSEFIELD = Path(sys.executable).with_name("posefield")
+MODEL = Path("build/models/reaching.onnx")
+STARTS, RELOADS = 5, 20
+READY, MEMORY = 2.0, 250.0
+
+
+def rows(model: Path) -> list[Row]:
+    """Start to ready and resident memory with one and ten models, and requests beside reloads."""
+    with TemporaryDirectory() as name:
+        one, ten = Path(name, "one"), Path(name, "ten")
+        _models(model, one, 1)
+        _models(model, ten, 10)
+        return [*_start(one), *_start(ten), *_workers(ten), *_memory(one, ten), *_reloads(ten)]
+
+
+def content(model: Path, number: int) -> bytes:
+    """The model in other bytes, which answer the same: a doc_string of its own."""
+    return model.read_bytes() + b"\x32\x04" + b"%04d" % number
+
+
+def _models(model: Path, folder: Path, count: int) -> None:
+    folder.mkdir()
+    for number in range(count):
+        (folder / f"model{number}.onnx").write_bytes(content(model, number))
+
+
+@contextmanager
+def _serving(
+    folder: Path, **environ: str
+) -> Iterator[tuple[subprocess.Popen[bytes], httpx.Client, float]]:
+    """The server, a client of it, and seconds until it said that it listens."""
+    given = {**os.environ, "POSEFIELD_PORT": "0", **environ}
+    begin, command = time.perf_counter(), [POSEFIELD, "serve", str(folder)]
+    with subprocess.Popen(command, env=given, stdout=subprocess.PIPE) as process:
+        assert process.stdout
+        base = process.stdout.readline().decode().split()[-1]
+        took = time.perf_counter() - begin
+        try:
+            with httpx.Client(base_url=base, timeout=60) as client:
+                yield process, client, took
+        finally:
+            process.terminate()
+            process.wait()
+
+
+def _taken(folder: Path, **environ: str) -> list[float]:
+    found = []
+    for _ in range(STARTS):
+        with _serving(folder, **environ) as (_, _, took):
+            found.append(took)
+    return sorted(found)
+
+
+def _start(folder: Path) -> list[Row]:
+    took, count = _taken(folder), len(list(folder.iterdir()))
+    with _serving(folder) as (process, _, _):
+        own = _processor_time(process.pid)
+    said = f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s; {own:.2f} s of processor time"
+    return [Row(f"start to ready, {count} models", statistics.median(took), "s", said, None, READY)]
+
+
+def _workers(folder: Path) -> list[Row]:
+    took = _taken(folder, POSEFIELD_WORKERS="2")
+    said = f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s, on {os.cpu_count()} cores"
+    return [
+        Row("start to ready, 10 models, 2 workers", statistics.median(took), "s", said, None, None)
+    ]
+
+
+def _memory(one: Path, ten: Path) -> list[Row]:
+    found = []
+    for folder, goal in ((one, None), (ten, MEMORY)):
+        with _serving(folder) as (process, client, _):
+            begun = resident(process.pid)
+            names = [model["name"] for model in client.get("/v1/models").json()["models"]]
+            for name in names:
+                _use(client, name)
+            used = resident(process.pid)
+        said = f"{begun:.0f} MB before a pose and a clip of each level of each was asked"
+        found.append(Row(f"resident memory, {len(names)} models", used, "MB", said, None, goal))
+    return found
+
+
+def _use(client: httpx.Client, name: str) -> None:
+    card = client.get(f"/v1/models/{name}").json()
+    controls = {control["name"]: control["default"] for control in card["controls"]}
+    for level in range(len(card["levels"])):
+        asked = {**controls, "level": level}
+        client.get(f"/v1/models/{name}/pose", params={**asked, "time": 0}).raise_for_status()
+        client.get(f"/v1/models/{name}/clip.usdc", params=asked).raise_for_status()
+
+
+def _reloads(folder: Path) -> list[Row]:
+    """Slowest requests with and without reloads, and what memory grows by."""
+    with _serving(folder, POSEFIELD_RELOAD="1") as (process, client, _):
+        _use(client, "model0")
+        controls = client.get("/v1/models/model0").json()["controls"]
+        asked = {**{c["name"]: c["default"] for c in controls}, "time": 0}
+        quiet, busy, sizes = [], [], []
+        for number in range(RELOADS):
+            quiet += _asked(client, asked, 0.3)
+            _replace(folder, number)
+            before = client.get("/readyz").json()["reload"]["opened"]
+            while client.get("/readyz").json()["reload"]["opened"] == before:
+                busy += _asked(client, asked, 0.05)
+            sizes.append(resident(process.pid))
+    rows = []
+    for what, share in (("median", 0.5), ("p99", 0.99), ("slowest", 1.0)):
+        own, other = (1e3 * _at(times, share) for times in (busy, quiet))
+        said = f"without: {other:.1f} ms"
+        rows.append(Row(f"request while models are reloaded, {what}", own, "ms", said, None, None))
+    half = RELOADS // 2
+    said = f"of {half} more; {sizes[half - 1]:.0f} MB after {half}"
+    grown = sizes[-1] - sizes[half - 1]
+    return [*rows, Row("memory that reloads add", grown, "MB", said, None, None)]
+
+
+def _asked(client: httpx.Client, question: dict[str, float], seconds: float) -> list[float]:
+    """Seconds that requests took, asked one after the other for so long."""
+    took, end = [], time.perf_counter() + seconds
+    while (begin := time.perf_counter()) < end:
+        client.get("/v1/models/model1/pose", params=question).raise_for_status()
+        took.append(time.perf_counter() - begin)
+    return took
+
+
+def _replace(folder: Path, number: int) -> None:
+    path = folder / "model0.onnx"
+    aside = folder / "aside"
+    aside.write_bytes(path.read_bytes()[:-6] + b"\x32\x04" + b"%04d" % (1000 + number))
+    aside.rename(path)
+
+
+def _processor_time(process: int) -> float:
+    """Seconds that a process has computed."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return sum(int(ticks) for ticks in fields[11:13]) / os.sysconf("SC_CLK_TCK")
+
+
+def _at(times: list[float], share: float) -> float:
+    return sorted(times)[min(len(times) - 1, int(share * len(times)))]
+
+
+def resident(process: int) -> float:
+    """Resident memory of a process, MB."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    kilobytes = next(line.split()[1] for line in lines if line.startswith("VmRSS"))
+    return int(kilobytes) * 1024 / 1e6
+
+
+if __name__ == "__main__":
+    print(table(rows(Path(sys.argv[1]) if sys.argv[1:] else MODEL)))

@@ -1,0 +1,124 @@
+"""The service as a process of its own, and clients that notice whatever is lost."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+POSEFIELD = Path(sys.executable).with_name("posefield")
+
+
+@contextlib.contextmanager
+def process(*paths, **environ):
+    """The service as a process of its own; killed if the test leaves it running."""
+    with started([POSEFIELD, "serve", *map(str, paths)], **environ) as child:
+        yield child
+
+
+@contextlib.contextmanager
+def started(command, **environ):
+    """A command that serves, on a free port and silent if nothing else is said."""
+    given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", **environ}
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=ROOT, env=given, stdout=pipe, stderr=pipe) as child:
+        watch = threading.Timer(90, child.kill)
+        watch.start()
+        try:
+            yield child
+        finally:
+            watch.cancel()
+            child.kill()
+
+
+def address(child) -> str:
+    """Where the service says it listens: the one line that it prints."""
+    return child.stdout.readline().decode().split()[-1]
+
+
+def host_and_port(url):
+    host, port = url.removeprefix("http://").split(":")
+    return host, int(port)
+
+
+def children(pid):
+    """Processes that a process has started."""
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    return [int(word) for word in listed.split()]
+
+
+def within(seconds, is_so):
+    """Whether something becomes so in time."""
+    until = time.monotonic() + seconds
+    while not (found := is_so()) and time.monotonic() < until:
+        time.sleep(0.02)
+    return found
+
+
+class Crowd:
+    """Clients at raw sockets, each in a thread, that ask on until they are refused.
+
+    answered: how many answers there were, and how many of them asked to close the connection;
+    lost: what became of requests that were sent on a connection that stood and not answered.
+    """
+
+    def __init__(self, url):
+        self.where = host_and_port(url)
+        self.answered = Counter()
+        self.lost = []
+        self._ended = False
+        kinds = [(True, 0.0)] * 4 + [(True, 0.05)] * 4 + [(True, 0.3)] * 2 + [(False, 0.0)] * 6
+        self._threads = [threading.Thread(target=self._ask_on, args=kind) for kind in kinds]
+        for thread in self._threads:
+            thread.start()
+
+    def wait(self):
+        """Until all have been refused."""
+        for thread in self._threads:
+            thread.join(20)
+        self._ended = True
+
+    def _ask_on(self, keeps, pause):
+        while not self._ended:
+            try:
+                wire = socket.create_connection(self.where, timeout=10)
+            except ConnectionRefusedError:
+                return
+            with wire:
+                self._ask_over(wire, keeps, pause)
+
+    def _ask_over(self, wire, keeps, pause):
+        while True:
+            try:
+                closes = exchange(wire)
+            except OSError as fault:
+                self.lost.append(repr(fault))
+                return
+            self.answered["closing" if closes else "open"] += 1
+            if closes or not keeps:
+                return
+            time.sleep(pause)
+
+
+def exchange(wire, path="/v1/models"):
+    """Ask over a socket; whether the answer says that it closes. OSError if there is none."""
+    wire.sendall(f"GET {path} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+    head, body = b"", b""
+    while b"\r\n\r\n" not in head:
+        head += received(wire)
+    head, _, body = head.lower().partition(b"\r\n\r\n")
+    lines = dict(line.split(b": ", 1) for line in head.split(b"\r\n")[1:])
+    while len(body) < int(lines[b"content-length"]):
+        body += received(wire)
+    return lines.get(b"connection") == b"close"
+
+
+def received(wire):
+    if content := wire.recv(65536):
+        return content
+    raise ConnectionError("ended without an answer")

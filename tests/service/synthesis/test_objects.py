@@ -1,0 +1,123 @@
+"""Models in an object store: a real server that speaks S3, in a process of its own."""
+
+import pytest
+import stores
+
+from service.motion.errors import ModelError
+from service.synthesis import library, session
+from service.synthesis.library import Bounds
+from service.synthesis.objects import connect
+from service.synthesis.shelf import Shelf
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    """Address of a store's server."""
+    with stores.serving(tmp_path_factory.mktemp("server") / "said") as address:
+        yield address
+
+
+@pytest.fixture(autouse=True)
+def told(server, monkeypatch):
+    """The environment that says where the store is and who asks."""
+    for name, value in stores.told(server).items():
+        monkeypatch.setenv(name, value)
+
+
+@pytest.fixture
+def url(server, request):
+    """URL of a place in a bucket of the test's own."""
+    return f"s3://{stores.bucket(server, request.node.name)}/models"
+
+
+@pytest.fixture
+def put(url, model_path):
+    """Function that puts the model of a number under a name; its hash."""
+    store, plain = connect(url), model_path.read_bytes()
+
+    def at(name, number):
+        content = plain + b"\x32\x02" + b"%02d" % number
+        store.put(name, content)
+        return session.digest(content)
+
+    return at
+
+
+def test_models_are_named_as_in_a_folder(put, url):
+    put("walk.onnx", 1)
+    old, new = put("reach/9.onnx", 2), put("reach/10.onnx", 3)
+    put(".hidden.onnx", 4)
+    put("notes.txt", 5)
+    shelf = Shelf([url], Bounds())
+    assert sorted(shelf.library.models) == ["reach", "walk"]
+    assert [m.session.digest for m in shelf.library.versions("reach")] == [new, old]
+    assert sorted(library.load([f"{url}/"]).models) == ["reach", "walk"]
+
+
+def test_one_object_is_a_model(put, url):
+    digest = put("walk.onnx", 1)
+    put("reach.onnx", 2)
+    (model,) = library.load([f"{url}/walk.onnx"]).models.values()
+    assert model.identity == f"walk@{digest}"
+
+
+@pytest.mark.parametrize("ending", ["", "/walk.onnx"])
+def test_what_is_put_there_is_followed(ending, put, url):
+    old = put("walk.onnx", 1)
+    shelf = Shelf([url + ending], Bounds())
+    assert shelf.look() and shelf.reloads.opened == 1
+    new = put("walk.onnx", 2)
+    assert not shelf.look()
+    assert shelf.look()
+    assert [m.session.digest for m in shelf.library.versions("walk")] == [new, old]
+
+
+def test_a_broken_object_leaves_the_old_one(put, url):
+    old = put("walk.onnx", 1)
+    shelf = Shelf([url], Bounds())
+    connect(url).put("walk.onnx", b"broken")
+    shelf.look()
+    shelf.look()
+    assert shelf.library.find("walk").session.digest == old
+    (fault,) = shelf.reloads.faults
+    assert fault.error.path == f"{url}/walk.onnx"
+
+
+def test_a_bucket_that_is_not_there_is_refused(url):
+    with pytest.raises(ModelError, match="cannot be read"):
+        library.load(["s3://no-such-bucket-anywhere/models"])
+    with pytest.raises(ModelError, match=r"no \.onnx object under this URL"):
+        library.load([url])
+
+
+def test_a_store_that_has_become_empty_leaves_what_there_was(put, url):
+    old = put("walk.onnx", 1)
+    shelf = Shelf([url], Bounds())
+    connect(url).delete("walk.onnx")
+    shelf.look()
+    shelf.look()
+    assert shelf.library.find("walk").session.digest == old
+    (fault,) = shelf.reloads.faults
+    assert fault.name == "" and fault.error.path == url
+
+
+def test_a_store_that_cannot_be_reached_leaves_what_there_was(model_path, tmp_path, monkeypatch):
+    with stores.serving(tmp_path / "said") as address:
+        for name, value in stores.told(address).items():
+            monkeypatch.setenv(name, value)
+        url = f"s3://{stores.bucket(address, 'models')}"
+        connect(url).put("walk.onnx", model_path.read_bytes())
+        shelf = Shelf([url], Bounds())
+    shelf.look()
+    assert list(shelf.library.models) == ["walk"]
+    (fault,) = shelf.reloads.faults
+    assert fault.error.message.startswith("cannot be read: ")
+
+
+def test_a_url_of_no_store_is_refused():
+    with pytest.raises(ModelError, match="cannot be read"):
+        library.load(["nonsense://somewhere/models"])
+
+
+def test_a_url_of_a_file_is_a_path(model_path):
+    assert library.load([model_path.as_uri()]).models.keys() == {model_path.stem}
