@@ -1,0 +1,222 @@
+"""What requests cost the service, beside a handler that does nothing but ask the model.
+
+    make build/models/reaching.onnx && .venv/bin/python benchmarks/serve.py [MODEL]
+
+Each server has the first core for itself, and wrk the last. The cost is processor time, which
+neighbours of the machine change least; it is taken in turn, round by round, and a ratio is the
+median of the rounds' own. No two questions of a load are the same.
+"""
+
+import statistics
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from urllib.parse import urlencode
+
+import httpx
+import numpy as np
+import orjson
+from rows import Row, table
+from serve_load import Cost, Load, get, in_turn, post, run
+from serve_process import Server, bare, posefield
+
+from service.motion.card import Control
+from service.synthesis import session
+
+MODEL = Path("build/models/reaching.onnx")
+ROUNDS = 7
+QUESTIONS, MANY = 10_000, 500
+ALONE, TOGETHER, PACED = 1, 32, 64
+# Sums of float32 in another order.
+CLOSE = 1e-5
+
+Numbers = dict[str, float]
+
+
+def rows(model: Path, rounds: int = ROUNDS) -> list[Row]:
+    """Poses, answers that clients have already, clips, crowds, and how long requests wait."""
+    controls = session.load(model).card.controls
+    path = f"/v1/models/{model.stem}"
+    with posefield(model) as ours, bare(model) as other:
+        _check(ours, other, path, controls)
+        return [
+            *_poses(ours, other, path, controls, rounds),
+            *_files(ours, other, path, controls, rounds),
+            *_crowds(ours, path, controls, rounds),
+            *_waits(ours, path, controls, rounds),
+        ]
+
+
+def points(controls: Sequence[Control], count: int) -> list[Numbers]:
+    """Control values at random, anywhere in what was sampled, and always the same."""
+    rng = np.random.default_rng(1)
+    ends = np.array([(c.minimum, c.maximum) for c in controls])
+    # Four digits: what people write, and what bodies of usual length have.
+    values = rng.uniform(*ends.T, (count, len(ends))).round(4)
+    inside = np.clip(values, *ends.T)
+    return [dict(zip((c.name for c in controls), row, strict=True)) for row in inside.tolist()]
+
+
+def pose_questions(controls: Sequence[Control], count: int = QUESTIONS) -> list[Numbers]:
+    """Control values and a time."""
+    times = np.random.default_rng(2).uniform(0, 1, count).round(4).tolist()
+    asked = zip(points(controls, count), times, strict=True)
+    return [{**point, "time": when} for point, when in asked]
+
+
+def _check(ours: Server, other: Server, path: str, controls: Sequence[Control]) -> None:
+    """Both answer alike: otherwise nothing can be compared."""
+    for question in pose_questions(controls, 20):
+        plain = {"Accept-Encoding": "identity"}
+        urls = ours.url + path + "/pose", other.url
+        found = [httpx.get(url, params=question, headers=plain).json() for url in urls]
+        assert list(found[0]) == list(found[1])
+        for name in ("rotations", "root_position", "bone_offsets"):
+            np.testing.assert_allclose(found[0][name], found[1][name], atol=CLOSE)
+
+
+def _poses(
+    ours: Server, other: Server, path: str, controls: Sequence[Control], rounds: int
+) -> list[Row]:
+    questions = pose_questions(controls)
+    asked = _asked(f"{path}/pose", questions)
+    tags = _asked_again(ours, f"{path}/pose", questions[:2000])
+    plain = _asked("/", questions)
+    # Beside each other in time what is compared: neighbours come and go.
+    runs = [
+        (ours, Load(asked, ALONE)),
+        (other, Load(plain, ALONE)),
+        (ours, Load(tags, ALONE)),
+        (ours, Load(_asked(f"{path}/pose.msgpack", questions), ALONE)),
+        (ours, Load(asked, TOGETHER)),
+        (other, Load(plain, TOGETHER)),
+        (ours, Load(tags, TOGETHER)),
+    ]
+    alone, base, held, packed, many, base_many, held_many = in_turn(runs, rounds)
+    return [
+        _share("pose, 1 connection", alone, base, 1.8),
+        _share(f"pose, {TOGETHER} connections", many, base_many, 1.4),
+        _share("pose as MessagePack, 1 connection", packed, base, None),
+        _gain("304, 1 connection", held, base),
+        _gain(f"304, {TOGETHER} connections", held_many, base_many),
+    ]
+
+
+def _files(
+    ours: Server, other: Server, path: str, controls: Sequence[Control], rounds: int
+) -> list[Row]:
+    questions = points(controls, QUESTIONS)
+    runs = [
+        (ours, Load(_asked(f"{path}/clip.usdc", questions), ALONE)),
+        (ours, Load(_asked(f"{path}/clip.usdc", questions[:1]), ALONE)),
+        (ours, Load(_asked(f"{path}/clip.json", questions), ALONE)),
+    ]
+    varied, same, numbers = in_turn(runs, rounds)
+    goal = "500 µs: 2,000 a second on one core"
+    return [
+        _cost("clip as usdc", varied, goal, 500.0),
+        _cost("the same clip as usdc again and again", same, goal, 500.0),
+        _cost("clip as JSON", numbers, "", None),
+    ]
+
+
+def _crowds(ours: Server, path: str, controls: Sequence[Control], rounds: int) -> list[Row]:
+    bodies = [_crowd(points(controls, MANY), shift) for shift in range(20)]
+    names = ("json", "arrow", "msgpack", "npz")
+    runs = [
+        (ours, Load(tuple(post(f"{path}/crowd.{name}", body) for body in bodies), ALONE))
+        for name in names
+    ]
+    costs = dict(zip(names, in_turn(runs, rounds), strict=True))
+    json = costs.pop("json")
+    return [_crowd_row(name, own, json) for name, own in costs.items()]
+
+
+def _crowd_row(name: str, own: Sequence[Cost], json: Sequence[Cost]) -> Row:
+    ratios = [b.median / a.median for a, b in zip(own, json, strict=True)]
+    words = f"as JSON: {1e3 * _best(c.median for c in json):.2f} ms; rounds {_range(ratios)}"
+    value, ratio = 1e3 * _best(c.median for c in own), statistics.median(ratios)
+    return Row(f"crowd of {MANY} poses as {name}", value, "ms", words, ratio, 5.0)
+
+
+def _waits(ours: Server, path: str, controls: Sequence[Control], rounds: int) -> list[Row]:
+    """Latencies at half of the rate that saturates: many connections that each ask seldom."""
+    asked = _asked(f"{path}/pose", pose_questions(controls))
+    found = []
+    for _ in range(rounds):
+        most = run(ours, Load(asked, TOGETHER)).rate
+        paced = Load(asked, PACED, think=1e3 * PACED / (most / 2))
+        found.append((most, run(ours, paced)))
+    ratios = [cost.p99 / cost.median for _, cost in found]
+    most, cost = sorted(found, key=lambda one: one[1].p99 / one[1].median)[len(found) // 2]
+    words = (
+        f"p50 {1e3 * cost.median:.2f} ms, p99 {1e3 * cost.p99:.2f} ms at {cost.rate:.0f} requests "
+        f"a second of {most:.0f}; rounds {_range(ratios)}"
+    )
+    return [Row("p99 of p50 at half the load", statistics.median(ratios), "×", words, None, 5.0)]
+
+
+def _asked(target: str, questions: Iterable[Numbers]) -> tuple[bytes, ...]:
+    return tuple(get(f"{target}?{urlencode(question)}") for question in questions)
+
+
+def _asked_again(ours: Server, target: str, questions: Sequence[Numbers]) -> tuple[bytes, ...]:
+    """The questions with the tags of their answers."""
+    made = []
+    with httpx.Client(base_url=ours.url, headers={"Accept-Encoding": "identity"}) as client:
+        for question in questions:
+            line = f"{target}?{urlencode(question)}"
+            made.append(get(line, f"If-None-Match: {client.get(line).headers['etag']}"))
+    return tuple(made)
+
+
+def _crowd(points: Sequence[Numbers], shift: int) -> bytes:
+    columns = {name: [point[name] for point in points] for name in points[0]}
+    moved = [round(0.001 * (shift + i), 4) for i in range(len(points))]
+    places = [[float(i % 25), 0.0, float(i // 25)] for i in range(len(points))]
+    return orjson.dumps({"controls": columns, "time": moved, "position": places})
+
+
+def _share(name: str, own: Sequence[Cost], base: Sequence[Cost], goal: float | None) -> Row:
+    """Processor time as a multiple of the bare handler's: at most the goal."""
+    ratios = [a.each / b.each for a, b in zip(own, base, strict=True)]
+    return Row(name, statistics.median(ratios), "×", _words(own, base, ratios), None, goal)
+
+
+def _gain(name: str, own: Sequence[Cost], base: Sequence[Cost]) -> Row:
+    """How many times the processor time the bare handler's 200 takes: at least as much."""
+    ratios = [b.each / a.each for a, b in zip(own, base, strict=True)]
+    value = _best(cost.each for cost in own)
+    return Row(name, value, "µs", _words(own, base, ratios), statistics.median(ratios), 1.0)
+
+
+def _words(own: Sequence[Cost], base: Sequence[Cost], ratios: Sequence[float]) -> str:
+    best, other = _best(c.each for c in own), _best(c.each for c in base)
+    return (
+        f"processor time of the bare handler; rounds {_range(ratios)}; least {best:.0f} of "
+        f"{other:.0f} µs; at most {_most(own)} of {_most(base)} requests a second"
+    )
+
+
+def _cost(name: str, own: Sequence[Cost], words: str, goal: float | None) -> Row:
+    each = [cost.each for cost in own]
+    said = "; ".join(
+        word for word in (words, f"rounds {_range(each, 0)}", f"{_most(own)} a second") if word
+    )
+    return Row(name, statistics.median(each), "µs of processor time", said, None, goal)
+
+
+def _best(values: Iterable[float]) -> float:
+    return min(values)
+
+
+def _most(costs: Sequence[Cost]) -> str:
+    return f"{max(cost.rate for cost in costs):.0f}"
+
+
+def _range(values: Sequence[float], digits: int = 2) -> str:
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
+
+
+if __name__ == "__main__":
+    print(table(rows(Path(sys.argv[1]) if sys.argv[1:] else MODEL)))
