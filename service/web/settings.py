@@ -19,14 +19,14 @@ class Settings:
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
     grid_limit: points of a grid of sigma. output_limit: bytes of a clip or a crowd's poses.
     grace: seconds that open requests get to finish after SIGTERM, and drain: seconds before that in
-    which the service still listens, but says that it is not ready. workers: processes that share the port; 0 for as many as there are processors.
-    reload: seconds from a look for new models to the next; 0 for never. versions: older versions of
-    a model that answer under their hash, and versions_memory: bytes that all of those may take.
-    concurrency: requests that a process answers at a time, and deadline: seconds until an answer
-    has to begin. alias_seconds: how long caches may use an answer under a model's plain name
-    without asking whether it is the newest's. log: whether each request is told on standard error,
-    in one line. inference_body_limit: bytes of a body of tensors, and inference_poses: rows times
-    times of one.
+    which the service still listens, but says that it is not ready. workers: processes that share
+    the port; 0 for as many as there are processors. reload: seconds from a look for new models to
+    the next; 0 for never. versions: older versions of a model that answer under their hash, and
+    versions_memory: bytes that all of those may take. concurrency: requests that a process answers
+    at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long caches
+    may use an answer under a model's plain name without asking whether it is the newest's. log:
+    whether each request is told on standard error, in one line. inference_body_limit: bytes of a
+    body of tensors, and inference_poses: rows times times of one.
 
     url_limit, head_limit: bytes of a URL, and of all header lines. head_time, body_time: seconds in
     which a request's head and body have to arrive; idle_time: seconds that an unused connection
