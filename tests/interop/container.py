@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import debian
@@ -38,7 +39,9 @@ def faults() -> list[str]:
     with image.built() as built, tempfile.TemporaryDirectory() as name:
         print(f"image in {time.monotonic() - began:.0f} s: {built.own / 1e6:.0f} MB", end=" ")
         print(f"on a base of {built.base / 1e6:.0f}")
-        found = [*_described(built), *_jailed(built, Path(name)), *_served(built, Path(name))]
+        folder = Path(name)
+        found = [*_described(built), *_listed(built)]
+        found += [*_jailed(built, folder), *_served(built, folder)]
     return [f"image: {fault}" for fault in found]
 
 
@@ -68,6 +71,21 @@ def _described(built: Image) -> Iterator[str]:
             yield f"label {key} {labels.get(prefix + key)!r}, expected {value!r}"
     if built.own > BUDGET:
         yield f"{built.own} bytes beyond the base, expected at most {BUDGET}"
+
+
+def _listed(built: Image) -> Iterator[str]:
+    """Faults of the bill of materials: what it names has to be what is installed."""
+    content = (built.root / "opt/posefield/share/sbom.cdx.json").read_bytes()
+    bill = json.loads(content)
+    named = {each["name"] for each in bill["components"]} | {bill["metadata"]["component"]["name"]}
+    (packages,) = built.root.glob("opt/posefield/lib/python*/site-packages")
+    there = {dist.name for dist in metadata.distributions(path=[str(packages)])}
+    if (found := {*map(_plain, named)}) != (expected := {*map(_plain, there)}):
+        yield f"only in the bill or only installed: {sorted(found ^ expected)}"
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "-").replace(".", "-")
 
 
 def _jailed(built: Image, folder: Path) -> Iterator[str]:
