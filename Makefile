@@ -45,7 +45,7 @@ test: $(ENV) ## lint, types, layers and all tests (no Blender, no browser)
 	$(BIN)/python -m pytest -n auto
 
 .PHONY: interop
-interop: $(ENV) ## read our files back through Blender, three.js and the glTF validator
+interop: $(ENV) ## other readers of our files, other engines of a model, the image really built
 	$(BIN)/python tests/interop/run.py
 
 .PHONY: audit
@@ -62,4 +62,4 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist .venv .venv-blender .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist .venv .venv-blender .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -22,6 +22,7 @@ import newcomer
 import paper
 import precompute
 import runtime
+import serve_models
 from rows import Row, table, write
 
 from model_export.evaluate import table1_family, table1_measure, table1_text
@@ -46,6 +47,7 @@ def main() -> None:
         *export.rows(model),
         *export_cluster.rows(model),
         *clips_http.rows(made),
+        *serve_models.rows(model),
         *export_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]

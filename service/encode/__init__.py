@@ -22,12 +22,14 @@ class Encoder:
     write: files of several answers, as long as they and in their order; those of one model and
     length are made together. usual: the convention that readers of the format expect; law: whether
     it allows no other. at_once: frames up to which a file is written in so little time (a
-    millisecond or two) that others may wait for it.
+    millisecond or two) that others may wait for it. per_joint: bytes that a joint takes in a frame
+    at most; beside them stands what all frames share.
     """
 
     extension: str
     media_type: str
     write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+    per_joint: int
     usual: Convention = METRES
     law: bool = False
     at_once: int = 200
@@ -43,6 +45,11 @@ class Encoder:
     def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
         """File of one answer, in the usual convention if none is said."""
         return self.write([answer], convention or self.usual)[0]
+
+
+def poses_within(size: int, joints: int, per_joint: int) -> int:
+    """How many poses so many bytes hold, whatever they are; the root's place counts as a joint."""
+    return size // ((joints + 1) * per_joint)
 
 
 def one_by_one(
@@ -63,16 +70,16 @@ ENCODERS = {
     encoder.extension: encoder
     for encoder in (
         # A template takes 30 ms to make, and every number of frames has one of its own.
-        Encoder("usda", "model/vnd.usda", usd.usda, at_once=0),
+        Encoder("usda", "model/vnd.usda", usd.usda, 120, at_once=0),
         # Not registered, unlike those of text and package, but what others call it.
-        Encoder("usdc", "model/vnd.usdc", usd.usdc, at_once=0),
-        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz, at_once=0),
-        Encoder("json", JSON, one_by_one(keyframes.json)),
-        Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), CENTIMETRES),
-        Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), law=True),
-        Encoder("npz", NPZ, numbers(tables.npz)),
-        Encoder("arrow", ARROW, numbers(arrow)),
-        Encoder("msgpack", MSGPACK, numbers(tables.msgpack)),
+        Encoder("usdc", "model/vnd.usdc", usd.usdc, 48, at_once=0),
+        Encoder("usdz", "model/vnd.usdz+zip", usdz.usdz, 48, at_once=0),
+        Encoder("json", JSON, one_by_one(keyframes.json), 96),
+        Encoder("bvh", "application/x-bvh", one_by_one(bvh.bvh), 72, CENTIMETRES),
+        Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), 24, law=True),
+        Encoder("npz", NPZ, numbers(tables.npz), 24),
+        Encoder("arrow", ARROW, numbers(arrow), 24),
+        Encoder("msgpack", MSGPACK, numbers(tables.msgpack), 24),
     )
 }
 
@@ -103,11 +110,13 @@ POSE_ENCODERS = {
 
 @dataclass(frozen=True)
 class CrowdEncoder:
-    """How one format of crowd poses is named and made, and the most characters it is good for."""
+    """How one format of crowd poses is named and made, the bytes that a joint of a character takes
+    at most, and the most characters it is good for."""
 
     extension: str
     media_type: str
     write: Callable[[Table], bytes]
+    per_joint: int
     most: float = math.inf
 
     def encode(self, crowd: CrowdPoses) -> bytes:
@@ -118,9 +127,9 @@ class CrowdEncoder:
 CROWD_ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        CrowdEncoder("arrow", ARROW, arrow),
-        CrowdEncoder("npz", NPZ, tables.npz),
-        CrowdEncoder("msgpack", MSGPACK, tables.msgpack),
-        CrowdEncoder("json", JSON, tables.json, crowd_poses.JSON_LIMIT),
+        CrowdEncoder("arrow", ARROW, arrow, 40),
+        CrowdEncoder("npz", NPZ, tables.npz, 40),
+        CrowdEncoder("msgpack", MSGPACK, tables.msgpack, 40),
+        CrowdEncoder("json", JSON, tables.json, 150, crowd_poses.JSON_LIMIT),
     )
 }

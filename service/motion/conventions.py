@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-"""Arrays of numbers in Python are float64, but for crowds; the model file states its own type."""
+"""Arrays of numbers in Python are float64, but for poses that a model has just answered with."""
 
 Singles = npt.NDArray[np.float32]
-"""Poses of a crowd, as the model answers them: twice the precision is twice the memory."""
+"""Poses as the model answers them: twice the precision is twice the memory."""
 
 Indices = npt.NDArray[np.int64]
 

@@ -31,19 +31,20 @@ def window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
     return rate, start, last
 
 
-def times(asked: ClipQuestion, duration: float) -> Floats:
-    """Times (F,) of the frames asked for, s, of a clip that takes `duration`.
+def times(asked: ClipQuestion, duration: float, most: int = MOST_POSES) -> Floats:
+    """Times (F,) of the frames asked for, s, of a clip that takes `duration`; InvalidField for more
+    frames than `most`.
 
     Those of a loop lack the last frame, which is the first again.
     """
     rate, start, last = window(asked, duration)
     if asked.loop:
         steps = max(1, round(duration * rate))
-        _check_count(steps + 1)
+        _check_count(steps + 1, most)
         return np.arange(steps) * duration / steps
     # A millionth of a frame forgives the rounding of duration * rate.
     frames = math.floor((last - start) * rate + 1e-6) + 1
-    _check_count(frames)
+    _check_count(frames, most)
     return np.minimum(start + np.arange(frames) / rate, duration)
 
 
@@ -68,6 +69,6 @@ def closed(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswer[np
     )
 
 
-def _check_count(frames: int) -> None:
-    if frames > MOST_POSES:
-        raise InvalidField("fps", f"{frames} frames, expected at most {MOST_POSES}")
+def _check_count(frames: int, most: int) -> None:
+    if frames > most:
+        raise InvalidField("fps", f"{frames} frames, expected at most {most}")

@@ -27,12 +27,14 @@ ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 @dataclass(frozen=True)
 class Moments:
-    """A question for poses that has passed the door, and its times (S,), s, as they were given and
-    as the graph is asked."""
+    """A question for poses that has passed the door, its times (S,), s, as they were given and as
+    the graph is asked, and the earliest and the latest of them."""
 
     question: Question
     when: Floats
     asked: Floats
+    first: float
+    last: float
 
     @property
     def level(self) -> int:
@@ -138,9 +140,10 @@ class Synthesizer:
         # Whether a time is within the clip shows when the graph has said how long that is; what is
         # within none of them might be more than a float32 holds.
         longest = self._durations[1]
-        fits = 0.0 <= min(when) and max(when) <= longest
-        asked = np.array(when)
-        return Moments(question, asked, asked if fits else np.clip(asked, 0.0, longest))
+        first, last, given = min(when), max(when), np.array(when)
+        fits = 0.0 <= first and last <= longest
+        asked = given if fits else np.clip(given, 0.0, longest)
+        return Moments(question, given, asked, first, last)
 
     def poses(self, asked: Sequence[Moments]) -> list[Row]:
         """What the graph says to questions of as many times and of one level, in one call.
@@ -193,14 +196,14 @@ class Synthesizer:
         """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
         rotations, root, offsets, length, sigma = row
         duration = self._sensible(float(length))
-        if not (asked.when.min() >= 0.0 and asked.when.max() <= duration):
+        if not (asked.first >= 0.0 and asked.last <= duration):
             for index, value in enumerate(asked.when):
                 limits.within(f"times/{index}", value, 0.0, duration, "s")
         trust = self._trust(asked.question, duration, float(sigma))
         return PoseAnswer(asked.when, rotations, root, offsets, trust)
 
-    def clip(self, asked: ClipQuestion) -> ClipAnswer:
-        """Clip of the question; frame i is the pose at start + i / fps.
+    def clip(self, asked: ClipQuestion, most: int = course.MOST_POSES) -> ClipAnswer:
+        """Clip of the question, of at most so many frames; frame i is the pose at start + i / fps.
 
         The N steps of a loop share the duration evenly, but are played at fps. Raises as `pose`
         does, and InvalidField for a loop of what is no cycle and names that no role leads to.
@@ -209,7 +212,8 @@ class Synthesizer:
             asked.controls, asked.extrapolate, asked.performer, asked.level
         )
         joints = self._joints(asked)
-        answer = self._answer(question, course.times(asked, self._duration(question)))
+        when = course.times(asked, self._duration(question), most)
+        answer = self._answer(question, when)
         if asked.loop or asked.root == "in_place":
             answer = self._routed(question, answer, asked)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets

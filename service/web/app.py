@@ -16,13 +16,13 @@ from service.web import contract, cors, problems
 from service.web.access import policy
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
-from service.web.log import Lines
 from service.web.operations import OPERATIONS
 from service.web.problems import RequestFault
 from service.web.readiness import Readiness
 from service.web.routing import Map, Route
 from service.web.service import Handler, Service
 from service.web.settings import PREFIX, Settings
+from service.web.telling import SILENT, Telling
 
 FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd|sigma)\.([^/]+)")
 FORMATS = {
@@ -34,12 +34,10 @@ FORMATS = {
 }
 
 
-def create_app(
-    models: Library | Readiness, settings: Settings, lines: Lines | None = None
-) -> "App":
+def create_app(models: Library | Readiness, settings: Settings, telling: Telling = SILENT) -> "App":
     """Application that answers for the models of a library, or for those of a shelf, that may be
-    told to turn requests away, and tells of requests in lines."""
-    return build(contract.load(), OPERATIONS, models, settings, lines)
+    told to turn requests away; telling: where it tells of requests."""
+    return build(contract.load(), OPERATIONS, models, settings, telling)
 
 
 def build(
@@ -47,7 +45,7 @@ def build(
     handlers: Mapping[str, Handler],
     models: Library | Readiness,
     settings: Settings,
-    lines: Lines | None = None,
+    telling: Telling = SILENT,
 ) -> "App":
     """Application of a contract and the handlers of its operations.
 
@@ -59,7 +57,7 @@ def build(
     rules = policy.of(settings)
     policy.check_exposure(settings, rules)
     origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
-    service = Service(readiness, settings, agreed.source, rules, origins, lines)
+    service = Service(readiness, settings, agreed.source, rules, origins, telling)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

@@ -44,7 +44,7 @@ class Operation:
     @cached_property
     def pure(self) -> bool:
         """Whether its answer follows from the model and the request's line alone."""
-        return self.method == "GET" and "{model}" in self.path
+        return "304" in self.responses
 
 
 @dataclass(frozen=True)

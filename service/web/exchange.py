@@ -33,6 +33,7 @@ from service.web.deadline import Watch
 from service.web.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
 from service.web.routing import Map, Place, Route
 from service.web.service import Service
+from service.web.telling import trace
 
 faults = logging.getLogger(__name__)
 
@@ -67,6 +68,7 @@ class Exchange:
         self._coding: str | None = None
         self._tag: str | None = None
         self._status = self._size = 0
+        self._span = site.service.telling.begin(self._headers)
 
     async def run(self) -> None:
         """Answer, whatever happens, and note it."""
@@ -200,14 +202,16 @@ class Exchange:
         took = time.perf_counter() - self._begun
         operation = self._route.operation.id if self._route else "none"
         metrics.answered(operation, self._status, took, self._size)
-        if (lines := self._site.service.lines) is not None:
-            lines.add(self._line(operation, took))
+        telling = self._site.service.telling
+        if telling.wanted:
+            telling.end(self._span, self._line(operation, took))
 
     def _line(self, operation: str, took: float) -> dict[str, Any]:
         model = self._scope.get("model")
         return {
             "time": log.moment(time.time()),
             "request": self._identity,
+            "trace": trace(self._headers),
             "method": self._scope["method"],
             "operation": operation,
             "model": model.identity if model else None,

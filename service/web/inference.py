@@ -47,9 +47,9 @@ async def get_ready(service: Service, request: Request) -> Response:
 
 
 async def get_model(service: Service, request: Request) -> Response:
-    """A model's inputs and outputs."""
+    """A model's inputs and outputs; its versions are the hashes of its files."""
     model = _model(request)
-    card = model.session.card
+    card, versions = model.session.card, request.scope["library"].versions(model.name)
     inputs = [
         _port("controls", "FP32", [-1, len(card.controls)]),
         _port("time", "FP32", [-1, -1]),
@@ -59,7 +59,7 @@ async def get_model(service: Service, request: Request) -> Response:
     return answers.document(
         {
             "name": model.name,
-            "versions": [model.session.digest],
+            "versions": [each.session.digest for each in versions],
             "platform": "onnxruntime_onnx",
             "inputs": inputs,
             "outputs": [_port(name, "FP32", s) for name, s in _outputs(len(card.skeleton)).items()],

@@ -5,7 +5,7 @@ answers for all; prometheus_client reads that variable when it is imported.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -39,7 +39,16 @@ _OPEN = prometheus.Gauge(
     "posefield_open_requests", "Requests that are being answered", multiprocess_mode="livesum"
 )
 _MODEL = prometheus.Gauge(
-    "posefield_model", "1 for each version that answers", ("model", "hash"), multiprocess_mode="max"
+    "posefield_model",
+    "1 for each version that answers, 0 for one that did",
+    ("model", "hash"),
+    multiprocess_mode="mostrecent",
+)
+_LOOKS = prometheus.Gauge(
+    "posefield_reloads",
+    "Looks for new models, versions opened, attempts that failed, and faults there are now",
+    ("what",),
+    multiprocess_mode="mostrecent",
 )
 _BUILD = prometheus.Gauge(
     "posefield_build", "1; which version serves", ("version",), multiprocess_mode="max"
@@ -70,9 +79,17 @@ def opened(change: int) -> None:
     _OPEN.inc(change)
 
 
-def model(name: str, digest: str, answers: bool) -> None:
-    """Note that a version of a model answers, or no longer does."""
-    _MODEL.labels(name, digest).set(answers)
+def models(identities: Iterable[str], reloads: Mapping[str, int]) -> None:
+    """Note which versions of models answer, and what became of looking for new ones."""
+    now = {tuple(identity.split("@")) for identity in identities}
+    for labels in now | _known:
+        _MODEL.labels(*labels).set(labels in now)
+    _known.update(now)
+    for what, number in reloads.items():
+        _LOOKS.labels(what).set(number)
+
+
+_known: set[tuple[str, ...]] = set()
 
 
 def page() -> bytes:

@@ -76,7 +76,7 @@ def negotiated(offers: Mapping[str, str], handlers: Mapping[str, Handler]) -> Ha
 
 def format_of(request: Request, offers: Offers) -> str:
     """Format that the request prefers; RequestFault where it accepts none."""
-    lines = request.headers.getlist("accept")
+    lines = [value.decode("latin-1") for name, value in request["headers"] if name == b"accept"]
     if not lines:
         return offers[0][0]
     accept = ", ".join(lines)

@@ -7,13 +7,22 @@ from anyio import to_thread
 from starlette.requests import Request
 from starlette.responses import Response
 
-from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, CrowdEncoder, Encoder, poses
+from service.encode import (
+    CROWD_ENCODERS,
+    ENCODERS,
+    POSE_ENCODERS,
+    CrowdEncoder,
+    Encoder,
+    poses,
+    poses_within,
+)
 from service.encode import crowd as crowd_usd
 from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS, Pack
 from service.export import pack as packing
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
+from service.synthesis.course import MOST_POSES
 from service.synthesis.synthesizer import Moments, Row, Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
@@ -69,21 +78,23 @@ async def get_clip(encoder: Encoder, service: Service, request: Request) -> Resp
     """A clip in the encoder's format, asked for by query parameters."""
     model = _model(service, request)
     question = query.file_of_pairs(query.pairs(request.scope["query_string"]))
-    return await _clip(model, question, encoder)
+    return await _clip(service, model, question, encoder)
 
 
 async def query_clip(encoder: Encoder, service: Service, request: Request) -> Response:
     """A clip in the encoder's format, asked for by a body."""
     model = _model(service, request)
     content = await body.read(request, service.settings.body_limit)
-    return await _clip(model, query.file_of_body(content), encoder)
+    return await _clip(service, model, query.file_of_body(content), encoder)
 
 
 async def query_crowd(encoder: CrowdEncoder, service: Service, request: Request) -> Response:
     """Poses of a crowd in the encoder's format, asked for by a body."""
     model, settings = _model(service, request), service.settings
     content = await body.read(request, settings.crowd_body_limit)
-    most = min(settings.crowd_limit, encoder.most)
+    joints = len(model.session.card.skeleton)
+    fits = poses_within(settings.output_limit, joints, encoder.per_joint)
+    most = min(settings.crowd_limit, encoder.most, fits)
     made = await to_thread.run_sync(_crowd, model, encoder, content, most, limiter=CROWDS)
     return answers.attachment(made, encoder.media_type, f"{model.name}.{encoder.extension}")
 
@@ -145,6 +156,9 @@ async def ready(service: Service, request: Request) -> Response:
 
 async def get_metrics(service: Service, request: Request) -> Response:
     """What is counted, for Prometheus."""
+    reloads = service.readiness.models.reloads
+    counts = {"looks": reloads.looks, "opened": reloads.opened, "failed": reloads.failed}
+    metrics.models(service.library.identities, {**counts, "faults": len(reloads.faults)})
     return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
 
 
@@ -161,6 +175,7 @@ _FIXED: dict[str, Handler] = {
     **pose_operations.OPERATIONS,
     **sigma_operations.OPERATIONS,
     **why_operations.OPERATIONS,
+    **inference.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
     **{f"queryCrowd{n.capitalize()}": partial(query_crowd, e) for n, e in CROWD_ENCODERS.items()},
@@ -170,7 +185,6 @@ _FIXED: dict[str, Handler] = {
     "getLiveness": live,
     "getReadiness": ready,
     "getContract": get_contract,
-    **inference.OPERATIONS,
 }
 
 
@@ -212,9 +226,13 @@ def _posed(model: Synthesizer, asked: Moments, row: Row | None) -> bytes:
     return poses.json(model.posed(asked, row or model.poses([asked])[0]))
 
 
-async def _clip(model: Synthesizer, question: FileQuestion, encoder: Encoder) -> Response:
+async def _clip(
+    service: Service, model: Synthesizer, question: FileQuestion, encoder: Encoder
+) -> Response:
     convention = encoder.convention(question.unit, question.up)
-    answer = model.clip(question.clip)
+    joints = len(model.session.card.skeleton)
+    most = poses_within(service.settings.output_limit, joints, encoder.per_joint)
+    answer = model.clip(question.clip, min(most, MOST_POSES))
     quick = len(answer.clip) <= encoder.at_once
     content = await made(quick, partial(encoder.encode, answer, convention))
     return answers.file(content, encoder, answer.trust)

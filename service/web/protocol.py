@@ -9,7 +9,7 @@ import httptools
 from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
-from service.web import problems
+from service.web import refusals
 from service.web.patience import FIELDS, PERIOD, Limits, Watch
 from service.web.problems import RequestFault
 from service.web.wire import SLOWEST, Wire
@@ -87,7 +87,7 @@ class Bounded(HttpToolsProtocol):
             self._read_again(data[upgrade.args[0] :])
             return
         except httptools.HttpParserError as broken:
-            self._refuse(self.fault or RequestFault(problems.MALFORMED, _said(broken)))
+            self._refuse(self.fault or refusals.of_parser(broken))
             return
         if self.phase is HEAD:
             self._check_unfinished_head()
@@ -125,7 +125,8 @@ class Bounded(HttpToolsProtocol):
         self.headers = []
         self.phase, self.since = BODY, self.loop.time()
         if len(self.pipeline) >= PIPELINE:
-            raise self._fault(problems.MALFORMED, f"more than {PIPELINE} requests ahead of answers")
+            self.fault = refusals.malformed(f"more than {PIPELINE} requests ahead of answers")
+            raise self.fault
 
     def on_body(self, body: bytes) -> None:
         self.body += len(body)
@@ -197,12 +198,12 @@ class Bounded(HttpToolsProtocol):
         if self.phase is IDLE and waited > limits.idle_time:
             self.transport.close()
         elif self.phase is HEAD and answered and waited > limits.head_time:
-            self._refuse(self._too_slow("head", limits.head_time))
+            self._refuse(refusals.too_slow("head", limits.head_time))
         elif self.phase is BODY and waited > limits.body_time + self.body / SLOWEST:
             if answered:
                 self.transport.close()
             else:
-                self._refuse(self._too_slow("body", limits.body_time))
+                self._refuse(refusals.too_slow("body", limits.body_time))
 
     def _make_room(self) -> None:
         unused = [c for c in self.connections if isinstance(c, Bounded) and c.is_unused(self)]
@@ -211,9 +212,7 @@ class Bounded(HttpToolsProtocol):
         elif len(self.connections) > 2 * self.limits.connections:
             self.wire.abort()
         else:
-            detail = f"{self.limits.connections} are open, expected fewer"
-            later = {"Retry-After": "1"}
-            self._refuse(RequestFault(problems.NO_CONNECTION_LEFT, detail, headers=later))
+            self._refuse(refusals.no_connection_left(self.limits))
 
     def is_unused(self, other: "Bounded") -> bool:
         """Whether nothing is being asked here, and another has more use for the place."""
@@ -221,57 +220,31 @@ class Bounded(HttpToolsProtocol):
 
     # What is refused ----------------------------------------------------------------------------
 
-    def _fault(self, kind: problems.Kind, detail: str) -> RequestFault:
-        # The parser tells of an exception in what it calls, but not which one.
-        self.fault = RequestFault(kind, detail)
-        return self.fault
-
     def _check_head(self) -> None:
-        limits, version = self.limits, self.parser.get_http_version()
-        codings, self.codings = self.codings, []
-        if len(self.url) > limits.url:
-            raise self._too_long()
-        if sum(len(n) + len(v) + 4 for n, v in self.headers) > limits.head:
-            raise self._too_large()
-        if len(self.headers) > FIELDS:
-            raise self._too_large()
-        if version not in ("1.1", "1.0"):
-            raise self._fault(problems.MALFORMED, f"HTTP/{version}, expected HTTP/1.1")
-        if self.hosts != 1 and (version == "1.1" or self.hosts):
-            # Who reads one of two, and who the other, do not see the same request (RFC 9112, 3.2).
-            raise self._fault(problems.MALFORMED, f"{self.hosts} Host headers, expected one")
-        if codings and (codings != [b"chunked"] or version != "1.1"):
-            raise self._fault(problems.MALFORMED, "Transfer-Encoding, expected none or chunked")
+        version = self.parser.get_http_version()
+        head = refusals.Head(self.url, self.headers, self.hosts, self.codings, version)
+        self.codings = []
+        if fault := refusals.of_head(head, self.limits):
+            # The parser tells of an exception in what it calls, but not which one.
+            self.fault = fault
+            raise fault
 
     def _check_unfinished_head(self) -> None:
         if len(self.url) > self.limits.url:
-            self._refuse(self._too_long())
+            self._refuse(refusals.too_long(self.limits))
         elif self.after > self.limits.most:
-            self._refuse(self._too_large())
+            self._refuse(refusals.too_large(self.limits))
 
     def _check_framing(self) -> None:
         """Chunk sizes may have extensions, and bodies trailers: without end, if nobody counts."""
         if self.after - self.body * FRAMING > 2 * self.limits.most:
-            self._refuse(self._fault(problems.MALFORMED, "a chunked body of hardly any content"))
-
-    def _too_long(self) -> RequestFault:
-        most = self.limits.url
-        return self._fault(
-            problems.URL_TOO_LONG, f"more than {most} bytes, expected at most {most}"
-        )
-
-    def _too_large(self) -> RequestFault:
-        detail = f"expected at most {self.limits.head} bytes in at most {FIELDS} headers"
-        return self._fault(problems.HEAD_TOO_LARGE, detail)
-
-    def _too_slow(self, what: str, seconds: int) -> RequestFault:
-        return self._fault(problems.TOO_SLOW, f"its {what} was expected within {seconds} seconds")
+            self._refuse(refusals.malformed("a chunked body of hardly any content"))
 
     def _read_again(self, rest: bytes) -> None:
         """Read a request as if it did not want another protocol, which RFC 9110, 7.8 allows."""
         method = self.parser.get_method()
         if method == b"CONNECT":
-            self._refuse(RequestFault(problems.MALFORMED, "CONNECT: this is no proxy"))
+            self._refuse(refusals.malformed("CONNECT: this is no proxy"))
             return
         fields = [b"%b: %b\r\n" % pair for pair in self.headers if pair[0] != b"upgrade"]
         head = b"%b %b HTTP/1.1\r\n%b\r\n" % (method, self.url, b"".join(fields))
@@ -336,9 +309,3 @@ class Bounded(HttpToolsProtocol):
 
 
 _OF_READING = frozenset({b"host", b"transfer-encoding", b"expect"})
-
-
-def _said(broken: httptools.HttpParserError) -> str:
-    if isinstance(broken, httptools.HttpParserCallbackError):
-        return "its URL cannot be read"
-    return f"{broken}"

@@ -11,12 +11,12 @@ import uvicorn
 
 from service.synthesis.library import Bounds
 from service.synthesis.shelf import Shelf
-from service.web import listening, log, metrics, patience, protocol, workers
+from service.web import listening, log, metrics, patience, protocol, tracing, workers
 from service.web.app import create_app
 from service.web.draining import Ending, Server
-from service.web.log import Lines
 from service.web.readiness import Readiness
 from service.web.settings import Settings
+from service.web.telling import Telling
 from service.web.workers import Hooks, Work
 
 
@@ -57,8 +57,9 @@ def answer(
     shelf = Shelf(work.places, Bounds(settings.versions, settings.versions_memory))
     readiness = Readiness(shelf)
     lines = log.to_standard_error() if settings.log == "on" else None
+    telling = Telling(lines, tracing.of())
     server = Server(
-        _config(readiness, settings, lines),
+        _config(readiness, settings, telling),
         readiness,
         Ending(settings.drain, settings.grace),
         lambda: listens([*shelf.library.models]),
@@ -66,8 +67,7 @@ def answer(
     )
     with shelf.watched(settings.reload):
         server.run(work.sockets)
-    if lines is not None:
-        lines.flush()
+    telling.close()
     if server.cut_off:
         # A thread that is not done would hold the process up.
         logging.shutdown()
@@ -75,9 +75,9 @@ def answer(
         os._exit(0)
 
 
-def _config(readiness: Readiness, settings: Settings, lines: Lines | None) -> uvicorn.Config:
+def _config(readiness: Readiness, settings: Settings, telling: Telling) -> uvicorn.Config:
     return uvicorn.Config(
-        create_app(readiness, settings, lines),
+        create_app(readiness, settings, telling),
         # Named, not "auto": without them the service would run at a fraction of its speed.
         loop="uvloop",
         http=protocol.bounded(patience.of(settings)),

@@ -14,9 +14,9 @@ from service.synthesis.synthesizer import Synthesizer
 from service.web import caching
 from service.web.access.policy import Policy
 from service.web.batching import Batcher
-from service.web.log import Lines
 from service.web.readiness import Readiness
 from service.web.settings import Settings
+from service.web.telling import SILENT, Telling
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
 CROWDS = CapacityLimiter(os.cpu_count() or 1)
@@ -32,7 +32,7 @@ class Service:
     source: bytes
     rules: Policy
     origins: frozenset[bytes] = frozenset()
-    lines: Lines | None = None
+    telling: Telling = SILENT
     code: bytes = field(default_factory=caching.code)
     batcher: Batcher = field(default_factory=Batcher)
 

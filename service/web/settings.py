@@ -17,16 +17,16 @@ class Settings:
     crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
     crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
     that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
-    grid_limit: points of a grid of sigma. grace: seconds that open requests get to finish after
-    SIGTERM, and drain: seconds before that in which the service still listens, but says that it is
-    not ready. workers: processes that share the port; 0 for as many as there are processors.
-    reload: seconds from a look for new models to the next; 0 for never. versions: older versions of
-    a model that answer under their hash, and versions_memory: bytes that all of those may take.
-    concurrency: requests that a process answers at a time, and deadline: seconds until an answer
-    has to begin. alias_seconds: how long caches may use an answer under a model's plain name
-    without asking whether it is the newest's. log: whether each request is told on standard error,
-    in one line. inference_body_limit: bytes of a body of tensors, and inference_poses: rows times
-    times of one.
+    grid_limit: points of a grid of sigma. output_limit: bytes of a clip or a crowd's poses.
+    grace: seconds that open requests get to finish after SIGTERM, and drain: seconds before that in
+    which the service still listens, but says that it is not ready. workers: processes that share
+    the port; 0 for as many as there are processors. reload: seconds from a look for new models to
+    the next; 0 for never. versions: older versions of a model that answer under their hash, and
+    versions_memory: bytes that all of those may take. concurrency: requests that a process answers
+    at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long caches
+    may use an answer under a model's plain name without asking whether it is the newest's. log:
+    whether each request is told on standard error, in one line. inference_body_limit: bytes of a
+    body of tensors, and inference_poses: rows times times of one.
 
     url_limit, head_limit: bytes of a URL, and of all header lines. head_time, body_time: seconds in
     which a request's head and body have to arrive; idle_time: seconds that an unused connection
@@ -55,6 +55,7 @@ class Settings:
     clips_poses: int = 1_000_000
     # 50 ms of work.
     grid_limit: int = 65_536
+    output_limit: int = 256 * 1024 * 1024
     inference_body_limit: int = 32 * 1024 * 1024
     inference_poses: int = 100_000
     grace: int = 10
@@ -99,6 +100,7 @@ class Settings:
         _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("output_limit", self.output_limit, 64 * 1024, 1 << 34)
         _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
         _within("inference_body_limit", self.inference_body_limit, 1, 1024 * 1024 * 1024)
         _within("inference_poses", self.inference_poses, 1, 10_000_000)

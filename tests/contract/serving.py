@@ -23,7 +23,7 @@ def process(*paths, **environ):
 
 @contextlib.contextmanager
 def started(command, **environ):
-    """A command that serves, on a free port and without a line a request if nothing else is said."""
+    """A command that serves, on a free port and without lines of requests unless told otherwise."""
     given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", **environ}
     pipe = subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, env=given, stdout=pipe, stderr=pipe) as child:

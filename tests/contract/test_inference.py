@@ -12,6 +12,7 @@ from asking import asker
 from service import __version__
 from service.synthesis import library
 from service.synthesis.session import OUTPUTS
+from service.synthesis.synthesizer import Synthesizer
 from service.web.app import create_app
 from service.web.settings import Settings
 
@@ -184,6 +185,32 @@ def test_a_version_is_a_hash_and_an_id_comes_back(ask, loaded, tensors):
     assert ask("POST", f"{PATH}/infer", json=twice).status_code == 200
     assert ask("GET", f"{PATH}/versions/{digest}").json() == ask("GET", PATH).json()
     assert ask("GET", f"{PATH}@{digest}/ready").json() == {"name": "reach", "ready": True}
+
+
+def test_it_is_ready_when_the_service_is(ask):
+    assert ask("GET", "/v2/health/live").json() == {"live": True}
+    assert ask("GET", "/v2/health/ready").json() == {"ready": True}
+    answer = asker(create_app(library.Library({}), Settings()))("GET", "/v2/health/ready")
+    assert (answer.status_code, answer.json()["error"]) == (503, "there is no model")
+
+
+def test_all_versions_that_answer_are_listed(loaded, model_path, tensors):
+    newest = loaded.find("reach")
+    before = Synthesizer("reach", library.load([model_path]).find("reaching").session)
+    both = asker(create_app(library.Library({"reach": newest}, (before,)), Settings()))
+    digests = [newest.session.digest, before.session.digest]
+    assert both("GET", PATH).json()["versions"] == digests
+    asked = question(tensors)
+    for digest in digests:
+        answer = both("POST", f"{PATH}/versions/{digest}/infer", json=asked).json()
+        assert answer["model_version"] == digest
+
+
+def test_what_answers_now_is_kept_by_nobody(ask, loaded):
+    versions = f"{PATH}/versions/{loaded.find('reach').session.digest}"
+    for path in (PATH, f"{PATH}/ready", versions, f"{versions}/ready"):
+        headers = ask("GET", path).headers
+        assert (headers["cache-control"], "etag" in headers) == ("no-store", False)
 
 
 def test_what_lies_outside_the_samples_is_said(ask, tensors):

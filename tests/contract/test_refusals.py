@@ -311,3 +311,15 @@ def test_a_time_that_no_float32_holds_is_refused_like_any_other(time, refuse, co
     )
     assert problem["errors"][0]["pointer"] == "/times/0"
     assert "expected 0 to" in problem["detail"]
+
+
+def test_an_answer_too_large_to_make_is_not_made(loaded, controls, monkeypatch):
+    model = loaded.find("reach")
+    small = asker(create_app(loaded, Settings(output_limit=64 * 1024)))
+    url = f"/v1/models/reach/clip.usda?{urlencode({**controls, 'fps': 1000})}"
+    monkeypatch.setattr(type(model), "_answer", None)
+    answer = small("GET", url)
+    assert answer.status_code == 422 and "frames, expected at most" in answer.json()["detail"]
+    few = {"controls": {n: [v] * 200 for n, v in controls.items()}, "time": 0}
+    answer = small("POST", "/v1/models/reach/crowd.arrow", json=few)
+    assert answer.status_code == 422 and "200 characters, expected 1 to" in answer.json()["detail"]

@@ -8,9 +8,10 @@ import pytest
 from asking import asker
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.web import log
+from service.web import log, metrics
 from service.web.app import create_app
 from service.web.settings import Settings
+from service.web.telling import Telling
 
 
 def value(page, name, **labels):
@@ -68,7 +69,7 @@ def told(loaded):
     def asked(*args, **given):
         source, target = os.pipe()
         lines = log.Lines(target)
-        answer = asker(create_app(loaded, Settings(), lines))(*args, **given)
+        answer = asker(create_app(loaded, Settings(), Telling(lines)))(*args, **given)
         lines.flush()
         os.close(target)
         with os.fdopen(source, "rb") as found:
@@ -93,6 +94,7 @@ def test_a_request_is_one_line(told, loaded, controls):
 LINE = (
     "time",
     "request",
+    "trace",
     "method",
     "operation",
     "model",
@@ -122,3 +124,27 @@ def test_lines_are_written_whole():
     assert b"".join(pieces) == b"".join([*short, *long, *short])
     assert [len(p) for p in pieces if b"y" not in p] == [4000, 4000, 2000] * 2
     assert b"y" * 9000 in pieces
+
+
+def test_a_line_names_the_trace_of_its_request(told):
+    parent = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"
+    _, (line,) = told("GET", "/livez", headers={"traceparent": parent})
+    assert line["trace"] == "4bf92f3577b34da6a3ce929d0e0e4736"
+    for strange in ("00-xyz-00f067aa0ba902b7-01", parent + "-more", ""):
+        _, (line,) = told("GET", "/livez", headers={"traceparent": strange})
+        assert line["trace"] is None
+
+
+def test_versions_of_models_are_shown_while_they_answer(ask, loaded):
+    page = ask("GET", "/metrics").text
+    for identity in loaded.identities:
+        name, digest = identity.split("@")
+        assert value(page, "posefield_model", model=name, hash=digest) == 1.0
+    assert value(page, "posefield_reloads", what="faults") == 0.0
+
+
+def test_a_version_that_is_gone_is_shown_to_be():
+    metrics.models(["gone@0123456789abcdef"], {})
+    metrics.models([], {})
+    page = metrics.page().decode()
+    assert 'posefield_model{hash="0123456789abcdef",model="gone"} 0.0' in page

@@ -1,23 +1,27 @@
 """The image runs where it may write nothing, and answers there what the service answers here."""
 
+import json
 import os
 import signal
-import socket
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import debian
 import httpx
 import image
+import running
 import trained
 from image import Image
 
 from service import __version__
 from service.encode import ENCODERS, poses
 from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+from service.web.access import keys
 
 # What the Dockerfile adds to its base: 334 MB were measured, 428 before anything was left out.
 BUDGET = 350_000_000
@@ -35,7 +39,9 @@ def faults() -> list[str]:
     with image.built() as built, tempfile.TemporaryDirectory() as name:
         print(f"image in {time.monotonic() - began:.0f} s: {built.own / 1e6:.0f} MB", end=" ")
         print(f"on a base of {built.base / 1e6:.0f}")
-        found = [*_described(built), *_jailed(built, Path(name)), *_served(built, Path(name))]
+        folder = Path(name)
+        found = [*_described(built), *_listed(built)]
+        found += [*_jailed(built, folder), *_served(built, folder)]
     return [f"image: {fault}" for fault in found]
 
 
@@ -67,6 +73,21 @@ def _described(built: Image) -> Iterator[str]:
         yield f"{built.own} bytes beyond the base, expected at most {BUDGET}"
 
 
+def _listed(built: Image) -> Iterator[str]:
+    """Faults of the bill of materials: what it names has to be what is installed."""
+    content = (built.root / "opt/posefield/share/sbom.cdx.json").read_bytes()
+    bill = json.loads(content)
+    named = {each["name"] for each in bill["components"]} | {bill["metadata"]["component"]["name"]}
+    (packages,) = built.root.glob("opt/posefield/lib/python*/site-packages")
+    there = {dist.name for dist in metadata.distributions(path=[str(packages)])}
+    if (found := {*map(_plain, named)}) != (expected := {*map(_plain, there)}):
+        yield f"only in the bill or only installed: {sorted(found ^ expected)}"
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "-").replace(".", "-")
+
+
 def _jailed(built: Image, folder: Path) -> Iterator[str]:
     """Faults of the container itself: what is tested in it has to be one."""
     script = "id -u; id -g; grep -E '^(CapEff|NoNewPrivs)' /proc/self/status"
@@ -85,29 +106,35 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
     models, temporary = _places(folder)
     model, content = trained.family()
     (models / "reaching.onnx").write_bytes(content)
-    port = str(_free_port())
+    port, key = str(running.ports(1)[0]), keys.make()
     told = {"POSEFIELD_PORT": port}
     health = built.config["Healthcheck"]["Test"][1:]
     command = [*built.config["Entrypoint"], *built.config["Cmd"]]
     if _run(built, health, folder, **told)[2] == 0:
         yield "healthy before it was started"
+    if "POSEFIELD_KEYS" not in (said := _run(built, command, folder, **told)[1]):
+        yield f"without keys it says {said!r}"
+    told["POSEFIELD_KEYS"] = keys.line("somebody", ["read:*"], key)
     began = time.monotonic()
     with built.start(command, models, temporary, **told) as jail:
         line = jail.stdout.readline().decode() if jail.stdout else ""
         print(f"it answers after {time.monotonic() - began:.1f} s: {line}", end="")
         if line:
-            yield from _answers(f"http://127.0.0.1:{port}", model)
+            yield from _answers(f"http://127.0.0.1:{port}", key, model)
             if _run(built, health, folder, **told)[2]:
                 yield "not healthy while it answers"
             os.kill(_first(jail.pid), signal.SIGTERM)
         said, complaint = jail.communicate(timeout=PATIENCE)
-    if (jail.returncode, said, complaint) != (0, b"", b""):
+    if (jail.returncode, said) != (0, b""):
         yield f"SIGTERM ends it with {jail.returncode}, {said!r} {complaint!r}"
+    statuses = [json.loads(line)["status"] for line in complaint.splitlines()]
+    if set(statuses) != {httpx.codes.OK}:
+        yield f"requests of statuses {statuses}"
     if left := sorted(path.name for path in temporary.iterdir()):
         yield f"it leaves {left} in /tmp"
 
 
-def _answers(url: str, model: trained.Synthesizer) -> Iterator[str]:
+def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
     """Faults of answers, which have to be those of here to the last byte."""
     controls = {control.name: control.default for control in model.session.card.controls}
     clip = model.clip(ClipQuestion(controls))
@@ -117,7 +144,8 @@ def _answers(url: str, model: trained.Synthesizer) -> Iterator[str]:
             clip, ENCODERS["usdc"].convention(None, None)
         ),
     }
-    with httpx.Client(base_url=url, timeout=STILL) as client:
+    known = {"Authorization": f"Bearer {key}"}
+    with httpx.Client(base_url=url, timeout=STILL, headers=known) as client:
         for path in ("/livez", "/readyz"):
             if (status := client.get(path).status_code) != httpx.codes.OK:
                 yield f"{path} answers {status}"
@@ -150,11 +178,6 @@ def _places(folder: Path) -> tuple[Path, Path]:
 def _first(unshare: int) -> int:
     """The container's first process, which unshare started, as it is numbered here."""
     return int(Path(f"/proc/{unshare}/task/{unshare}/children").read_text())
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as held:
-        return int(held.getsockname()[1])
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 """The programs that read our files: Blender as a Python module, three.js on Node, and the Khronos
-glTF validator beside it.
+glTF validator beside it; and what else is installed for the checks.
 
 Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender and Node are
 fetched where they are missing.
@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -28,33 +29,32 @@ LIBRARIES = (
 def prepare() -> tuple[Path, Path]:
     """The Python that has Blender and the node beside three.js, installed when they are not."""
     python = _blender()
-    return python, _three()
+    found = node()
+    modules(THREE, NODE_PACKAGES, *found)
+    return python, found[0]
 
 
-def _blender() -> Path:
-    python = BLENDER / "bin" / "python"
-    if _once(BLENDER / ".installed", " ".join(PACKAGES)):
-        _run(sys.executable, "-m", "venv", BLENDER)
-        _run(python, "-m", "pip", "install", "--quiet", *PACKAGES)
-        _done(BLENDER / ".installed", " ".join(PACKAGES))
-    if not _imports(python):
-        _libraries()
-        if not _imports(python):
-            sys.exit(f"Blender does not start; install {' '.join(LIBRARIES)} (Debian's names)")
+def packages(venv: Path, wanted: Sequence[str]) -> Path:
+    """The Python of an environment that has the packages, installed when it has not."""
+    python, stamp = venv / "bin" / "python", venv / ".installed"
+    if _once(stamp, " ".join(wanted)):
+        _run(sys.executable, "-m", "venv", venv)
+        _run(python, "-m", "pip", "install", "--quiet", *wanted)
+        _done(stamp, " ".join(wanted))
     return python
 
 
-def _three() -> Path:
-    node, npm = _node()
-    wanted = " ".join(NODE_PACKAGES)
-    if _once(THREE / ".installed", wanted):
-        THREE.mkdir(parents=True, exist_ok=True)
-        _run(npm, "install", "--silent", "--no-save", "--prefix", THREE, *NODE_PACKAGES, node=node)
-        _done(THREE / ".installed", wanted)
-    return node
+def modules(folder: Path, wanted: Sequence[str], node: Path, npm: Path) -> Path:
+    """The node_modules that have the packages, installed when they have not."""
+    stamp = folder / ".installed"
+    if _once(stamp, " ".join(wanted)):
+        folder.mkdir(parents=True, exist_ok=True)
+        _run(npm, "install", "--silent", "--no-save", "--prefix", folder, *wanted, node=node)
+        _done(stamp, " ".join(wanted))
+    return folder / "node_modules"
 
 
-def _node() -> tuple[Path, Path]:
+def node() -> tuple[Path, Path]:
     """node and npm of the machine, else of a wheel that holds them."""
     found = [shutil.which(name) for name in ("node", "npm")]
     if all(found):
@@ -63,6 +63,15 @@ def _node() -> tuple[Path, Path]:
     if not (folder / "npm").exists():
         _run(folder / "python", "-m", "pip", "install", "--quiet", NODE)
     return folder / "node", folder / "npm"
+
+
+def _blender() -> Path:
+    python = packages(BLENDER, PACKAGES)
+    if not _imports(python):
+        _libraries()
+        if not _imports(python):
+            sys.exit(f"Blender does not start; install {' '.join(LIBRARIES)} (Debian's names)")
+    return python
 
 
 def _libraries() -> None:

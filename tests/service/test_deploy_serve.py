@@ -9,7 +9,9 @@ import pytest
 import yaml
 
 import service
-from service.web import contract
+from service.motion.errors import InvalidField
+from service.web import contract, draining, settings
+from service.web.access import keys, policy
 from service.web.settings import PREFIX, Settings
 
 DEPLOY = Path(service.__file__).parent / "deploy"
@@ -142,11 +144,33 @@ def test_variables_are_settings(container):
 
 
 def test_a_pod_that_goes_has_the_time_it_needs(pod, container):
-    quiet = container["lifecycle"]["preStop"]["sleep"]["seconds"]
-    grace = int(environment(container)["POSEFIELD_GRACE"])
+    drain, grace = (int(environment(container)[f"POSEFIELD_{n}"]) for n in ("DRAIN", "GRACE"))
     # Endpoints are forgotten everywhere within some seconds.
-    assert quiet >= 5
-    assert pod["spec"]["terminationGracePeriodSeconds"] >= quiet + grace + 5
+    assert drain >= 5
+    assert pod["spec"]["terminationGracePeriodSeconds"] >= drain + draining.LINGER + grace + 4
+
+
+def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path):
+    """As the service itself checks them before it listens; the address is the image's."""
+    mounted = tmp_path / "keys"
+    mounted.write_text(keys.line("blender", ["read:*"], keys.make()) + "\n")
+    given = environment(container) | {"POSEFIELD_HOST": "0.0.0.0"}
+    assert given["POSEFIELD_KEYS_FILE"] == "/keys/keys"
+    given["POSEFIELD_KEYS_FILE"] = str(mounted)
+    own = settings.read(environ=given)
+    policy.check_exposure(own, policy.of(own))
+    # Negative control.
+    del given["POSEFIELD_KEYS_FILE"]
+    open_to_all = settings.read(environ=given)
+    with pytest.raises(InvalidField, match="POSEFIELD_KEYS_FILE"):
+        policy.check_exposure(open_to_all, policy.of(open_to_all))
+
+
+def test_what_is_counted_can_be_read(pod, container):
+    told = pod["metadata"]["annotations"]
+    assert told["prometheus.io/port"] == environment(container)["POSEFIELD_PORT"]
+    (operation,) = (o for o in contract.load().operations if o.id == "getMetrics")
+    assert told["prometheus.io/path"] == operation.path
 
 
 def test_a_pod_may_do_little(pod, container):
@@ -158,7 +182,7 @@ def test_a_pod_may_do_little(pod, container):
     assert own["capabilities"] == {"drop": ["ALL"]}
     assert pod["spec"]["automountServiceAccountToken"] is False
     mounts = {each["mountPath"]: each.get("readOnly", False) for each in container["volumeMounts"]}
-    assert mounts == {"/models": True, "/tmp": False}
+    assert mounts == {"/models": True, "/keys": True, "/tmp": False}
     assert container["args"] == ["/models"]
     volumes = {volume["name"] for volume in pod["spec"]["volumes"]}
     assert {each["name"] for each in container["volumeMounts"]} == volumes

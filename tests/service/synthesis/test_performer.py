@@ -38,13 +38,17 @@ def test_performers_move_each_in_their_own_way(model):
         assert one.trust.performer == (*NAMES, None)[i]
 
 
+# A pose is asked for twice: alone it would be summed in another order.
+TWICE = np.array([[0.5], [0.5]])
+
+
 def test_the_answer_for_a_name_is_that_of_its_label(model):
     point = np.array([[POINT[c.name] for c in model.session.card.controls]])
     for name, label in zip(NAMES, np.eye(3), strict=True):
         answer = model.pose(POINT, [0.5], "warn", name)
         rotations = [
-            model.session.run(point, np.array([[0.5]]), "rotations", labels=labels)[0][0, 0]
-            for labels in (label[None], np.roll(label, 1)[None])
+            model.session.run(point.repeat(2, 0), TWICE, "rotations", labels=labels)[0][0, 0]
+            for labels in (np.tile(label, (2, 1)), np.tile(np.roll(label, 1), (2, 1)))
         ]
         assert np.array_equal(answer.rotations[0], rotations[0])
         assert not np.array_equal(answer.rotations[0], rotations[1])

@@ -295,10 +295,11 @@ def test_a_whole_rate_is_a_number_like_any_other(model):
     assert repr(rate) == repr(30.0) != repr(30)
 
 
-def test_answers_are_float64_whatever_the_graph_speaks(model):
-    answer = model.pose(POINT, [0.5], "warn")
-    arrays = (answer.times, answer.rotations, answer.root_position, answer.bone_offsets)
-    assert {array.dtype for array in arrays} == {np.dtype(np.float64)}
+def test_clips_are_float64_and_poses_what_the_graph_speaks(model):
+    pose, clip = model.pose(POINT, [0.5], "warn"), model.clip(ClipQuestion(POINT)).clip
+    arrays = (pose.rotations, pose.root_position, pose.bone_offsets)
+    assert {array.dtype for array in arrays} == {np.dtype(np.float32)}
+    assert {array.dtype for array in (clip.rotations, clip.translations)} == {np.dtype(np.float64)}
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import json
 import math
+from urllib.parse import parse_qsl
 
 import pytest
 from hypothesis import given
@@ -72,3 +73,9 @@ def test_any_text_is_a_finite_number_or_refused(text):
 def test_any_bytes_are_a_question_or_refused(content):
     with pytest.raises(RequestFault):
         query.pose_of_body(content)
+
+
+@given(st.text(alphabet="ab&=;%+2f é", max_size=24))
+def test_a_query_is_read_as_the_standard_library_reads_it(text):
+    raw = text.encode()
+    assert query.pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)

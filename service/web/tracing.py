@@ -1,0 +1,77 @@
+"""Traces for OpenTelemetry, where OTEL_EXPORTER_OTLP_ENDPOINT says where to: a span a request.
+
+Its own middleware takes as long as a pose does, sampled or not; here nothing is done without an
+endpoint, and little with one. The SDK reads its own variables (OTEL_SERVICE_NAME and others).
+"""
+
+import importlib
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from service import __version__
+from service.motion.errors import InvalidField
+
+ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
+_CONTEXT = (b"traceparent", b"tracestate")
+
+
+class Tracer:
+    """Begins and ends spans of a provider of OpenTelemetry's SDK."""
+
+    def __init__(self, provider: Any) -> None:
+        self._provider = provider
+        self._tracer = provider.get_tracer("posefield", __version__)
+        self._trace = importlib.import_module("opentelemetry.trace")
+        context = importlib.import_module("opentelemetry.trace.propagation.tracecontext")
+        self._propagator = context.TraceContextTextMapPropagator()
+
+    def begin(self, headers: Mapping[bytes, bytes]) -> Any:
+        """Span of a request with these headers, within the trace that they name."""
+        carrier = {n.decode(): headers[n].decode("latin-1") for n in _CONTEXT if n in headers}
+        context = self._propagator.extract(carrier)
+        return self._tracer.start_span("request", context, self._trace.SpanKind.SERVER)
+
+    def end(self, span: Any, line: Mapping[str, Any]) -> None:
+        """End a span with what the log says of the request."""
+        span.update_name(f"{line['method']} {line['operation']}")
+        for name, field in _ATTRIBUTES.items():
+            if line[field] is not None:
+                span.set_attribute(name, line[field])
+        if line["status"] >= 500:
+            span.set_status(self._trace.StatusCode.ERROR)
+        span.end()
+
+    def close(self) -> None:
+        """Send what is held."""
+        self._provider.shutdown()
+
+
+_ATTRIBUTES = {
+    "http.request.method": "method",
+    "http.response.status_code": "status",
+    "http.response.body.size": "bytes",
+    "posefield.operation": "operation",
+    "posefield.model": "model",
+    "posefield.request": "request",
+}
+
+
+def of(environ: Mapping[str, str] = os.environ) -> Tracer | None:
+    """Tracer that sends spans to the endpoint that is set; none where there is none.
+
+    Raises InvalidField where one is set and the SDK is not installed.
+    """
+    named = [name for name in ENDPOINTS if environ.get(name)]
+    if not named:
+        return None
+    try:
+        sdk = importlib.import_module("opentelemetry.sdk.trace")
+        export = importlib.import_module("opentelemetry.sdk.trace.export")
+        otlp = importlib.import_module("opentelemetry.exporter.otlp.proto.http.trace_exporter")
+    except ModuleNotFoundError as fault:
+        said = f"is set, and {fault.name} is missing; expected posefield[trace]"
+        raise InvalidField(named[0], said) from fault
+    provider = sdk.TracerProvider()
+    provider.add_span_processor(export.BatchSpanProcessor(otlp.OTLPSpanExporter()))
+    return Tracer(provider)

@@ -1,0 +1,182 @@
+"""No name, path or address from a client reaches the file system or the network.
+
+The real process tells of whatever is asked of the system in a client's words: Python's audit
+events, and, where strace is installed, system calls, those of libraries in C++ among them.
+"""
+
+import copy
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+from asking import exchange
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[1] / "api/examples"
+
+NAMES = [
+    "canary",
+    "../../canary",
+    "/etc/canary",
+    "..%2f..%2fcanary",
+    "reach@../canary",
+    "canary.onnx",
+    "~/canary",
+    "file:///canary",
+    "http://127.0.0.1:9/canary",
+    "s3://canary/x",
+    "@canary@</Root>",
+    "C:\\canary",
+    "canary\x00.usda",
+    "${HOME}/canary",
+    "$(touch canary)",
+    "|canary",
+]
+HEADERS = ("X-Request-Id", "Accept", "Authorization", "Prefer", "Traceparent", "If-None-Match")
+
+
+def asked():
+    """The examples of the whole contract, with a file's name in each place where a word may be."""
+    for folder in sorted(EXAMPLES.iterdir()):
+        example = json.loads((folder / "request.json").read_bytes())
+        every = [(name, changed) for name in NAMES for changed in mutations(example, name)]
+        # All names in all places would be some 15,000 requests.
+        yield from (
+            request(c) for i, (name, c) in enumerate(every) if name == "canary" or i % 7 == 0
+        )
+
+
+def mutations(example, name):
+    """The example with one thing changed into the name, for each thing."""
+    head, _, query = example["path"].partition("?")
+    parts, pairs = head.split("/"), query.split("&") if query else []
+    word = quote(name, safe="%")
+    for index in range(1, len(parts)):
+        stem, dot, ending = parts[index].partition(".")
+        for part in {word, f"{word}{dot}{ending}", f"{stem}.{word}"}:
+            path = "/".join([*parts[:index], part, *parts[index + 1 :]])
+            yield {**example, "path": f"{path}?{query}"}
+    for index, pair in enumerate(pairs):
+        key, _, value = pair.partition("=")
+        for other in (f"{key}={word}", f"{word}={value}"):
+            changed = [*pairs[:index], other, *pairs[index + 1 :]]
+            yield {**example, "path": f"{head}?{'&'.join(changed)}"}
+    for key in ("performer", "names", "format", "camera", "paths", "url", "file"):
+        yield {**example, "path": f"{example['path']}{'&' if query else '?'}{key}={word}"}
+    if "body" in example:
+        for body in changed_bodies(example["body"], name):
+            yield {**example, "body": body}
+    for header in HEADERS:
+        yield {**example, "headers": {**example.get("headers", {}), header: word}}
+
+
+def changed_bodies(node, name):
+    """The document with one value, or one key, changed into the name."""
+    yield name
+    items = node.items() if isinstance(node, dict) else enumerate(node)
+    for key, value in items:
+        inner = changed_bodies(value, name) if isinstance(value, dict | list) else [name]
+        for changed in inner:
+            whole = copy.copy(node)
+            whole[key] = changed
+            yield whole
+        if isinstance(node, dict):
+            yield {name if k == key else k: v for k, v in node.items()}
+
+
+def request(example):
+    """The bytes of a request, which ends its connection."""
+    body = json.dumps(example["body"]).encode() if "body" in example else b""
+    headers = {"Host": "x", "Connection": "close", **(example.get("headers") or {})}
+    if body:
+        headers |= {"Content-Type": "application/json", "Content-Length": str(len(body))}
+    lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
+    return f"{example['method']} {example['path']} HTTP/1.1\r\n{lines}\r\n".encode() + body
+
+
+def by_hook(models, plant):
+    """Answers to all that is asked, and what the process asked of the system meanwhile."""
+    reading, writing = os.pipe()
+    environ = {"WATCH": str(writing), **({"PLANT": "1"} if plant else {})}
+    answers = served(models, [sys.executable], environ, (writing,), plant)
+    os.close(writing)
+    with os.fdopen(reading) as told:
+        return answers, [line for line in told if not is_address(line)]
+
+
+def by_strace(models, plant, log):
+    sink = os.open(os.devnull, os.O_WRONLY)
+    environ = {"WATCH": str(sink), **({"PLANT": "1"} if plant else {})}
+    # -D: the service is our child, and strace its own grandchild.
+    calls = ["strace", "-D", "-f", "-s", "400", "-e", "trace=%file,connect", "-o", log]
+    answers = served(models, [*calls, sys.executable], environ, (sink,), plant)
+    os.close(sink)
+    until = time.monotonic() + 20
+    while "+++ exited" not in log.read_text("latin-1"):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    return answers, [line for line in log.read_text("latin-1").splitlines() if "canary" in line]
+
+
+def served(models, command, environ, kept, plant):
+    """Answers of a watched process to everything asked, or, with a planted fault, to some of it."""
+    given = {
+        **os.environ,
+        **environ,
+        "POSEFIELD_PORT": "0",
+        "POSEFIELD_LOG": "off",
+        "POSEFIELD_WORKERS": "1",
+    }
+    whole = [*command, str(HERE / "watched_serve.py"), "serve", str(models)]
+    with subprocess.Popen(whole, env=given, stdout=subprocess.PIPE, pass_fds=kept) as child:
+        try:
+            host, port = child.stdout.readline().decode().split("//")[-1].split(":")
+            requests = list(asked())[: 50 if plant else None]
+            answers = [exchange((host, int(port)), content) for content in requests]
+            child.terminate()
+            child.wait(20)
+        finally:
+            child.kill()
+    return [answer for (answer,) in answers]
+
+
+def is_address(line):
+    """The client's own address, which the service is told of, has none of the client's words."""
+    return re.match(r"socket\.(accept|__new__)", line)
+
+
+WITNESSES = [
+    "hook",
+    pytest.param(
+        "strace",
+        marks=pytest.mark.skipif(not shutil.which("strace"), reason="strace is not installed"),
+    ),
+]
+
+
+@pytest.mark.parametrize("witness", WITNESSES)
+def test_no_word_of_a_client_is_a_name_of_a_file_or_a_host(witness, models, tmp_path):
+    if witness == "hook":
+        answers, told = by_hook(models, plant=False)
+    else:
+        answers, told = by_strace(models, False, tmp_path / "calls")
+    assert told == []
+    statuses = {answer.status for answer in answers}
+    assert len(answers) > 2000
+    assert {200, 400, 404, 422} <= statuses and max(statuses) < 500
+
+
+@pytest.mark.parametrize("witness", WITNESSES)
+def test_a_planted_look_for_a_file_is_noticed(witness, models, tmp_path):
+    if witness == "hook":
+        _, told = by_hook(models, plant=True)
+    else:
+        _, told = by_strace(models, True, tmp_path / "calls")
+    assert any("/models/" in line and "canary" in line for line in told)

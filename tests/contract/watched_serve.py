@@ -1,0 +1,33 @@
+"""`posefield serve` that tells on file descriptor WATCH of each thing asked of the system in words
+that name the canary; with PLANT set, a model's name is looked up as a file first."""
+
+import os
+import sys
+from pathlib import Path
+
+CANARY, SINK = "canary", int(os.environ["WATCH"])
+
+
+def tell(event, arguments):
+    said = f"{event} {arguments!r}"
+    if CANARY in said.lower():
+        os.write(SINK, said[:300].encode("ascii", "replace") + b"\n")
+
+
+sys.addaudithook(tell)
+
+from service import cli  # noqa: E402
+from service.synthesis.library import Library  # noqa: E402
+
+if os.environ.get("PLANT"):
+    find = Library.find
+
+    def careless(self, key):
+        try:
+            Path("/models", f"{key}.onnx").read_bytes()
+        except (OSError, ValueError):
+            return find(self, key)
+
+    Library.find = careless
+
+cli.main()

@@ -1,0 +1,205 @@
+"""The same model file in other engines, unchanged: each answers what the service answers.
+
+Over the Open Inference Protocol, by Triton's client: our own service, MLServer and Triton. In a
+process of their own: OpenVINO, and onnxruntime-web on Node.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import environment
+import numpy as np
+import running
+import trained
+
+from service.synthesis.session import OUTPUTS, Session
+
+HERE = Path(__file__).parent
+VENV = environment.ROOT / ".venv-engines"
+PACKAGES = (
+    "mlserver==1.7.1",
+    "nvidia-pytriton==0.7.0",
+    "onnxruntime==1.31.1",
+    "openvino==2026.4.1",
+    "tritonclient[http]==2.73.0",
+)
+WEB = environment.ROOT / "build/web"
+WEB_PACKAGES = ("onnxruntime-web@1.23.0",)
+# Engines sum in another order, and sigma is the root of a difference: metres, seconds and parts of
+# a quaternion. The next level of detail is off by much more, which is looked at too.
+CLOSE = 5e-5
+
+Tensors = Mapping[str, np.ndarray]
+
+
+def faults(node: Path, npm: Path) -> list[str]:
+    """What is wrong with any engine's answers, a line each."""
+    python = environment.packages(VENV, PACKAGES)
+    web = environment.modules(WEB, WEB_PACKAGES, node, npm)
+    model, content = trained.family()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "reaching.onnx").write_bytes(content)
+        question = _question(model.session)
+        np.savez(folder / "question.npz", **question)
+        asked = question["controls"], question["time"]
+        expected = dict(zip(OUTPUTS, model.session.run(*asked, *OUTPUTS), strict=True))
+        other = dict(zip(OUTPUTS, model.session.run(*asked, *OUTPUTS, level=1), strict=True))
+        found = dict(_served(python, folder))
+        found["openvino"] = _openvino(python, folder)
+        found["onnxruntime-web"] = _web(node, web, folder, question)
+        return [*_compared(found, expected, other)]
+
+
+def _compared(found: Mapping[str, Tensors], right: Tensors, wrong: Tensors) -> Iterator[str]:
+    print(f"{'engine':<20}{'off':>10}{'another level':>16}")
+    for engine, answers in found.items():
+        off, control = _distance(answers, right), _distance(answers, wrong)
+        print(f"{engine:<20}{off:>10.1e}{control:>16.1e}")
+        if not off < CLOSE < control:
+            yield f"{engine}: off by {off:g}, and by {control:g} from another level"
+
+
+def _distance(answers: Tensors, expected: Tensors) -> float:
+    """The largest difference of any number; infinite where tensors or shapes differ."""
+    if {n: a.shape for n, a in answers.items()} != {n: e.shape for n, e in expected.items()}:
+        return float("inf")
+    return max(_apart(answers[name], expected[name], name) for name in expected)
+
+
+def _apart(one: np.ndarray, other: np.ndarray, name: str) -> float:
+    # A quaternion and its negative are one rotation.
+    signs = np.sign((one * other).sum(-1, keepdims=True)) if name == "rotations" else 1.0
+    return float(abs(one - signs * other).max())
+
+
+def _question(session: Session) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(7)
+    low, high = np.array([[c.minimum, c.maximum] for c in session.card.controls]).T
+    points = (low + rng.random((40, len(low))) * (high - low)).astype(np.float32)
+    times = rng.random((40, 3)) * session.durations(points)[:, None]
+    return {"controls": points, "time": times.astype(np.float32)}
+
+
+def _served(python: Path, folder: Path) -> Iterator[tuple[str, Tensors]]:
+    """Answers over the protocol by engine and way to send tensors."""
+    with _ours(folder) as address:
+        yield "posefield", _asked(python, folder, address)
+        yield "posefield, JSON", _asked(python, folder, address, "--json")
+    with _mlserver(python, folder) as address:
+        yield "MLServer, JSON", _asked(python, folder, address, "--json")
+    if not sysconfig.get_config_var("Py_ENABLE_SHARED"):
+        print("not asked: Triton, which needs Python as a shared library")
+        return
+    with _triton(folder) as address:
+        yield "Triton", _asked(python, folder, address)
+        yield "Triton, JSON", _asked(python, folder, address, "--json")
+
+
+def _asked(python: Path, folder: Path, address: str, *options: str) -> Tensors:
+    result, client = folder / "answer.npz", HERE / "inference_client.py"
+    command = (python, client, address, "reaching", folder / "question.npz", result, *options)
+    _call(*command)
+    return _loaded(result)
+
+
+@contextmanager
+def _ours(folder: Path) -> Iterator[str]:
+    port = running.ports(1)[0]
+    command = [Path(sys.executable).with_name("posefield"), "serve", folder]
+    with running.started(command, folder / "said.txt", POSEFIELD_PORT=str(port)):
+        yield f"127.0.0.1:{port}"
+
+
+@contextmanager
+def _mlserver(python: Path, folder: Path) -> Iterator[str]:
+    ports, own = running.ports(3), folder / "mlserver"
+    own.mkdir()
+    names = ("http_port", "grpc_port", "metrics_port")
+    told = dict(zip(names, ports, strict=True)) | {"host": "127.0.0.1", "parallel_workers": 0}
+    (own / "settings.json").write_text(json.dumps(told))
+    model = {"uri": str(folder / "reaching.onnx")}
+    settings = {
+        "name": "reaching",
+        "implementation": "mlserver_onnx.OnnxRuntime",
+        "parameters": model,
+    }
+    (own / "model-settings.json").write_text(json.dumps(settings))
+    command = [python.with_name("mlserver"), "start", own]
+    with running.started(command, own / "said.txt", PYTHONPATH=str(HERE)):
+        yield f"127.0.0.1:{ports[0]}"
+
+
+@contextmanager
+def _triton(folder: Path) -> Iterator[str]:
+    """Triton itself, out of PyTriton's package, whose own way to start it is not needed."""
+    (packages,) = VENV.glob("lib/python*/site-packages")
+    server, version = packages / "pytriton/tritonserver", f"{sys.version_info.minor}"
+    stub = f"python_backend_stubs/3.{version}/triton_python_backend_stub"
+    shutil.copy(server / stub, server / "backends/python")
+    own = folder / "triton/reaching/1"
+    own.mkdir(parents=True)
+    shutil.copy(folder / "reaching.onnx", own)
+    shutil.copy(HERE / "triton_onnx.py", own / "model.py")
+    (own.parent / "config.pbtxt").write_text(
+        'name: "reaching"\nbackend: "python"\ninstance_group [{kind: KIND_CPU}]\n'
+    )
+    port, libraries = (
+        running.ports(1)[0],
+        (sysconfig.get_config_var("LIBDIR"), packages / "nvidia_pytriton.libs"),
+    )
+    command = [
+        server / "bin/tritonserver",
+        f"--model-repository={folder / 'triton'}",
+        f"--backend-directory={server / 'backends'}",
+        f"--http-port={port}",
+        "--http-address=127.0.0.1",
+        "--allow-grpc=false",
+        "--allow-metrics=false",
+    ]
+    path = os.pathsep.join(map(str, libraries))
+    with running.started(
+        command, folder / "said.txt", LD_LIBRARY_PATH=path, PACKAGES=str(packages)
+    ):
+        yield f"127.0.0.1:{port}"
+
+
+def _openvino(python: Path, folder: Path) -> Tensors:
+    result = folder / "openvino.npz"
+    model, question = folder / "reaching.onnx", folder / "question.npz"
+    _call(python, HERE / "openvino_read.py", model, question, result)
+    return _loaded(result)
+
+
+def _web(node: Path, modules: Path, folder: Path, question: Tensors) -> Tensors:
+    asked, result = folder / "question.json", folder / "web.json"
+    plain = {n: {"shape": t.shape, "data": t.ravel().tolist()} for n, t in question.items()}
+    asked.write_text(json.dumps(plain))
+    _call(node, HERE / "web_read.mjs", modules, folder / "reaching.onnx", asked, result)
+    found = json.loads(result.read_text())
+    return {n: np.array(t["data"], np.float32).reshape(t["shape"]) for n, t in found.items()}
+
+
+def _loaded(path: Path) -> Tensors:
+    with np.load(path) as found:
+        return dict(found)
+
+
+def _call(*command: str | Path) -> None:
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{command[1]} failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+
+
+if __name__ == "__main__":
+    found = faults(*environment.node())
+    print("\n".join(found) or "no fault in any engine")
+    sys.exit(bool(found))

@@ -1,0 +1,66 @@
+"""What a file takes is known before it is made: bytes for each joint and frame, at most."""
+
+import numpy as np
+import pytest
+
+from service.encode import CROWD_ENCODERS, ENCODERS, poses_within
+from service.motion.crowd import Placement
+from service.synthesis import crowd, session
+from service.synthesis.crowd_question import CrowdQuestion
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+
+SHARES = np.linspace(0.03, 0.97, 7)
+
+
+@pytest.fixture(scope="module")
+def model(walk_path):
+    """One of few joints, whose root weighs most."""
+    return Synthesizer("walk", session.load(walk_path))
+
+
+def controls(model, share):
+    return {
+        c.name: c.minimum + share * (c.maximum - c.minimum) for c in model.session.card.controls
+    }
+
+
+@pytest.mark.parametrize("name", ENCODERS)
+def test_no_clip_takes_more_than_was_reckoned(name, model):
+    joints, encoder = len(model.session.card.skeleton) + 1, ENCODERS[name]
+    for share in SHARES:
+        question = controls(model, share)
+        long, short = (model.clip(ClipQuestion(question, fps=f)) for f in (400.0, 200.0))
+        more = len(encoder.encode(long)) - len(encoder.encode(short))
+        per_joint = more / (len(long.clip) - len(short.clip)) / joints
+        assert encoder.per_joint / 3 < per_joint < encoder.per_joint
+
+
+@pytest.mark.parametrize("name", CROWD_ENCODERS)
+def test_no_crowd_takes_more_than_was_reckoned(name, model):
+    joints, encoder = len(model.session.card.skeleton) + 1, CROWD_ENCODERS[name]
+    sizes = [len(encoder.encode(crowd.poses(model, company(model, n)))) for n in (100, 400)]
+    per_joint = (sizes[1] - sizes[0]) / 300 / joints
+    assert encoder.per_joint / 3 < per_joint < encoder.per_joint
+
+
+def company(model, count):
+    columns = {name: np.full(count, value) for name, value in controls(model, 0.37).items()}
+    place = Placement(np.full((count, 3), 0.123456), np.full(count, 0.7))
+    level = np.zeros(count, dtype=np.int64)
+    return CrowdQuestion(
+        columns,
+        np.full(count, 0.1),
+        place,
+        (None,),
+        np.zeros(count, dtype=np.int64),
+        level,
+        "travelling",
+        "warn",
+        None,
+    )
+
+
+def test_as_many_poses_are_allowed_as_surely_fit():
+    assert poses_within(4800, 9, 48) == 10
+    assert poses_within(4799, 9, 48) == 9
