@@ -8,8 +8,8 @@ from time import monotonic
 from faults_known import Answer, Known
 from faults_wire import Wire
 
-UNAVAILABLE = ("overloaded", "late", "not-ready", "no-connection-left")
-"""Problems that may be answered with 503, as the contract says."""
+UNAVAILABLE = ("overloaded", "late", "not-ready", "no-connection-left", "unsaid")
+"""Problems that may be answered with 503, as the contract says; an answer to HEAD has no body."""
 
 GONE = (OSError, EOFError, TimeoutError)
 """What a connection raises that does not answer."""

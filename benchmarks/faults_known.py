@@ -35,10 +35,11 @@ class Answer:
 
     @property
     def problem(self) -> str | None:
-        """Type of the problem that it tells of; none where it does not, as it should."""
-        if self.headers.get("content-type") != "application/problem+json" or not self.body:
+        """Type of the problem that it tells of, `unsaid` in an answer to HEAD; none where it is of
+        another form than every problem has."""
+        if self.headers.get("content-type") != "application/problem+json":
             return None
-        return str(orjson.loads(self.body).get("type"))
+        return str(orjson.loads(self.body)["type"]) if self.body else "unsaid"
 
     def is_like(self, other: "Answer") -> bool:
         """Whether it says the same, to the byte but for what no two answers share."""
