@@ -12,7 +12,7 @@ from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.synthesis.shelf import Fixed
-from service.web import contract, problems
+from service.web import contract, pages, problems
 from service.web.access import policy
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
@@ -58,7 +58,7 @@ def build(
     readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
     rules = policy.of(settings)
     policy.check_exposure(settings, rules)
-    service = Service(readiness, settings, agreed.source, rules, lines)
+    service = Service(readiness, settings, pages.made(agreed), rules, lines)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 
