@@ -55,5 +55,7 @@ def _article(kind: Kind, text: Text) -> Element:
 def example(kind: Kind) -> dict[str, object]:
     """A problem of that kind, as it is sent."""
     text = TEXTS[kind]
-    errors = [{**text.place, "detail": text.said}] if text.place else []
+    # Models say of a field what is wrong, and not once more which it is.
+    said = text.detail.partition(": ")[2] if kind in problems.TABLE.values() else text.detail
+    errors = [{**text.place, "detail": said}] if text.place else []
     return problems.document(kind, text.detail, "3f9c0b7a5d21", errors)

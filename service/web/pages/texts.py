@@ -17,11 +17,6 @@ class Text:
     detail: str
     place: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def said(self) -> str:
-        """The detail without the place."""
-        return self.detail.partition(": ")[2] or self.detail
-
 
 TEXTS: dict[Kind, Text] = {
     problems.BAD_PARAMETER: Text(
@@ -34,7 +29,7 @@ TEXTS: dict[Kind, Text] = {
     problems.BAD_BODY: Text(
         "The body is no JSON, or has a field that is unknown, missing or of another type.",
         "Compare the field that `pointer` names with the schema of the operation's body.",
-        "frames: no such field",
+        "Object contains unknown field `frames`",
         {"pointer": "/frames"},
     ),
     problems.MALFORMED: Text(
@@ -48,18 +43,18 @@ TEXTS: dict[Kind, Text] = {
         "The service asks for a key or token, and there is none, or one that is unknown, "
         "expired or signed by somebody else. `WWW-Authenticate` says which.",
         "Send `Authorization: Bearer` and a key of the operator's, or a fresh token.",
-        "no key; send Authorization: Bearer and a key",
+        "no Authorization; expected a key or token that is known",
     ),
     problems.FORBIDDEN: Text(
         "The key or token holds, but not for this: it lacks the scope that `WWW-Authenticate` "
         "names. Models that a key may not read are answered as `unknown-model` instead.",
         "Ask the operator for a key with that scope.",
-        "this needs the scope metrics",
+        "the key or token has no scope 'metrics' for anything",
     ),
     problems.NO_SUCH_PATH: Text(
         "No operation lies at this path. A slash at its end counts.",
         "Look the path up in the contract, at `/docs` or `/openapi.yaml`.",
-        "'/v1/models/', /openapi.yaml names what there is",
+        "'/v1/models/'; /openapi.yaml names what there is",
     ),
     TABLE[UnknownModel]: Text(
         "No model of that name, or of that name and hash, answers here, or none that the key "
@@ -82,7 +77,8 @@ TEXTS: dict[Kind, Text] = {
     problems.NOT_ACCEPTABLE: Text(
         "The header `Accept` accepts none of the formats that the path can answer in.",
         "Accept one of those that `detail` lists, or ask at a path that ends in a format.",
-        "Accept 'text/html', expected one of application/json, application/vnd.msgpack",
+        "Accept 'text/html', expected one of application/json, application/vnd.msgpack, "
+        "application/x-npz, application/vnd.apache.arrow.stream",
     ),
     problems.TOO_SLOW: Text(
         "The head or body of the request did not arrive in time. The connection is closed.",
@@ -111,20 +107,20 @@ TEXTS: dict[Kind, Text] = {
         "clip, there would be too many frames, the model knows no such performer.",
         "Change the field that `errors` names. The model's card says what the model has: its "
         "controls, their ranges, its performers and levels.",
-        "fps: 10000, expected 1 to 1000",
+        "fps: 10000 frames a second, expected 1 to 1000 frames a second",
         {"parameter": "fps"},
     ),
     TABLE[OutsideSamples]: Text(
         "Controls lie outside what the model was trained from, and `extrapolate=refuse` asked "
         "for an error rather than a warning.",
         "Move the controls into the ranges on the model's card, or ask with `extrapolate=warn`.",
-        "controls: turn = 60, sampled -45 to 45",
+        "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
         {"parameter": "controls"},
     ),
     problems.HEAD_TOO_LARGE: Text(
         "All header lines together are longer than the service reads. The connection is closed.",
         "Send fewer or shorter headers; cookies are never looked at.",
-        "more than 16384 bytes, expected at most 16384",
+        "expected at most 16384 bytes in at most 100 headers",
     ),
     problems.INTERNAL: Text(
         "The service failed. The request is not at fault.",
@@ -142,17 +138,17 @@ TEXTS: dict[Kind, Text] = {
         "one that the request asked for by `Prefer: wait=`.",
         "Send again after `Retry-After`, or ask for less at a time: fewer frames, clips or "
         "characters.",
-        "not begun within 30 seconds",
+        "no answer within 30 s",
     ),
     problems.NOT_READY: Text(
         "Only `/readyz` and its like answer so: there is no model, one of them fails its trial "
         "question, or the service has been told to end.",
         "Send requests to another instance. What is still sent to this one is answered.",
-        "the service is ending",
+        "there is no model",
     ),
     problems.NO_CONNECTION_LEFT: Text(
         "As many connections are open as the service keeps. This one is closed.",
         "Try again after `Retry-After`; keep connections open and share them between requests.",
-        "500 connections are open",
+        "500 are open, expected fewer",
     ),
 }
