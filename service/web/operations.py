@@ -29,11 +29,11 @@ from service.web import (
     answers,
     body,
     clips_query,
-    contract,
     crowd_query,
     inference,
     metrics,
     negotiation,
+    pages,
     pose_operations,
     query,
     sending,
@@ -162,11 +162,6 @@ async def get_metrics(service: Service, request: Request) -> Response:
     return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
 
 
-async def get_contract(service: Service, request: Request) -> Response:
-    """The contract, byte for byte."""
-    return Response(service.source, media_type=contract.MEDIA_TYPE)
-
-
 _FIXED: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
@@ -184,7 +179,7 @@ _FIXED: dict[str, Handler] = {
     "getMetrics": get_metrics,
     "getLiveness": live,
     "getReadiness": ready,
-    "getContract": get_contract,
+    **pages.OPERATIONS,
 }
 
 

@@ -1,8 +1,10 @@
 """What handlers of operations share."""
 
 import os
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import blake2b
 
 from anyio import CapacityLimiter
 from starlette.concurrency import run_in_threadpool
@@ -24,12 +26,26 @@ CLIPS = CapacityLimiter(os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)
+class Page:
+    """A document, and headers that it is sent with."""
+
+    content: bytes
+    media_type: str
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def digest(self) -> bytes:
+        """What its entity tag is made of."""
+        return blake2b(self.content, digest_size=16).digest()
+
+
+@dataclass(frozen=True)
 class Service:
-    """What every operation may use."""
+    """What every operation may use; pages: by operationId."""
 
     readiness: Readiness
     settings: Settings
-    source: bytes
+    pages: Mapping[str, Page]
     rules: Policy
     origins: frozenset[bytes] = frozenset()
     telling: Telling = SILENT
