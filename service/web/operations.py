@@ -42,7 +42,7 @@ from service.web import (
     why_operations,
 )
 from service.web.query import FileQuestion, PoseQuestion
-from service.web.service import CLIPS, CROWDS, Handler, Service, made
+from service.web.service import CLIPS, CROWDS, Handler, Service
 from service.web.service import model as _model
 from service.web.walk_query import WalkQuestion
 
@@ -228,6 +228,8 @@ async def _clip(
     joints = len(model.session.card.skeleton)
     most = poses_within(service.settings.output_limit, joints, encoder.per_joint)
     answer = model.clip(question.clip, min(most, MOST_POSES))
-    quick = len(answer.clip) <= encoder.at_once
-    content = await made(quick, partial(encoder.encode, answer, convention))
+    if len(answer.clip) <= encoder.at_once:
+        content = encoder.encode(answer, convention)
+    else:
+        content = await service.desk.file(encoder, convention, answer)
     return answers.file(content, encoder, answer.trust)

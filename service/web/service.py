@@ -19,6 +19,7 @@ from service.web.batching import Batcher
 from service.web.readiness import Readiness
 from service.web.settings import Settings
 from service.web.telling import SILENT, Telling
+from service.web.writing import Desk
 
 # Crowds take as long as many clips: of their own, these threads hold nobody else up.
 CROWDS = CapacityLimiter(os.cpu_count() or 1)
@@ -51,6 +52,7 @@ class Service:
     telling: Telling = SILENT
     code: bytes = field(default_factory=caching.code)
     batcher: Batcher = field(default_factory=Batcher)
+    desk: Desk = field(default_factory=Desk)
 
     def lifetime(self, model: str) -> bytes:
         """How long an answer may be used unasked, by the model's name in its path."""
