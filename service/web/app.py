@@ -12,7 +12,7 @@ from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.synthesis.shelf import Fixed
-from service.web import contract, cors, problems
+from service.web import contract, cors, pages, problems
 from service.web.access import policy
 from service.web.contract import Contract
 from service.web.exchange import Exchange, Site
@@ -57,7 +57,7 @@ def build(
     rules = policy.of(settings)
     policy.check_exposure(settings, rules)
     origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
-    service = Service(readiness, settings, agreed.source, rules, origins, telling)
+    service = Service(readiness, settings, pages.made(agreed), rules, origins, telling)
     routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

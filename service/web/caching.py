@@ -14,6 +14,7 @@ import service
 ALWAYS_NEW = b"no-store"
 FOR_EVER = b"max-age=31536000, immutable"
 AGAIN = b"no-cache"
+PUBLIC = b"public, "
 
 LIBRARIES = ("backports.zstd", "msgspec", "nanoarrow", "numpy", "onnxruntime", "orjson", "usd-core")
 """Those that have a say in an answer's bytes."""
@@ -52,7 +53,7 @@ def held(given: str, own: str) -> bool:
 def lifetime(model: str, alias_seconds: int, closed: bool) -> bytes:
     """How long an answer may be used unasked: for ever under a model's hash, under its name alone
     for so many seconds. closed: by whoever asked and had to say who they are, not by others."""
-    whose = b"private, " if closed else b"public, "
+    whose = b"private, " if closed else PUBLIC
     if "@" in model:
         return whose + FOR_EVER
     return whose + (b"max-age=%d" % alias_seconds if alias_seconds else AGAIN)

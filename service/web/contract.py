@@ -49,9 +49,10 @@ class Operation:
 
 @dataclass(frozen=True)
 class Contract:
-    """The contract's bytes, to be served as they are, and its operations."""
+    """The contract's bytes, to be served as they are, what they say, and its operations."""
 
     source: bytes
+    document: Mapping[str, Any]
     operations: tuple[Operation, ...]
 
 
@@ -64,14 +65,14 @@ def load() -> Contract:
 def parse(source: bytes) -> Contract:
     """Contract of a document's bytes."""
     document = yaml.load(source, yaml.CSafeLoader)
-    return Contract(source, tuple(_operations(document)))
+    return Contract(source, document, tuple(_operations(document)))
 
 
 def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
     for path, item in document["paths"].items():
         for method in (m for m in METHODS if m in item):
             given = [*item.get("parameters", []), *item[method].get("parameters", [])]
-            query = [p for p in (_resolve(document, g) for g in given) if p["in"] == "query"]
+            query = [p for p in (resolve(document, g) for g in given) if p["in"] == "query"]
             exploded = [p["name"] for p in query if p["schema"].get("type") == "object"]
             yield Operation(
                 id=item[method]["operationId"],
@@ -86,7 +87,7 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
 
 
 def _media_types(document: Mapping[str, Any], responses: Mapping[str, Any]) -> tuple[str, ...]:
-    well = (_resolve(document, node) for code, node in responses.items() if code.startswith("2"))
+    well = (resolve(document, node) for code, node in responses.items() if code.startswith("2"))
     return tuple(name for node in well for name in node.get("content", ()))
 
 
@@ -98,7 +99,7 @@ def _scope(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
     return scopes[0] if scopes else None
 
 
-def _resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:
+def resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:
     """The node itself, or what its local $ref points to."""
     found: Any = node
     while "$ref" in found:

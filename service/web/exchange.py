@@ -67,6 +67,7 @@ class Exchange:
         self._route: Route | None = None
         self._coding: str | None = None
         self._tag: str | None = None
+        self._lifetime = b""
         self._status = self._size = 0
         self._span = site.service.telling.begin(self._headers)
 
@@ -144,7 +145,11 @@ class Exchange:
         if "model" in scope["path_params"]:
             scope["model"] = scope["library"].find(_key(scope["path_params"]))
             if operation.pure:
-                self._check_held(route)
+                self._lifetime = site.service.lifetime(_key(scope["path_params"]))
+                self._check_held(*self._parts(route))
+        elif page := site.service.pages.get(operation.id):
+            self._lifetime = caching.PUBLIC + caching.AGAIN
+            self._check_held(page.digest)
 
     def _let_in(self, operation: Operation) -> None:
         """Who asks, and the library as they may see it; RequestFault 401 or 403."""
@@ -158,12 +163,16 @@ class Exchange:
                 asked = scope["path_params"].get("model")
                 scope["library"] = door.seen(service.library, known, asked, call)
 
-    def _check_held(self, route: Route) -> None:
+    def _parts(self, route: Route) -> tuple[bytes, ...]:
+        """All that the answer to a pure question follows from."""
         scope, accepted = self._scope, b""
         if route.operation.negotiated:
             accepted = b",".join(value for name, value in scope["headers"] if name == b"accept")
         model, code = scope["model"], self._site.service.code
-        parts = code, model.fingerprint, route.name, scope["query_string"], accepted
+        return code, model.fingerprint, route.name, scope["query_string"], accepted
+
+    def _check_held(self, *parts: bytes) -> None:
+        """Name the answer before it is made; NotModified where the client has it."""
         self._tag = caching.tag(*parts, coding=self._coding)
         given = self._headers.get(b"if-none-match")
         if given is not None and caching.held(given.decode("latin-1"), self._tag):
@@ -184,8 +193,7 @@ class Exchange:
         if held and self._route and self._route.vary:
             headers.append((b"vary", self._route.vary))
         if held and self._tag:
-            lifetime = self._site.service.lifetime(_key(self._scope["path_params"]))
-            headers += [(b"etag", self._tag.encode()), (b"cache-control", lifetime)]
+            headers += [(b"etag", self._tag.encode()), (b"cache-control", self._lifetime)]
         elif "cache-control" not in response.headers:
             headers.append((b"cache-control", caching.ALWAYS_NEW))
         return headers

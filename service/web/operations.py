@@ -29,11 +29,11 @@ from service.web import (
     answers,
     body,
     clips_query,
-    contract,
     crowd_query,
     inference,
     metrics,
     negotiation,
+    pages,
     pose_operations,
     query,
     sending,
@@ -42,7 +42,7 @@ from service.web import (
     why_operations,
 )
 from service.web.query import FileQuestion, PoseQuestion
-from service.web.service import CLIPS, CROWDS, Handler, Service, made
+from service.web.service import CLIPS, CROWDS, Handler, Service
 from service.web.service import model as _model
 from service.web.walk_query import WalkQuestion
 
@@ -162,11 +162,6 @@ async def get_metrics(service: Service, request: Request) -> Response:
     return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
 
 
-async def get_contract(service: Service, request: Request) -> Response:
-    """The contract, byte for byte."""
-    return Response(service.source, media_type=contract.MEDIA_TYPE)
-
-
 _FIXED: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
@@ -184,7 +179,7 @@ _FIXED: dict[str, Handler] = {
     "getMetrics": get_metrics,
     "getLiveness": live,
     "getReadiness": ready,
-    "getContract": get_contract,
+    **pages.OPERATIONS,
 }
 
 
@@ -233,6 +228,8 @@ async def _clip(
     joints = len(model.session.card.skeleton)
     most = poses_within(service.settings.output_limit, joints, encoder.per_joint)
     answer = model.clip(question.clip, min(most, MOST_POSES))
-    quick = len(answer.clip) <= encoder.at_once
-    content = await made(quick, partial(encoder.encode, answer, convention))
+    if len(answer.clip) <= encoder.at_once:
+        content = encoder.encode(answer, convention)
+    else:
+        content = await service.desk.file(encoder, convention, answer)
     return answers.file(content, encoder, answer.trust)

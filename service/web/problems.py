@@ -3,7 +3,7 @@
 The only module that knows both the errors of the domain and the statuses of HTTP.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import orjson
@@ -21,6 +21,7 @@ from service.motion.errors import (
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:posefield:problem:"
 INFERENCE = "/v2"
+PAGE = "/problems"
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,16 @@ class Kind:
     status: int
     name: str
     title: str
+
+    @property
+    def type(self) -> str:
+        """What programs tell it by."""
+        return TYPE_PREFIX + self.name
+
+    @property
+    def help(self) -> str:
+        """Header Link to what it means."""
+        return f'<{PAGE}#{self.name}>; rel="help"'
 
 
 BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
@@ -73,6 +84,8 @@ TABLE: dict[type[QueryError], Kind] = {
     InvalidField: Kind(422, "invalid-field", "A field is missing, unknown or out of range"),
     OutsideSamples: Kind(422, "outside-samples", "The controls lie outside what was sampled"),
 }
+
+KINDS = (*OF_REQUEST, *OF_WIRE, *OF_LOAD, *TABLE.values(), INTERNAL)
 
 _IN_THE_PATH = ("model", "format")
 
@@ -149,15 +162,23 @@ def _answer(
     errors: list[dict[str, str]],
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    document = {
-        "type": TYPE_PREFIX + kind.name,
+    content = document(kind, detail, request.state.request_id, errors)
+    if request.scope["path"].startswith(INFERENCE):
+        # Clients of the Open Inference Protocol read nothing else.
+        content["error"] = detail
+    sent = {"Link": kind.help, **(headers or {})}
+    return Response(orjson.dumps(content), kind.status, sent, MEDIA_TYPE)
+
+
+def document(
+    kind: Kind, detail: str, instance: str, errors: Sequence[Mapping[str, str]]
+) -> dict[str, object]:
+    """Schema Problem of the contract."""
+    return {
+        "type": kind.type,
         "title": kind.title,
         "status": kind.status,
         "detail": detail,
-        "instance": request.state.request_id,
+        "instance": instance,
         "errors": errors,
     }
-    if request.scope["path"].startswith(INFERENCE):
-        # Clients of the Open Inference Protocol read nothing else.
-        document["error"] = detail
-    return Response(orjson.dumps(document), kind.status, headers, MEDIA_TYPE)

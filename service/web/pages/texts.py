@@ -1,0 +1,154 @@
+"""What each kind of problem means, when it comes and what to do about it, for those who meet it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from service.motion.errors import InvalidField, OutsideSamples, UnknownFormat, UnknownModel
+from service.web import problems
+from service.web.problems import TABLE, Kind
+
+
+@dataclass(frozen=True)
+class Text:
+    """comes: when it does. remedy: what to do then. detail, place: of an example."""
+
+    comes: str
+    remedy: str
+    detail: str
+    place: Mapping[str, str] = field(default_factory=dict)
+
+
+TEXTS: dict[Kind, Text] = {
+    problems.BAD_PARAMETER: Text(
+        "A query parameter or header breaks the contract: it is unknown, missing, given twice, "
+        "no finite number, or none of the words that it may be.",
+        "Send what `detail` says was expected. Asking again as it was will not help.",
+        "fps: 'abc', expected a finite number",
+        {"parameter": "fps"},
+    ),
+    problems.BAD_BODY: Text(
+        "The body is no JSON, or has a field that is unknown, missing or of another type.",
+        "Compare the field that `pointer` names with the schema of the operation's body.",
+        "Object contains unknown field `frames`",
+        {"pointer": "/frames"},
+    ),
+    problems.MALFORMED: Text(
+        "What arrived is not HTTP/1.1 in its strict form: a broken request line or header, more"
+        " than one `Host`, a length that is given twice. Parsers differ on such requests, so "
+        "none is guessed at. The connection is closed.",
+        "Look at what stands between: a client that is not written by hand never sends this.",
+        "2 Host headers, expected one",
+    ),
+    problems.UNAUTHENTICATED: Text(
+        "The service asks for a key or token, and there is none, or one that is unknown, "
+        "expired or signed by somebody else. `WWW-Authenticate` says which.",
+        "Send `Authorization: Bearer` and a key of the operator's, or a fresh token.",
+        "no Authorization; expected a key or token that is known",
+    ),
+    problems.FORBIDDEN: Text(
+        "The key or token holds, but not for this: it lacks the scope that `WWW-Authenticate` "
+        "names. Models that a key may not read are answered as `unknown-model` instead.",
+        "Ask the operator for a key with that scope.",
+        "the key or token has no scope 'metrics' for anything",
+    ),
+    problems.NO_SUCH_PATH: Text(
+        "No operation lies at this path. A slash at its end counts.",
+        "Look the path up in the contract, at `/docs` or `/openapi.yaml`.",
+        "'/v1/models/'; /openapi.yaml names what there is",
+    ),
+    TABLE[UnknownModel]: Text(
+        "No model of that name, or of that name and hash, answers here, or none that the key "
+        "may read. A hash goes when newer versions of a model have pushed it out.",
+        "Ask `/v1/models` which there are. Under its plain name a model's newest version answers.",
+        "model: no model 'reich'; there are reach@0123456789abcdef",
+        {"parameter": "model"},
+    ),
+    TABLE[UnknownFormat]: Text(
+        "The path ends in a format that this service does not write.",
+        "Choose one of those that `detail` lists, or leave the ending out and send `Accept`.",
+        "format: no format 'fbx'; there are usda, usdc, usdz, json, bvh, glb, npz, arrow, msgpack",
+        {"parameter": "format"},
+    ),
+    problems.METHOD_NOT_ALLOWED: Text(
+        "The path is there, but does not take this method.",
+        "Use one of the methods in the header `Allow`.",
+        "PUT, expected one of GET, HEAD, OPTIONS, POST",
+    ),
+    problems.NOT_ACCEPTABLE: Text(
+        "The header `Accept` accepts none of the formats that the path can answer in.",
+        "Accept one of those that `detail` lists, or ask at a path that ends in a format.",
+        "Accept 'text/html', expected one of application/json, application/vnd.msgpack, "
+        "application/x-npz, application/vnd.apache.arrow.stream",
+    ),
+    problems.TOO_SLOW: Text(
+        "The head or body of the request did not arrive in time. The connection is closed.",
+        "Send again. Large bodies have longer, as long as 4 KiB a second arrive.",
+        "its body was expected within 20 seconds",
+    ),
+    problems.BODY_TOO_LARGE: Text(
+        "The body is larger than the operation takes. It was not read to its end, and the "
+        "connection is closed.",
+        "Ask in several requests, or have the operator raise the limit.",
+        "more than 65536 bytes, expected at most 65536",
+    ),
+    problems.URL_TOO_LONG: Text(
+        "The URL is longer than the service reads. The connection is closed.",
+        "Ask by POST: each question that a URL can hold can also be a JSON body.",
+        "more than 8192 bytes, expected at most 8192",
+    ),
+    problems.NOT_JSON: Text(
+        "The body's `Content-Type` is missing or not one that the operation takes.",
+        "Send `Content-Type: application/json`, in UTF-8.",
+        "Content-Type 'text/plain', expected 'application/json'",
+    ),
+    TABLE[InvalidField]: Text(
+        "The request keeps the contract, but this model has no answer to it: a control is "
+        "missing or unknown, a value is far outside what was sampled, a time lies outside the "
+        "clip, there would be too many frames, the model knows no such performer.",
+        "Change the field that `errors` names. The model's card says what the model has: its "
+        "controls, their ranges, its performers and levels.",
+        "fps: 10000 frames a second, expected 1 to 1000 frames a second",
+        {"parameter": "fps"},
+    ),
+    TABLE[OutsideSamples]: Text(
+        "Controls lie outside what the model was trained from, and `extrapolate=refuse` asked "
+        "for an error rather than a warning.",
+        "Move the controls into the ranges on the model's card, or ask with `extrapolate=warn`.",
+        "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
+        {"parameter": "controls"},
+    ),
+    problems.HEAD_TOO_LARGE: Text(
+        "All header lines together are longer than the service reads. The connection is closed.",
+        "Send fewer or shorter headers; cookies are never looked at.",
+        "expected at most 16384 bytes in at most 100 headers",
+    ),
+    problems.INTERNAL: Text(
+        "The service failed. The request is not at fault.",
+        "Tell the operator `instance`: the service's log has the fault under that id. The same "
+        "request may be sent again, as no request changes anything.",
+        "see the service's log under the id in `instance`",
+    ),
+    problems.OVERLOADED: Text(
+        "More requests are open than the service answers at a time. Nothing was asked of a model.",
+        "Send the same request again after as many seconds as `Retry-After` says.",
+        "1000 requests are being answered",
+    ),
+    problems.LATE: Text(
+        "The answer had not begun when its time was over: the operator's limit, or the shorter "
+        "one that the request asked for by `Prefer: wait=`.",
+        "Send again after `Retry-After`, or ask for less at a time: fewer frames, clips or "
+        "characters.",
+        "no answer within 30 s",
+    ),
+    problems.NOT_READY: Text(
+        "Only `/readyz` and its like answer so: there is no model, one of them fails its trial "
+        "question, or the service has been told to end.",
+        "Send requests to another instance. What is still sent to this one is answered.",
+        "there is no model",
+    ),
+    problems.NO_CONNECTION_LEFT: Text(
+        "As many connections are open as the service keeps. This one is closed.",
+        "Try again after `Retry-After`; keep connections open and share them between requests.",
+        "500 are open, expected fewer",
+    ),
+}

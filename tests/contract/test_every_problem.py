@@ -1,0 +1,180 @@
+"""Every kind of problem, provoked over HTTP: it comes as its page says, example and all."""
+
+import asyncio
+import json
+import re
+import socket
+
+import httpx
+import jsonschema
+import pytest
+from asking import Answer, asker, exchange, process, read_answer
+
+from service.synthesis.library import Library
+from service.web import contract, problems
+from service.web.access import keys
+from service.web.app import build, create_app
+from service.web.operations import OPERATIONS
+from service.web.pages import problems as page
+from service.web.problems import KINDS
+from service.web.settings import Settings
+
+MODEL = "/v1/models/reach"
+CLIP = f"{MODEL}/clip.json"
+JSON = {"content-type": "application/json"}
+CONTROLS = "stature=1.72&hip_height=0.9&target_height=1.1"
+UNFINISHED = (
+    b"POST /v1/models/reach/pose HTTP/1.1\r\nHost: x\r\n"
+    b"Content-Type: application/json\r\nContent-Length: 9\r\n\r\n{"
+)
+LIMITS = {"POSEFIELD_HEAD_TIME": "1", "POSEFIELD_BODY_TIME": "1", "POSEFIELD_CONNECTIONS": "2"}
+
+
+def by_request(method, path, **given):
+    """Provoke by a request to a service as it usually is."""
+    return lambda app, place: answered(asker(app)(method, path, **given))
+
+
+def by_bytes(content):
+    """Provoke by what arrives at a service with few connections and little patience."""
+    return lambda app, place: exchange(place, content)[0]
+
+
+def answered(response):
+    return Answer(response.status_code, dict(response.headers), response.content)
+
+
+KEY = keys.make()
+
+
+def with_key(**headers):
+    """Provoke at a service with one key, which may not read metrics."""
+    closed = create_app(Library({}), Settings(keys=keys.line("one", ["read:*"], KEY)))
+    return lambda app, place: answered(asker(closed)("GET", "/metrics", headers=headers))
+
+
+async def stuck(service, request):
+    await asyncio.sleep(100)
+
+
+async def broken(service, request):
+    raise ZeroDivisionError
+
+
+def served_by(handler, concurrency=1):
+    handlers = {**OPERATIONS, "listModels": handler}
+    return build(contract.load(), handlers, Library({}), Settings(concurrency=concurrency))
+
+
+def fault(app, place):
+    return answered(asker(served_by(broken))("GET", "/v1/models"))
+
+
+def late(app, place):
+    return answered(asker(served_by(stuck))("GET", "/v1/models", headers={"prefer": "wait=1"}))
+
+
+def overloaded(app, place):
+    async def both():
+        transport = httpx.ASGITransport(served_by(stuck))
+        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+            asked = [client.get("/v1/models", headers={"prefer": "wait=1"}) for _ in range(2)]
+            return await asyncio.gather(*asked)
+
+    return answered((asyncio.run(both()))[1])
+
+
+def not_ready(app, place):
+    return answered(asker(create_app(Library({}), Settings()))("GET", "/readyz"))
+
+
+def too_slow(app, place):
+    with socket.create_connection(place, timeout=20) as wire:
+        wire.sendall(UNFINISHED)
+        return read_answer(wire.makefile("rb"))
+
+
+def no_connection_left(app, place):
+    busy = [socket.create_connection(place, timeout=20) for _ in range(2)]
+    try:
+        for wire in busy:
+            wire.sendall(UNFINISHED)
+        # Until both have been accepted.
+        for _ in range(100):
+            (found,) = exchange(place, b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+            if found.status == 503:
+                break
+        return found
+    finally:
+        for wire in busy:
+            wire.close()
+
+
+PROVOKED = {
+    "bad-parameter": by_request("GET", f"{CLIP}?{CONTROLS}&turn=20&fps=abc"),
+    "bad-body": by_request("POST", CLIP, json={"controls": {}, "frames": 3}),
+    "malformed-request": by_bytes(b"GET /livez HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n"),
+    "unauthenticated": with_key(),
+    "forbidden": with_key(authorization=f"Bearer {KEY}"),
+    "no-such-path": by_request("GET", "/v1/models/"),
+    "unknown-model": by_request("GET", "/v1/models/reich"),
+    "unknown-format": by_request("GET", f"{MODEL}/clip.fbx"),
+    "method-not-allowed": by_request("PUT", f"{MODEL}/pose"),
+    "not-acceptable": by_request(
+        "GET", f"{MODEL}/pose?{CONTROLS}&turn=20&time=0", headers={"accept": "text/html"}
+    ),
+    "request-too-slow": too_slow,
+    "body-too-large": by_request("POST", CLIP, content=b" " * 65_537, headers=JSON),
+    "url-too-long": by_bytes(b"GET /livez?" + b"a" * 9000 + b" HTTP/1.1\r\nHost: x\r\n\r\n"),
+    "head-too-large": by_bytes(b"GET / HTTP/1.1\r\nHost: x\r\nA: " + b"a" * 17_000 + b"\r\n\r\n"),
+    "unsupported-media-type": by_request(
+        "POST", CLIP, content=b"{}", headers={"content-type": "text/plain"}
+    ),
+    "invalid-field": by_request("GET", f"{CLIP}?{CONTROLS}&turn=20&fps=10000"),
+    "outside-samples": by_request("GET", f"{CLIP}?{CONTROLS}&turn=1000&extrapolate=refuse"),
+    "internal-error": fault,
+    "overloaded": overloaded,
+    "late": late,
+    "not-ready": not_ready,
+    "no-connection-left": no_connection_left,
+}
+
+
+@pytest.fixture(scope="module")
+def place(models):
+    """Host and port of a service that has few connections and waits for nobody."""
+    with process(models, **LIMITS) as served:
+        yield served.place
+
+
+def kinds_declared():
+    return {value for value in vars(problems).values() if isinstance(value, problems.Kind)}
+
+
+def test_every_kind_is_provoked_here_and_is_one_of_all():
+    assert set(PROVOKED) == {kind.name for kind in KINDS}
+    assert kinds_declared() | set(problems.TABLE.values()) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_it_comes_as_its_page_says(kind, app, place, spec):
+    answer = PROVOKED[kind.name](app, place)
+    assert (answer.status, answer.headers["link"]) == (kind.status, kind.help)
+    assert answer.headers["content-type"] == "application/problem+json"
+    found, said = json.loads(answer.body), page.example(kind)
+    schema = {"$ref": "#/components/schemas/Problem", "components": spec["components"]}
+    for problem in (found, said):
+        jsonschema.validate(problem, schema, jsonschema.Draft202012Validator)
+    assert found["instance"] == answer.headers["x-request-id"]
+    assert alike(found | {"instance": ""}) == alike(said | {"instance": ""})
+
+
+def alike(problem):
+    """The problem without what differs from model to model and setting to setting."""
+    return re.sub(r"(reach|walk)@[0-9a-f]{16}(, )?|\d+(\.\d+)?", "", json.dumps(problem))
+
+
+@pytest.mark.parametrize("change", [{"detail": "other"}, {"errors": []}, {"title": "Another"}])
+def test_an_example_that_is_not_so_would_be_seen(change):
+    said = page.example(problems.BAD_PARAMETER)
+    assert alike(said | change) != alike(said)

@@ -1,0 +1,99 @@
+"""Files that are wanted at once are written together, and as each would be alone."""
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+
+from service.encode import ENCODERS
+from service.encode.convention import CENTIMETRES, METRES
+from service.synthesis import session
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+from service.web import writing
+from service.web.writing import Desk
+
+USDC = ENCODERS["usdc"]
+
+
+@pytest.fixture(scope="module")
+def answers(walk_path):
+    model = Synthesizer("walk", session.load(walk_path))
+    controls = {c.name: c.default for c in model.session.card.controls}
+    questions = (controls | {"haste": 3.0 + 0.1 * number} for number in range(40))
+    return [model.clip(ClipQuestion(question)) for question in questions]
+
+
+@pytest.fixture
+def calls():
+    """An encoder that notes how many files each of its calls wrote, and those numbers."""
+    made = []
+
+    def write(answers, convention):
+        made.append(len(answers))
+        return USDC.write(answers, convention)
+
+    return replace(USDC, write=write), made
+
+
+def written(encoder, wanted):
+    async def ask():
+        desk = Desk()
+        files = await asyncio.gather(*(desk.file(encoder, c, a) for c, a in wanted))
+        await asyncio.sleep(0)
+        assert not desk._waiting and not desk._tasks
+        return files
+
+    return asyncio.run(ask())
+
+
+def test_what_is_wanted_at_once_is_written_together(calls, answers):
+    encoder, made = calls
+    files = written(encoder, [(METRES, answer) for answer in answers])
+    assert made == [writing.MOST, writing.MOST, 8]
+    assert files == [USDC.encode(answer, METRES) for answer in answers]
+
+
+def test_conventions_are_not_mixed(calls, answers):
+    encoder, made = calls
+    files = written(encoder, [(c, answers[0]) for c in (METRES, CENTIMETRES)])
+    assert made == [1, 1]
+    assert files == [USDC.encode(answers[0], c) for c in (METRES, CENTIMETRES)]
+
+
+def test_a_long_clip_keeps_nobody_waiting(calls, answers, monkeypatch):
+    encoder, made = calls
+    monkeypatch.setattr(writing, "LONG", len(answers[0].clip) - 1)
+    written(encoder, [(METRES, answers[0])] * 3)
+    assert made == [1, 1, 1]
+
+
+def test_a_fault_reaches_everybody_and_the_next_is_written(answers):
+    def broken(asked, convention):
+        raise RuntimeError("broken")
+
+    async def ask():
+        desk = Desk()
+        wrong = replace(USDC, write=broken)
+        asking = (desk.file(wrong, METRES, answer) for answer in answers[:3])
+        faults = await asyncio.gather(*asking, return_exceptions=True)
+        return faults, await desk.file(USDC, METRES, answers[0])
+
+    faults, file = asyncio.run(ask())
+    assert [str(fault) for fault in faults] == ["broken"] * 3
+    assert file == USDC.encode(answers[0], METRES)
+
+
+def test_a_client_that_went_away_is_passed_over(calls, answers):
+    encoder, made = calls
+
+    async def ask():
+        desk = Desk()
+        tasks = [asyncio.create_task(desk.file(encoder, METRES, a)) for a in answers[:3]]
+        await asyncio.sleep(0)
+        tasks[1].cancel()
+        return await asyncio.gather(*tasks, return_exceptions=True)
+
+    first, gone, last = asyncio.run(ask())
+    assert isinstance(gone, asyncio.CancelledError) and made == [2]
+    assert (first, last) == tuple(USDC.encode(a, METRES) for a in (answers[0], answers[2]))
