@@ -43,7 +43,7 @@ def rows(model: Path, rounds: int = ROUNDS) -> list[Row]:
         _check(ours, other, path, controls)
         return [
             *_poses(ours, other, path, controls, rounds),
-            *_files(ours, other, path, controls, rounds),
+            *_files(ours, path, controls, rounds),
             *_crowds(ours, path, controls, rounds),
             *_waits(ours, path, controls, rounds),
         ]
@@ -104,21 +104,19 @@ def _poses(
     ]
 
 
-def _files(
-    ours: Server, other: Server, path: str, controls: Sequence[Control], rounds: int
-) -> list[Row]:
-    questions = points(controls, QUESTIONS)
-    runs = [
-        (ours, Load(_asked(f"{path}/clip.usdc", questions), ALONE)),
-        (ours, Load(_asked(f"{path}/clip.usdc", questions[:1]), ALONE)),
-        (ours, Load(_asked(f"{path}/clip.json", questions), ALONE)),
-    ]
-    varied, same, numbers = in_turn(runs, rounds)
+def _files(ours: Server, path: str, controls: Sequence[Control], rounds: int) -> list[Row]:
+    usdc, json = (_asked(f"{path}/clip.{e}", points(controls, QUESTIONS)) for e in ("usdc", "json"))
     goal = "500 µs: 2,000 a second on one core"
+    wanted = {
+        f"clip as usdc, {TOGETHER} connections": (Load(usdc, TOGETHER), goal, 500.0),
+        f"one and the same, {TOGETHER} connections": (Load(usdc[:1], TOGETHER), goal, 500.0),
+        "clip as usdc, 1 connection": (Load(usdc, ALONE), "", None),
+        "clip as JSON, 1 connection": (Load(json, ALONE), "", None),
+    }
+    costs = in_turn([(ours, load) for load, _, _ in wanted.values()], rounds)
     return [
-        _cost("clip as usdc", varied, goal, 500.0),
-        _cost("the same clip as usdc again and again", same, goal, 500.0),
-        _cost("clip as JSON", numbers, "", None),
+        _cost(name, own, words, most)
+        for (name, (_, words, most)), own in zip(wanted.items(), costs, strict=True)
     ]
 
 
