@@ -114,6 +114,8 @@ async def slowly_sending(site: Site, rng: random.Random) -> None:
     except GONE as reason:
         if seconds < HEAD_TIME:
             site.book.unanswered(wire, "slow request", reason)
+        else:
+            site.book.faulty["slow: cut off"] += 1
         return
     took = asyncio.get_running_loop().time() - begun
     if took < min(HEAD_TIME, BODY_TIME):

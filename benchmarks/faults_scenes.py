@@ -89,9 +89,12 @@ class Stage:
         while not self.book.ended:
             for worker in self.workers():
                 try:
-                    self.memory.append((monotonic(), worker, resident(worker)))
+                    size = resident(worker)
                 except OSError:
                     continue
+                # One that was killed has none until it is buried.
+                if size:
+                    self.memory.append((monotonic(), worker, size))
             await asyncio.sleep(1.0)
 
     async def play(self, seconds: float, rng: random.Random) -> None:
