@@ -32,11 +32,6 @@ class Operation:
     scope: str | None = None
 
     @cached_property
-    def negotiated(self) -> bool:
-        """Whether Accept chooses among the media types."""
-        return "406" in self.responses
-
-    @cached_property
     def sheds(self) -> bool:
         """Whether it is refused when there is too much to do; what watches the service is not."""
         return self.scope == "read"
