@@ -62,7 +62,7 @@ def started(
     folder: Path | None = None,
 ) -> Iterator[Server]:
     """A server of a command, once it answers at a path, or listens; what it says is in
-    build/serve/NAME.log."""
+    build/serve/NAME.log, which stays where something fails."""
     log = HERE.parent / f"build/serve/{name}.log"
     log.parent.mkdir(parents=True, exist_ok=True)
     core = {min(os.sched_getaffinity(0))}
@@ -80,6 +80,7 @@ def started(
     try:
         _wait(child, port, path, log)
         yield Server(name, url, child.pid)
+        log.unlink()
     finally:
         _end(child)
 

@@ -24,7 +24,7 @@ from service.web.readiness import Readiness
 log = logging.getLogger(__name__)
 
 LINGER = 0.5
-"""Seconds in which connections that have begun are accepted, and the idle ones may yet ask."""
+"""Seconds in which connections that have begun are accepted, and idle ones may yet ask."""
 TICK = 0.02
 CLOSE = (b"connection", b"close")
 
@@ -82,8 +82,10 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell clients to go, stop listening, answer who was let in."""
         for connection in self._connections():
-            if connection.cycle is not None:
-                connection.cycle.keep_alive = False
+            cycle = connection.cycle
+            # Where the head of an answer has gone, nobody would be told.
+            if cycle is not None and not cycle.response_started:
+                cycle.keep_alive = False
         await self._until(self._ending.drain, lambda: False)
         listening.turn_away(sockets or [])
         await self._until(LINGER, lambda: False)
@@ -104,8 +106,10 @@ class Server(uvicorn.Server):
             count += 1
 
     def _done(self) -> bool:
+        # Whoever was answered without being told to go may be asking at this moment.
+        before = asyncio.get_running_loop().time() - LINGER
         for connection in self._connections():
-            if _is_idle(connection):
+            if connection.since < before and _is_idle(connection):
                 connection.transport.close()
         return not self.server_state.connections and not self.server_state.tasks
 

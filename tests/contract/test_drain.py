@@ -1,5 +1,6 @@
 """Told to end, the service answers everybody whom it let in, and sends them away."""
 
+import json
 import signal
 import socket
 import subprocess
@@ -84,6 +85,36 @@ def test_a_head_that_has_begun_is_waited_for(models):
         answer = wire.recv(65536)
         assert answer.startswith(b"HTTP/1.1 200 ") and b"connection: close" in answer
         assert child.wait(5) == 0
+
+
+def test_whoever_is_being_answered_may_ask_once_more(models, controls):
+    """The head of that answer has gone, and could not say that it was the last."""
+    with process(models) as child, socket.create_connection(host_and_port(address(child))) as wire:
+        wire.settimeout(20)
+        wire.sendall(archive(controls))
+        answer = wire.makefile("rb")
+        head = [answer.readline() for _ in range(5)]
+        child.send_signal(signal.SIGTERM)
+        time.sleep(1.0)
+        while line := answer.readline().strip():
+            head.append(line)
+        assert head[0].startswith(b"HTTP/1.1 200 ") and b"connection: close" not in head
+        while size := int(answer.readline(), 16):
+            answer.read(size + 2)
+        answer.readline()
+        time.sleep(0.1)
+        assert exchange(wire)
+        assert child.wait(20) == 0
+
+
+def archive(controls):
+    """Question for more than the buffers of a socket hold."""
+    clips = [{"controls": controls, "fps": 500, "end": 0.5}] * 200
+    body = json.dumps({"format": "json", "clips": clips}).encode()
+    return (
+        b"POST /v1/models/reach/clips.zip HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n"
+        b"Content-Type: application/json\r\n\r\n%b" % (len(body), body)
+    )
 
 
 def opened_for_good(child):

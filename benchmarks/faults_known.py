@@ -1,0 +1,231 @@
+"""Questions whose right answers are known: made in this process, one at a time, nothing amiss."""
+
+import asyncio
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+from urllib.parse import unquote, urlencode, urlsplit
+
+import numpy as np
+import onnx
+import orjson
+from onnx import numpy_helper
+
+from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
+from service.encode.grids import GRID_ENCODERS
+from service.encode.packs import PACKS
+from service.motion.card import Control
+from service.synthesis import session
+from service.synthesis.library import Library
+from service.synthesis.synthesizer import Synthesizer
+from service.web.app import App, create_app
+from service.web.settings import Settings
+
+JSON = ("Content-Type: application/json",)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came back; headers by their names in small letters."""
+
+    status: int
+    headers: Mapping[str, str]
+    body: bytes
+
+    @property
+    def problem(self) -> str | None:
+        """Type of the problem that it tells of, `unsaid` in an answer to HEAD; none where it is of
+        another form than every problem has."""
+        if self.headers.get("content-type") != "application/problem+json":
+            return None
+        return str(orjson.loads(self.body)["type"]) if self.body else "unsaid"
+
+    def is_like(self, other: "Answer") -> bool:
+        """Whether it says the same, to the byte but for what no two answers share."""
+        if (self.status, self.headers.get("etag")) != (other.status, other.headers.get("etag")):
+            return False
+        if self.status >= 400:
+            return self.problem == other.problem
+        return self.body == other.body
+
+
+@dataclass(frozen=True)
+class Question:
+    """A request to a model: what follows the model's name in its URL, header lines, a body."""
+
+    method: str
+    rest: str
+    headers: tuple[str, ...] = ()
+    body: bytes = b""
+
+    def content(self, model: str) -> bytes:
+        """As it travels."""
+        lines = [f"{self.method} /v1/models/{model}{self.rest} HTTP/1.1", "Host: x", *self.headers]
+        if self.body:
+            lines.append(f"Content-Length: {len(self.body)}")
+        return "\r\n".join([*lines, "", ""]).encode() + self.body
+
+
+@dataclass(frozen=True)
+class Known:
+    """A question to a model by its name, or name@hash, and every answer that is right."""
+
+    question: Question
+    model: str
+    right: tuple[Answer, ...]
+
+    @property
+    def content(self) -> bytes:
+        """The request as it travels."""
+        return self.question.content(self.model)
+
+
+def other_version(content: bytes) -> bytes:
+    """A model file that is asked the same and answers otherwise."""
+    model = onnx.load_from_string(content)
+    for tensor in model.graph.initializer:
+        if tensor.name == "core":
+            values = numpy_helper.to_array(tensor) * np.float32(1.01)
+            tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
+    return bytes(model.SerializeToString())
+
+
+def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:
+    """Questions to models of some names, each of which may be of any of the contents, and to each
+    of the first name's versions by its hash."""
+    sessions = [session.open_bytes(content, "version") for content in contents]
+    questions = [*_questions(sessions[0].card.controls)]
+    found = []
+    for name in names:
+        versions = [Synthesizer(name, one) for one in sessions]
+        apps = [create_app(Library({name: model}), Settings()) for model in versions]
+        own = [*questions, *_held(questions, name, apps)]
+        answers = [[asyncio.run(answered(app, q, name)) for app in apps] for q in own]
+        for question, right in zip(own, answers, strict=True):
+            assert right[0].status < 500
+            found.append(Known(question, name, tuple(right)))
+            if name == names[0]:
+                pairs = zip(versions, right, strict=True)
+                found += [Known(question, model.identity, (one,)) for model, one in pairs]
+    return found
+
+
+async def answered(app: App, question: Question, model: str) -> Answer:
+    """Answer of an application in this process."""
+    url = urlsplit(f"/v1/models/{model}{question.rest}")
+    pairs = [line.split(": ", 1) for line in ("Host: x", *question.headers)]
+    scope = {
+        "type": "http",
+        "http_version": "1.1",
+        "method": question.method,
+        "scheme": "http",
+        "path": unquote(url.path),
+        "raw_path": url.path.encode(),
+        "query_string": url.query.encode(),
+        "root_path": "",
+        "headers": [(name.lower().encode(), value.encode()) for name, value in pairs],
+    }
+    sent: list[dict[str, Any]] = []
+    given = iter([{"type": "http.request", "body": question.body, "more_body": False}])
+
+    async def receive() -> dict[str, Any]:
+        if (message := next(given, None)) is not None:
+            return message
+        # Nobody hangs up here.
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    await app(scope, receive, send)
+    headers = {name.decode(): value.decode("latin-1") for name, value in sent[0]["headers"]}
+    body = b"".join(message.get("body", b"") for message in sent[1:])
+    return Answer(sent[0]["status"], headers, b"" if question.method == "HEAD" else body)
+
+
+def _held(questions: Sequence[Question], name: str, apps: Sequence[App]) -> Iterator[Question]:
+    """Some of them by clients that have the answer of the first version already."""
+    for question in [q for q in questions if q.method == "GET"][::3]:
+        answer = asyncio.run(answered(apps[0], question, name))
+        if tag := answer.headers.get("etag"):
+            yield replace(question, headers=(*question.headers, f"If-None-Match: {tag}"))
+
+
+def _questions(controls: Sequence[Control]) -> Iterator[Question]:
+    rng = random.Random(1)
+    yield from _poses(controls, rng)
+    for extension in ENCODERS:
+        for _ in range(2):
+            asked = urlencode({**_point(controls, rng), "fps": rng.choice((25, 60))})
+            yield Question("GET", f"/clip.{extension}?{asked}")
+        body = orjson.dumps({"controls": _point(controls, rng), "fps": 30})
+        yield Question("POST", f"/clip.{extension}", JSON, body)
+    for extension in CROWD_ENCODERS:
+        yield Question("POST", f"/crowd.{extension}", JSON, _crowd(controls, rng, 60))
+    for pack in PACKS:
+        for extension in ("usdc", "glb"):
+            yield Question("POST", f"/clips.{pack}", JSON, _clips(controls, rng, extension, 8))
+    yield from _grids(controls, rng)
+    yield from _refused(controls, rng)
+
+
+def _poses(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
+    for _ in range(60):
+        asked = urlencode({**_point(controls, rng), "time": round(rng.random(), 3)})
+        yield Question("GET", f"/pose?{asked}")
+    for extension in POSE_ENCODERS:
+        asked = urlencode({**_point(controls, rng), "time": round(rng.random(), 3), "level": 1})
+        yield Question("GET", f"/pose.{extension}?{asked}")
+        times = [round(rng.random(), 3) for _ in range(5)]
+        body = orjson.dumps({"controls": _point(controls, rng), "times": times})
+        yield Question("POST", f"/pose.{extension}", JSON, body)
+    for coding in ("gzip", "zstd"):
+        asked = urlencode({**_point(controls, rng), "time": 0.5})
+        yield Question("GET", f"/pose?{asked}", (f"Accept-Encoding: {coding}",))
+    asked = urlencode({**_point(controls, rng), "time": 0.5})
+    yield Question("HEAD", f"/pose?{asked}")
+    yield Question("GET", f"/pose?{asked}", ("Accept: application/vnd.msgpack",))
+
+
+def _grids(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
+    point = _point(controls, rng)
+    yield Question("POST", "/why", JSON, orjson.dumps({"controls": point}))
+    first, second = (control.name for control in controls[:2])
+    for extension in GRID_ENCODERS:
+        yield Question("GET", f"/sigma.{extension}?{urlencode({'across': first, 'along': second})}")
+
+
+def _refused(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
+    """What breaks the contract's form, or has no answer."""
+    point = _point(controls, rng)
+    asked = urlencode({**point, "time": 0.1})
+    yield Question("GET", f"/pose?{asked}&time=nan")
+    yield Question("GET", f"/pose?{asked}&more=1")
+    yield Question("GET", f"/clip.fbx?{asked}")
+    yield Question("GET", f"/pose?{asked}", ("Accept: image/png",))
+    yield Question("DELETE", "/pose")
+    yield Question("POST", "/pose", JSON, b'{"controls": {"stature": 1e400}, "times": [0]}')
+    yield Question("POST", "/pose", JSON, b'{"controls": {')
+    yield Question("POST", "/pose", ("Content-Type: text/plain",), b"[]")
+    yield Question("POST", "/clip.usdc", JSON, orjson.dumps({"controls": point, "fps": -1}))
+    yield Question(
+        "POST", "/crowd.arrow", JSON, orjson.dumps({"controls": point, "time": [0, "x"]})
+    )
+    yield Question("POST", "/clips.zip", JSON, b'{"format": "usdc", "clips": []}')
+
+
+def _point(controls: Sequence[Control], rng: random.Random) -> dict[str, float]:
+    return {c.name: round(rng.uniform(c.minimum, c.maximum), 3) for c in controls}
+
+
+def _crowd(controls: Sequence[Control], rng: random.Random, count: int) -> bytes:
+    points = [_point(controls, rng) for _ in range(count)]
+    columns = {c.name: [point[c.name] for point in points] for c in controls}
+    return orjson.dumps({"controls": columns, "time": [round(rng.random(), 3) for _ in points]})
+
+
+def _clips(controls: Sequence[Control], rng: random.Random, extension: str, count: int) -> bytes:
+    clips = [{"controls": _point(controls, rng), "fps": 60} for _ in range(count)]
+    return orjson.dumps({"format": extension, "clips": clips})

@@ -1,0 +1,202 @@
+"""What is done to the service and its models while clients ask."""
+
+import asyncio
+import os
+import random
+import signal
+import sys
+from collections import Counter
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic
+
+import httpx
+from faults_book import Book
+from faults_clients import BODY_TIME, HEAD_TIME
+from serve_process import POSEFIELD, children, resident
+
+WORKERS = 2
+SETTINGS = {
+    "POSEFIELD_WORKERS": str(WORKERS),
+    "POSEFIELD_RELOAD": "1",
+    "POSEFIELD_HEAD_TIME": str(HEAD_TIME),
+    "POSEFIELD_BODY_TIME": str(BODY_TIME),
+    # Few, so that the refusal is seen too.
+    "POSEFIELD_CONCURRENCY": "12",
+}
+
+
+@dataclass
+class Stage:
+    """The service, the folder of its models, and two contents of one model.
+
+    The folder has `reaching` with both contents as versions of which the newest changes, and the
+    file `plain`, which is replaced. memory: when, process and MB.
+    """
+
+    folder: Path
+    log: Path
+    contents: Sequence[bytes]
+    port: int
+    book: Book
+    child: asyncio.subprocess.Process | None = None
+    done: Counter[str] = field(default_factory=Counter)
+    memory: list[tuple[float, int, float]] = field(default_factory=list)
+
+    def lay_out(self) -> None:
+        """Put the models into the folder."""
+        (self.folder / "reaching").mkdir(parents=True)
+        for number, content in enumerate(self.contents):
+            (self.folder / f"reaching/{number}.onnx").write_bytes(content)
+        (self.folder / "plain.onnx").write_bytes(self.contents[0])
+
+    async def start(self) -> None:
+        """Start the service; return once it listens."""
+        with self.log.open("ab") as said:
+            self.child = await asyncio.create_subprocess_exec(
+                *(POSEFIELD, "serve", self.folder),
+                env={**os.environ, **SETTINGS, "POSEFIELD_PORT": str(self.port)},
+                stdout=asyncio.subprocess.PIPE,
+                stderr=said,
+            )
+        assert self.child.stdout
+        if not await self.child.stdout.readline():
+            sys.exit(f"the service does not start:\n{self.log.read_text()[-3000:]}")
+        self.book.listening = True
+
+    async def end(self) -> None:
+        """Tell the service to end; it does so by itself, and says that all went well."""
+        assert self.child
+        self.book.listening = False
+        self.child.send_signal(signal.SIGTERM)
+        try:
+            async with asyncio.timeout(30):
+                code = await self.child.wait()
+        except TimeoutError:
+            self.book.fault("SIGTERM: it did not end within 30 s")
+            self.child.kill()
+            code = await self.child.wait()
+        if code:
+            self.book.fault(f"SIGTERM: exit code {code}")
+
+    def workers(self) -> list[int]:
+        """Process ids of the workers."""
+        return children(self.child.pid) if self.child and self.child.returncode is None else []
+
+    async def watch(self) -> None:
+        """Look at the workers' memory every second."""
+        while not self.book.ended:
+            for worker in self.workers():
+                try:
+                    self.memory.append((monotonic(), worker, resident(worker)))
+                except OSError:
+                    continue
+            await asyncio.sleep(1.0)
+
+    async def play(self, seconds: float, rng: random.Random) -> None:
+        """Scenes for so many seconds, at least one of each kind."""
+        begun = monotonic()
+        pause = 0.3 if seconds < 120 else 3.0
+        rare = [(0.2, killing), (0.5, restarting), (0.75, killing)]
+        turn = 0
+        while monotonic() - begun < seconds or rare or turn < len(MODEL_SCENES):
+            await asyncio.sleep(pause)
+            if rare and monotonic() - begun > rare[0][0] * seconds:
+                scene = rare.pop(0)[1]
+            else:
+                scene, turn = MODEL_SCENES[turn % len(MODEL_SCENES)], turn + 1
+            self.book.scene = monotonic(), scene.__name__
+            await scene(self, rng)
+            self.done[scene.__name__] += 1
+
+
+Scene = Callable[[Stage, random.Random], Awaitable[None]]
+
+
+async def turning(stage: Stage, rng: random.Random) -> None:
+    """Another version becomes the newest, by a file that comes or goes."""
+    path = stage.folder / f"reaching/{len(stage.contents)}.onnx"
+    if path.exists():
+        path.unlink()
+    else:
+        _put(path, stage.contents[0])
+    await _settled(stage, lambda page: not page["reload"]["faults"])
+
+
+async def replacing(stage: Stage, rng: random.Random) -> None:
+    """Another content takes a file's place."""
+    path = stage.folder / "plain.onnx"
+    _put(path, next(c for c in stage.contents if c != path.read_bytes()))
+    await _settled(stage, lambda page: not page["reload"]["faults"])
+
+
+async def breaking_newest(stage: Stage, rng: random.Random) -> None:
+    """A newer version that cannot be used comes, is told of, and goes."""
+    path = stage.folder / "reaching/9.onnx"
+    _put(path, rng.randbytes(50_000))
+    await _settled(stage, lambda page: page["reload"]["faults"])
+    path.unlink()
+    await _settled(stage, lambda page: not page["reload"]["faults"])
+
+
+async def breaking_in_place(stage: Stage, rng: random.Random) -> None:
+    """A file is cut off where it lies; its place is taken by a whole one later."""
+    path = stage.folder / "plain.onnx"
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    await _settled(stage, lambda page: page["reload"]["faults"])
+    _put(path, whole)
+    await _settled(stage, lambda page: not page["reload"]["faults"])
+
+
+async def killing(stage: Stage, rng: random.Random) -> None:
+    """One worker dies; another takes its place."""
+    worker = rng.choice(stage.workers())
+    stage.book.killed.append(monotonic())
+    os.kill(worker, signal.SIGKILL)
+    await _until(stage, lambda: len(stage.workers()) == WORKERS and worker not in stage.workers())
+
+
+async def restarting(stage: Stage, rng: random.Random) -> None:
+    """SIGTERM in the middle, and a new start at the same port."""
+    await stage.end()
+    await stage.start()
+
+
+MODEL_SCENES: tuple[Scene, ...] = (turning, replacing, breaking_newest, breaking_in_place)
+
+
+def _put(path: Path, content: bytes) -> None:
+    """Put a file in its place in one step."""
+    aside = path.with_name(".aside")
+    aside.write_bytes(content)
+    aside.rename(path)
+
+
+async def _settled(stage: Stage, is_so: Callable[[dict], object]) -> None:
+    """Until the service says so, several times, for a worker each time."""
+    async with httpx.AsyncClient(timeout=30) as client:
+        seen, end = 0, monotonic() + 30
+
+        while seen < 2 * WORKERS:
+            if monotonic() > end:
+                stage.book.fault("what lies in the folder was not noticed within 30 s")
+                return
+            try:
+                page = await client.get(
+                    f"http://127.0.0.1:{stage.port}/readyz", headers={"Connection": "close"}
+                )
+            except httpx.TransportError:
+                continue
+            seen = seen + 1 if page.status_code == 200 and is_so(page.json()) else 0
+            await asyncio.sleep(0.1)
+
+
+async def _until(stage: Stage, is_so: Callable[[], bool]) -> None:
+    end = monotonic() + 30
+    while not is_so():
+        if monotonic() > end:
+            stage.book.fault("a killed worker was not replaced within 30 s")
+            return
+        await asyncio.sleep(0.1)

@@ -1,0 +1,74 @@
+"""The short form of benchmarks/serve_faults.py, and whether it would notice what it looks for."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+sys.path.insert(0, str(BENCHMARKS))
+
+from faults_book import Book  # noqa: E402
+from faults_known import Answer, Known, Question  # noqa: E402
+from faults_wire import Wire  # noqa: E402
+
+RIGHT = Answer(200, {"etag": '"a"'}, b"what it is")
+KNOWN = Known(Question("GET", "/pose"), "reach", (RIGHT,))
+PROBLEM = {"content-type": "application/problem+json"}
+OVERLOADED = Answer(503, PROBLEM, b'{"type": "urn:posefield:problem:overloaded"}')
+
+
+def test_whatever_is_done_to_it_no_answer_is_wrong_and_none_is_lost(models):
+    command = [sys.executable, BENCHMARKS / "serve_faults.py", models / "reach.onnx"]
+    done = subprocess.run([*command, "--seconds", "8"], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == "no fault"
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        replace(RIGHT, body=b"what it is not"),
+        replace(RIGHT, headers={"etag": '"b"'}),
+        replace(RIGHT, headers={}),
+        replace(RIGHT, status=304),
+        replace(OVERLOADED, status=500),
+        replace(OVERLOADED, headers={}),
+        replace(OVERLOADED, body=b'{"type": "urn:posefield:problem:internal-error"}'),
+    ],
+)
+def test_a_wrong_answer_is_noticed(answer):
+    book = Book()
+    book.answered(KNOWN, answer)
+    assert len(book.wrong) == 1
+
+
+def test_a_right_answer_and_a_documented_refusal_are_none():
+    book = Book()
+    book.answered(KNOWN, RIGHT)
+    book.answered(KNOWN, OVERLOADED)
+    assert book.wrong == []
+    assert (book.right, book.refused) == ({200: 1}, {"overloaded": 1})
+
+
+def test_a_request_that_is_not_answered_is_noticed_unless_a_worker_was_killed():
+    book, wire = Book(), Wire(None, None, monotonic())
+    book.unanswered(wire, "request", EOFError())
+    assert len(book.wrong) == 1
+    book.killed.append(monotonic())
+    book.unanswered(wire, "request", EOFError())
+    book.unanswered(replace(wire, begun=monotonic()), "request", EOFError())
+    assert (len(book.wrong), book.broken) == (2, 1)
+
+
+def test_a_connection_that_is_refused_while_somebody_listens_is_noticed():
+    book = Book()
+    book.listening = False
+    book.turned_away(ConnectionRefusedError())
+    assert book.wrong == []
+    book.listening = True
+    book.turned_away(ConnectionRefusedError())
+    assert len(book.wrong) == 1
