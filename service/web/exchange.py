@@ -75,7 +75,6 @@ class Exchange:
     async def run(self) -> None:
         """Answer, whatever happens, and note it."""
         self._site.open += 1
-        metrics.opened(1)
         try:
             await self._finish(await self._response())
         except ClientDisconnect:
@@ -87,7 +86,6 @@ class Exchange:
             await self._fail()
         finally:
             self._site.open -= 1
-            metrics.opened(-1)
             self._note()
 
     async def _fail(self) -> None:
