@@ -4,8 +4,8 @@
 
 Fails when a reader sees a joint elsewhere than our own kinematics, no animation, or another number
 of frames; and when a file passes that was damaged on purpose, or that the reader is known not to
-read. glTF files must also be without an error or a warning to the Khronos validator. Then builds
-the image and asks the service in it.
+read. glTF files must also be without an error or a warning to the Khronos validator, and the
+contract to Redocly. Then builds the image and asks the service in it.
 """
 
 import json
@@ -19,6 +19,7 @@ import container
 import crowds
 import environment
 import exports
+import lint
 import numpy as np
 from compare import Characters, Row, compare
 
@@ -78,7 +79,7 @@ def main() -> int:
         rows += khronos(node, folder)
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
-    others = container.faults()
+    others = lint.faults(node) + container.faults()
     print("\n".join(others) or "no fault in what runs elsewhere")
     return wrong or bool(faults + others)
 
