@@ -99,7 +99,7 @@ BREAKING = {
         f"POST {POSE}: body is gone",
     ),
     "parameter gone": (
-        lambda s: pose(s)["parameters"].pop(),
+        lambda s: pose(s)["parameters"].remove({"$ref": "#/components/parameters/level"}),
         f"GET {POSE}: parameter level is gone",
     ),
     "parameter needed": (
