@@ -2,9 +2,9 @@
 
     make bench
 
-Every ratio compares two things timed in turn in this one run; a row's baseline says in words what
-it is compared with. Medians, one thread inside onnxruntime; the whole call of a crowd takes one for
-each core.
+Needs wrk, which Debian has. Every ratio compares two things timed in turn in this one run; a row's
+baseline says in words what it is compared with. Medians, one thread inside onnxruntime; the whole
+call of a crowd takes one for each core.
 """
 
 import shutil
@@ -22,7 +22,10 @@ import newcomer
 import paper
 import precompute
 import runtime
+import serve
+import serve_growth
 import serve_models
+import serve_rivals
 from rows import Row, table, write
 
 from model_export.evaluate import table1_family, table1_measure, table1_text
@@ -47,7 +50,10 @@ def main() -> None:
         *export.rows(model),
         *export_cluster.rows(model),
         *clips_http.rows(made),
+        *serve.rows(model),
+        *serve_rivals.rows(model),
         *serve_models.rows(model),
+        *serve_growth.rows(model),
         *export_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]

@@ -18,7 +18,7 @@ SCRIPT = Path(__file__).with_name("serve_load.lua")
 @dataclass(frozen=True)
 class Load:
     """What wrk sends: requests in their order, again and again, over so many connections for so
-    many seconds, each connection waiting `think` ms on average before it asks again."""
+    many whole seconds, each connection waiting `think` ms on average before it asks again."""
 
     requests: tuple[bytes, ...]
     connections: int
@@ -28,13 +28,17 @@ class Load:
 
 @dataclass(frozen=True)
 class Cost:
-    """What came of it: requests, seconds, the server's processor time, and latencies, s."""
+    """What came of it: requests, seconds, the server's processor time, and latencies, s.
+
+    size: bytes of an answer, its head among them.
+    """
 
     requests: int
     seconds: float
     processor: float
     median: float
     p99: float
+    size: float
 
     @property
     def each(self) -> float:
@@ -70,7 +74,8 @@ def run(server: Server, load: Load) -> Cost:
     found = json.loads(said.splitlines()[-1])
     if found["wrong"] or not found["requests"]:
         sys.exit(f"{server.name}: {said}")
-    return Cost(found["requests"], found["seconds"], spent, found["median"], found["p99"])
+    count, waits = found["requests"], (found["median"], found["p99"])
+    return Cost(count, found["seconds"], spent, *waits, found["bytes"] / count)
 
 
 def _wrk(url: str, file: Path, load: Load) -> str:

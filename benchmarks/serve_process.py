@@ -138,6 +138,8 @@ def _answers(port: int, path: str | None) -> bool:
 
 
 def _end(child: subprocess.Popen[bytes]) -> None:
+    if child.poll() is not None:
+        sys.exit(f"{child.args} ended by itself, with {child.returncode}")
     child.terminate()
     try:
         child.wait(20)
