@@ -1,5 +1,5 @@
 """The programs that read our files: Blender as a Python module, three.js on Node, and the Khronos
-glTF validator beside it; Redocly, which lints the contract; and what else is installed for the checks.
+glTF validator beside it; Redocly, which lints the contract; and what else the checks install.
 
 Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender and Node are
 fetched where they are missing.

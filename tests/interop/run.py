@@ -4,9 +4,9 @@
 
 Fails when a reader sees a joint elsewhere than our own kinematics, no animation, or another number
 of frames; and when a file passes that was damaged on purpose, or that the reader is known not to
-read. glTF files must also be without an error or a warning to the Khronos validator, and
-the contract to Redocly. Then builds the image and asks the service in it, puts a cache before the service, and asks the model in other
-engines.
+read. glTF files must also be without an error or a warning to the Khronos validator, and the
+contract to Redocly. Then builds the image and asks the service in it, puts a cache before the
+service, and asks the model in other engines.
 """
 
 import json
