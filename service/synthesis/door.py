@@ -33,6 +33,7 @@ class Door:
         self._card = card
         self._ranges = [(control.name, *limits.sampled(control)) for control in card.controls]
         self._names = {control.name for control in card.controls}
+        self._nobody = labels(card.performers, None)
 
     def question(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
@@ -44,7 +45,8 @@ class Door:
         """
         if not controls.keys() <= self._names:
             limits.check_names(self._card, controls)
-        own, coarsest = labels(self._card.performers, performer), len(self._card.levels) - 1
+        own = self._nobody if performer is None else labels(self._card.performers, performer)
+        coarsest = len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         plain = self._plain(controls)

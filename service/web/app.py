@@ -14,8 +14,9 @@ from service.synthesis.library import Library
 from service.synthesis.shelf import Fixed
 from service.web import contract, cors, pages, problems
 from service.web.access import policy
-from service.web.contract import Contract
+from service.web.contract import Contract, Operation
 from service.web.exchange import Exchange, Site
+from service.web.negotiation import Negotiated
 from service.web.operations import OPERATIONS
 from service.web.problems import RequestFault
 from service.web.readiness import Readiness
@@ -58,8 +59,13 @@ def build(
     policy.check_exposure(settings, rules)
     origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
     service = Service(readiness, settings, pages.made(agreed), rules, origins, telling)
-    routes = [Route(o, partial(handlers[o.id], service)) for o in agreed.operations]
+    routes = [_route(operation, handlers[operation.id], service) for operation in agreed.operations]
     return App(Site(Map(routes), service, _missing))
+
+
+def _route(operation: Operation, handler: Handler, service: Service) -> Route:
+    offers = handler.offers if isinstance(handler, Negotiated) else ()
+    return Route(operation, partial(handler, service), offers)
 
 
 class App:

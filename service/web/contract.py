@@ -32,11 +32,6 @@ class Operation:
     scope: str | None = None
 
     @cached_property
-    def negotiated(self) -> bool:
-        """Whether Accept chooses among the media types."""
-        return "406" in self.responses
-
-    @cached_property
     def sheds(self) -> bool:
         """Whether it is refused when there is too much to do; what watches the service is not."""
         return self.scope == "read"
@@ -82,7 +77,7 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 open_query=bool(exploded),
                 media_types=_media_types(document, item[method]["responses"]),
                 responses=frozenset(item[method]["responses"]),
-                scope=_scope(item[method].get("security", document.get("security", []))),
+                scope=scope_of(item[method].get("security", document.get("security", []))),
             )
 
 
@@ -91,7 +86,7 @@ def _media_types(document: Mapping[str, Any], responses: Mapping[str, Any]) -> t
     return tuple(name for node in well for name in node.get("content", ()))
 
 
-def _scope(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
+def scope_of(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
     """The one scope of a security requirement; its other alternative is a service without keys."""
     scopes = [scope for alternative in security for of in alternative.values() for scope in of]
     if len(scopes) > 1:

@@ -6,6 +6,7 @@ from asyncio import Task
 from collections.abc import Awaitable
 from typing import Any, TypeVar
 
+from service.web import metrics
 from service.web.problems import LATE, RequestFault
 
 Answer = TypeVar("Answer")
@@ -60,6 +61,7 @@ class Watch:
         if self._looks:
             loop.call_later(LOOK, self._look)
         now = loop.time()
+        metrics.open_now(len(self._until))
         late = [task for task, until in self._until.items() if until < now]
         for task in late:
             if task not in self._late:

@@ -22,6 +22,7 @@ from service.web import (
     deadline,
     log,
     metrics,
+    negotiation,
     problems,
     protocol,
 )
@@ -74,7 +75,6 @@ class Exchange:
     async def run(self) -> None:
         """Answer, whatever happens, and note it."""
         self._site.open += 1
-        metrics.opened(1)
         try:
             await self._finish(await self._response())
         except ClientDisconnect:
@@ -86,7 +86,6 @@ class Exchange:
             await self._fail()
         finally:
             self._site.open -= 1
-            metrics.opened(-1)
             self._note()
 
     async def _fail(self) -> None:
@@ -142,6 +141,8 @@ class Exchange:
             _check_parameters(self._request, operation)
         if route.compresses and b"accept-encoding" in self._headers:
             self._coding = compression.preferred(self._headers[b"accept-encoding"])
+        if route.offers:
+            scope["format"] = negotiation.format_of(self._request, route.offers)
         if "model" in scope["path_params"]:
             scope["model"] = scope["library"].find(_key(scope["path_params"]))
             if operation.pure:
@@ -165,11 +166,11 @@ class Exchange:
 
     def _parts(self, route: Route) -> tuple[bytes, ...]:
         """All that the answer to a pure question follows from."""
-        scope, accepted = self._scope, b""
-        if route.operation.negotiated:
-            accepted = b",".join(value for name, value in scope["headers"] if name == b"accept")
+        scope, chosen = self._scope, b""
+        if route.offers:
+            chosen = scope["format"].encode()
         model, code = scope["model"], self._site.service.code
-        return code, model.fingerprint, route.name, scope["query_string"], accepted
+        return code, model.fingerprint, route.name, scope["query_string"], chosen
 
     def _check_held(self, *parts: bytes) -> None:
         """Name the answer before it is made; NotModified where the client has it."""

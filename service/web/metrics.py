@@ -36,7 +36,9 @@ _BATCH = prometheus.Histogram(
     "posefield_batch_rows", "Poses that one call of a graph answered together", buckets=ROWS
 )
 _OPEN = prometheus.Gauge(
-    "posefield_open_requests", "Requests that are being answered", multiprocess_mode="livesum"
+    "posefield_open_requests",
+    "Requests that were being answered when last looked at, ten times a second",
+    multiprocess_mode="livesum",
 )
 _MODEL = prometheus.Gauge(
     "posefield_model",
@@ -74,9 +76,9 @@ def batched(rows: int) -> None:
     _BATCH.observe(rows)
 
 
-def opened(change: int) -> None:
-    """Count a request that begins, 1, or ends, -1."""
-    _OPEN.inc(change)
+def open_now(count: int) -> None:
+    """Note how many requests are being answered."""
+    _OPEN.set(count)
 
 
 def models(identities: Iterable[str], reloads: Mapping[str, int]) -> None:

@@ -60,18 +60,19 @@ class _Range:
         return 0 if (self.kind, self.subtype) == ("*", "*") else -1
 
 
-def negotiated(offers: Mapping[str, str], handlers: Mapping[str, Handler]) -> Handler:
-    """Handler that answers by whichever of the handlers makes what the client prefers.
+@dataclass(frozen=True)
+class Negotiated:
+    """Handler that answers by whichever of the handlers makes what the client prefers, which has
+    been found before it is called.
 
-    offers: media type of each format that there is a handler of, the usual one first. The handler
-    raises RequestFault where the client accepts none.
+    offers: names and media types of what there is a handler of, the usual one first.
     """
-    table = tuple(offers.items())
 
-    async def handler(service: Service, request: Request) -> Response:
-        return await handlers[format_of(request, table)](service, request)
+    offers: Offers
+    handlers: Mapping[str, Handler]
 
-    return handler
+    async def __call__(self, service: Service, request: Request) -> Response:
+        return await self.handlers[request.scope["format"]](service, request)
 
 
 def format_of(request: Request, offers: Offers) -> str:

@@ -32,7 +32,6 @@ from service.web import (
     crowd_query,
     inference,
     metrics,
-    negotiation,
     pages,
     pose_operations,
     query,
@@ -41,6 +40,7 @@ from service.web import (
     walk_query,
     why_operations,
 )
+from service.web.negotiation import Format, Negotiated
 from service.web.query import FileQuestion, PoseQuestion
 from service.web.service import CLIPS, CROWDS, Handler, Service
 from service.web.service import model as _model
@@ -183,11 +183,10 @@ _FIXED: dict[str, Handler] = {
 }
 
 
-def _negotiated(stem: str, formats: Mapping[str, negotiation.Format]) -> Handler:
+def _negotiated(stem: str, formats: Mapping[str, Format]) -> Handler:
     """Handler of an operation whose formats, the usual one first, have operations of their own."""
-    offers = {name: found.media_type for name, found in formats.items()}
-    handlers = {name: _FIXED[f"{stem}{name.capitalize()}"] for name in formats}
-    return negotiation.negotiated(offers, handlers)
+    offers = tuple((name, found.media_type) for name, found in formats.items())
+    return Negotiated(offers, {name: _FIXED[f"{stem}{name.capitalize()}"] for name in formats})
 
 
 _USD = {name: ENCODERS[name] for name in ("usdc", "usda", "usdz")}

@@ -28,6 +28,12 @@ Pairs = Sequence[tuple[str, str]]
 """Names and values of a query string in their order."""
 
 Word = TypeVar("Word")
+# typing takes a microsecond for each.
+_NAMESS = get_args(Names)
+_POLICYS = get_args(Policy)
+_ROOTS = get_args(Root)
+_UNITS = get_args(Unit)
+_UPS = get_args(Up)
 FLAGS = {"true": True, "false": False}
 
 
@@ -114,8 +120,8 @@ def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
 def file_of_pairs(pairs: Pairs) -> FileQuestion:
     """Question of query parameters: those of the contract's clip paths, and one per control."""
     single = unique(pairs)
-    unit: Unit | None = _word(single, "unit", get_args(Unit), None)
-    up: Up | None = _word(single, "up", get_args(Up), None)
+    unit: Unit | None = _word(single, "unit", _UNITS, None)
+    up: Up | None = _word(single, "up", _UPS, None)
     return FileQuestion(_clip_of_single(single), unit, up)
 
 
@@ -123,8 +129,8 @@ def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
     """Question of texts by name, of which none is left over: what is no option is a control."""
     policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
-    names = _word(single, "names", get_args(Names), NAMES)
-    root = _word(single, "root", get_args(Root), ROOT)
+    names = _word(single, "names", _NAMESS, NAMES)
+    root = _word(single, "root", _ROOTS, ROOT)
     loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
     numbers = numbers_of(single)
     return ClipQuestion(
@@ -183,7 +189,7 @@ def unique(pairs: Pairs) -> dict[str, str]:
 
 def policy_of(single: dict[str, str]) -> Policy:
     """What is said of `extrapolate`, which is taken out, or the usual."""
-    return _word(single, "extrapolate", get_args(Policy), POLICY)
+    return _word(single, "extrapolate", _POLICYS, POLICY)
 
 
 def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Word) -> Word:

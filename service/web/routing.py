@@ -10,16 +10,18 @@ from starlette.responses import Response
 
 from service.web import compression
 from service.web.contract import Operation
+from service.web.negotiation import Offers
 
 Endpoint = Callable[[Request], Awaitable[Response]]
 
 
 @dataclass(frozen=True)
 class Route:
-    """An operation and what answers it."""
+    """An operation and what answers it; offers: what Accept chooses among, if it does."""
 
     operation: Operation
     endpoint: Endpoint
+    offers: Offers = ()
 
     @cached_property
     def name(self) -> bytes:
@@ -34,7 +36,7 @@ class Route:
     @cached_property
     def vary(self) -> bytes:
         """Which of the request's headers the answer depends on."""
-        named = ("Accept", self.operation.negotiated), ("Accept-Encoding", self.compresses)
+        named = ("Accept", bool(self.offers)), ("Accept-Encoding", self.compresses)
         return ", ".join(name for name, heeded in named if heeded).encode()
 
 

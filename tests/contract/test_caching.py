@@ -52,6 +52,14 @@ def test_a_tag_is_known_without_asking_the_model(ask, app, controls, monkeypatch
     assert ask("GET", url).status_code == 500
 
 
+def test_what_accepts_the_same_has_the_same_tag(ask, controls):
+    url = asked(controls, "clip?")
+    given = ("*/*", "model/vnd.usdc", "text/html, */*;q=0.1", "application/json")
+    tags = [ask("GET", url, headers={"accept": accept}).headers["etag"] for accept in given]
+    assert len(set(tags[:3])) == 1
+    assert tags[3] != tags[0]
+
+
 def test_tags_differ_wherever_answers_may(ask, controls):
     other = {**controls, "turn": controls["turn"] + 1.0}
     urls = [

@@ -114,6 +114,29 @@ def expected_statuses(path, method):
     return statuses | ({"413", "415"} if method == "post" else set())
 
 
+def responses(spec):
+    """Each operation's responses, as (where, status, response)."""
+    for path, item in spec["paths"].items():
+        for method in item.keys() & set(contract.METHODS):
+            for status, node in item[method]["responses"].items():
+                yield f"{method} {path} {status}", status, contract.resolve(spec, node)
+
+
+def test_every_error_has_the_one_shape_and_its_headers(spec):
+    problem = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    for where, status, response in responses(spec):
+        if status[0] in "45":
+            assert response["content"] == problem, where
+            assert "Link" in response["headers"], where
+        assert {"X-Request-Id", "Cache-Control"} <= set(response["headers"]), where
+
+
+def test_headers_that_come_with_a_status_are_documented(spec):
+    special = {"304": "ETag", "401": "WWW-Authenticate", "403": "WWW-Authenticate", "405": "Allow"}
+    for where, status, response in responses(spec):
+        assert special.get(status, "Cache-Control") in response["headers"], where
+
+
 def test_the_contract_lists_every_problem_type(spec):
     listed = spec["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
     assert set(listed) == {kind.type for kind in problems.KINDS}

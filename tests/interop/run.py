@@ -4,9 +4,9 @@
 
 Fails when a reader sees a joint elsewhere than our own kinematics, no animation, or another number
 of frames; and when a file passes that was damaged on purpose, or that the reader is known not to
-read. glTF files must also be without an error or a warning to the Khronos validator. Then builds
-the image and asks the service in it, puts a cache before the service, and asks the model in other
-engines.
+read. glTF files must also be without an error or a warning to the Khronos validator, and the
+contract to Redocly. Then builds the image and asks the service in it, puts a cache before the
+service, and asks the model in other engines.
 """
 
 import json
@@ -22,6 +22,7 @@ import crowds
 import engines
 import environment
 import exports
+import lint
 import numpy as np
 from compare import Characters, Row, compare
 
@@ -81,7 +82,8 @@ def main() -> int:
         rows += khronos(node, folder)
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
-    others = container.faults() + cache.faults() + engines.faults(*environment.node())
+    others = lint.faults(node) + container.faults() + cache.faults()
+    others += engines.faults(*environment.node())
     print("\n".join(others) or "no fault in what runs elsewhere")
     return wrong or bool(faults + others)
 

@@ -1,0 +1,214 @@
+"""The contract keeps what the last released one promised, but for what is listed."""
+
+import copy
+from pathlib import Path
+
+import breaking
+import pytest
+import yaml
+
+
+def version(text):
+    return tuple(map(int, text.split(".")))
+
+
+RELEASED = Path(__file__).parents[2] / "api/released"
+NEWEST = max(RELEASED.glob("[0-9]*.yaml"), key=lambda path: version(path.stem))
+POSE = "/v1/models/{model}/pose"
+
+
+def listed():
+    entries = yaml.safe_load((RELEASED / "breaking.yaml").read_bytes()) or []
+    return sorted(line for entry in entries if entry["why"] for line in entry["changes"])
+
+
+def test_all_that_breaks_the_released_contract_is_listed(spec):
+    assert breaking.changes(yaml.safe_load(NEWEST.read_bytes()), spec) == listed()
+
+
+def test_what_breaks_raises_the_major_version(spec):
+    released, own = version(NEWEST.stem), version(spec["info"]["version"])
+    assert own[0] > released[0] if listed() else own[0] == released[0] and own >= released
+
+
+def test_a_released_contract_lies_under_its_version():
+    for path in RELEASED.glob("[0-9]*.yaml"):
+        assert yaml.safe_load(path.read_bytes())["info"]["version"] == path.stem
+
+
+def test_a_contract_does_not_break_itself(spec):
+    assert breaking.changes(spec, spec) == []
+
+
+def pose(spec):
+    return spec["paths"][POSE]["get"]
+
+
+def schema(spec, name):
+    return spec["components"]["schemas"][name]
+
+
+def without(place, *names):
+    for name in names:
+        del place[name]
+
+
+# How a contract may be changed, and what is then said of it.
+BREAKING = {
+    "path": (
+        lambda s: without(s["paths"], "/livez"),
+        "GET /livez: gone",
+    ),
+    "operation": (
+        lambda s: without(s["paths"][POSE], "post"),
+        f"POST {POSE}: gone",
+    ),
+    "operationId": (
+        lambda s: pose(s).update(operationId="poses"),
+        f"GET {POSE}: operationId changed",
+    ),
+    "key": (
+        lambda s: pose(s).update(security=[{"bearer": ["read"]}]),
+        f"GET {POSE}: needs a key",
+    ),
+    "scope": (
+        lambda s: pose(s).update(security=[{}, {"bearer": ["metrics"]}]),
+        f"GET {POSE}: needs another scope",
+    ),
+    "status": (
+        lambda s: without(pose(s)["responses"], "406"),
+        f"GET {POSE}: status 406 is gone",
+    ),
+    "header": (
+        lambda s: without(s["components"]["responses"]["PosesJson"]["headers"], "ETag"),
+        f"GET {POSE}.json 200: header ETag is gone",
+    ),
+    "media type": (
+        lambda s: without(s["components"]["responses"]["PosesAny"]["content"], "application/x-npz"),
+        f"GET {POSE} 200: media type application/x-npz is gone",
+    ),
+    "body's media type": (
+        lambda s: without(
+            s["components"]["requestBodies"]["InferenceQuestion"]["content"],
+            "application/octet-stream",
+        ),
+        "POST /v2/models/{model}/infer body: media type application/octet-stream is gone",
+    ),
+    "body": (
+        lambda s: without(s["paths"][POSE]["post"], "requestBody"),
+        f"POST {POSE}: body is gone",
+    ),
+    "parameter gone": (
+        lambda s: pose(s)["parameters"].remove({"$ref": "#/components/parameters/level"}),
+        f"GET {POSE}: parameter level is gone",
+    ),
+    "parameter needed": (
+        lambda s: s["components"]["parameters"]["level"].update(required=True),
+        f"GET {POSE}: parameter level is needed",
+    ),
+    "new parameter needed": (
+        lambda s: pose(s)["parameters"].append(
+            {"name": "more", "in": "query", "required": True, "schema": {}}
+        ),
+        f"GET {POSE}: parameter more is needed",
+    ),
+    "type": (
+        lambda s: s["components"]["parameters"]["fps"]["schema"].update(type="string"),
+        "GET /v1/models/{model}/clip fps: no longer number",
+    ),
+    "narrower type": (
+        lambda s: s["components"]["parameters"]["fps"]["schema"].update(type="integer"),
+        "GET /v1/models/{model}/clip fps: no longer number",
+    ),
+    "enumeration": (
+        lambda s: schema(s, "Names")["enum"].remove("vrm"),
+        "Names (asked): no longer 'vrm'",
+    ),
+    "lower bound": (
+        lambda s: s["components"]["parameters"]["fps"]["schema"].update(minimum=2),
+        "GET /v1/models/{model}/clip fps: minimum 2 was 1",
+    ),
+    "upper bound": (
+        lambda s: s["components"]["parameters"]["fps"]["schema"].update(maximum=999),
+        "GET /v1/models/{model}/clip fps: maximum 999 was 1000",
+    ),
+    "new bound": (
+        lambda s: s["components"]["parameters"]["start"]["schema"].update(maximum=9),
+        "GET /v1/models/{model}/clip start: maximum 9 was None",
+    ),
+    "bound of items": (
+        lambda s: schema(s, "PoseQuestion")["properties"]["times"]["items"].update(minimum=1),
+        "PoseQuestion (asked)/times[]: minimum 1 was 0",
+    ),
+    "pattern": (
+        lambda s: s["components"]["parameters"]["model"]["schema"].update(pattern="^reach$"),
+        f"GET {POSE} model: pattern changed",
+    ),
+    "field of a question": (
+        lambda s: without(schema(s, "PoseQuestion")["properties"], "level"),
+        "PoseQuestion (asked)/level: gone",
+    ),
+    "field needed": (
+        lambda s: schema(s, "PoseQuestion")["required"].append("level"),
+        "PoseQuestion (asked)/level: is needed",
+    ),
+    "one of several": (
+        lambda s: schema(s, "CrowdQuestion")["properties"]["level"]["oneOf"].pop(),
+        "CrowdQuestion (asked)/level: ",
+    ),
+    "field of an answer": (
+        lambda s: without(schema(s, "Trust")["properties"], "sigma"),
+        "Trust (answered)/sigma: gone",
+    ),
+    "field of an answer missing": (
+        lambda s: schema(s, "Trust")["required"].remove("sigma"),
+        "Trust (answered)/sigma: may be missing",
+    ),
+    "type of an answer": (
+        lambda s: schema(s, "ModelSummary")["properties"]["name"].update(type=["string", "null"]),
+        "ModelSummary (answered)/name: now may be null",
+    ),
+    "constant of an answer": (
+        lambda s: schema(s, "Liveness")["properties"]["status"].update(const="up"),
+        "Liveness (answered)/status: now may be 'up'",
+    ),
+    "bound of an answer": (
+        lambda s: without(schema(s, "Trust")["properties"]["sigma"], "minimum"),
+        "Trust (answered)/sigma: minimum 0 was None",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BREAKING)
+def test_what_breaks_is_found_and_named(name, spec):
+    change, said = BREAKING[name]
+    changed = copy.deepcopy(spec)
+    change(changed)
+    found = breaking.changes(spec, changed)
+    assert any(line.startswith(said) for line in found), found
+
+
+HARMLESS = {
+    "path": lambda s: s["paths"].update({"/more": s["paths"]["/livez"]}),
+    "status": lambda s: pose(s)["responses"].update({"429": {"description": "too many"}}),
+    "parameter": lambda s: pose(s)["parameters"].append(
+        {"name": "more", "in": "query", "schema": {"type": "number"}}
+    ),
+    "bound": lambda s: s["components"]["parameters"]["fps"]["schema"].update(maximum=2000),
+    "word of a question": lambda s: schema(s, "Names")["enum"].append("cc4"),
+    "field of a question": lambda s: schema(s, "PoseQuestion")["properties"].update(more={}),
+    "field of an answer": lambda s: schema(s, "Trust")["properties"].update(more={}),
+    "problem": lambda s: schema(s, "Problem")["properties"]["type"]["enum"].append("urn:more"),
+    "words": lambda s: schema(s, "Trust").update(description="Otherwise."),
+    "bound of an answer": lambda s: schema(s, "ModelSummary")["properties"].update(
+        name={"type": "string", "minLength": 1}
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+def test_what_breaks_nothing_passes(name, spec):
+    changed = copy.deepcopy(spec)
+    HARMLESS[name](changed)
+    assert changed != spec
+    assert breaking.changes(spec, changed) == []
