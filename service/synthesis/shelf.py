@@ -67,12 +67,15 @@ class Shelf:
     """
 
     def __init__(self, places: Iterable[str | Path], bounds: Bounds) -> None:
-        """Open everything; raises ModelError as `library.load` does."""
+        """Open everything that can be; `check` says what could not."""
         self.library = Library({})
         self.reloads = Reloads()
         self._bounds = bounds
         self._intake = Intake(places, most=1 + bounds.older)
         self._take()
+
+    def check(self) -> None:
+        """Raise ModelError as `library.load` does, for what could not be opened."""
         self._intake.check()
 
     def look(self) -> bool:

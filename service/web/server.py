@@ -55,6 +55,9 @@ def answer(
     """
     settings = work.settings
     shelf = Shelf(work.places, Bounds(settings.versions, settings.versions_memory))
+    # A file that is broken by now stops a process no more than it stopped the one that died.
+    if not (work.again and shelf.library.models):
+        shelf.check()
     readiness = Readiness(shelf)
     lines = log.to_standard_error() if settings.log == "on" else None
     telling = Telling(lines, tracing.of())

@@ -39,11 +39,15 @@ MARGIN = 5.0
 
 @dataclass(frozen=True)
 class Work:
-    """What each process is to answer for, how, and the sockets that all of them listen on."""
+    """What each process is to answer for, how, and the sockets that all of them listen on.
+
+    again: whether it takes the place of one that died.
+    """
 
     places: tuple[str, ...]
     settings: Settings
     sockets: list[socket.socket]
+    again: bool = False
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,7 @@ class Keeper:
         worker.started = time.monotonic()
         self.selector.register(here, selectors.EVENT_READ, worker)
         with suppress(OSError):
-            here.sendall(pickle.dumps((self.work.places, self.work.settings)))
+            here.sendall(pickle.dumps((self.work.places, self.work.settings, self.announced)))
 
     def _hear(self, worker: Worker) -> None:
         try:

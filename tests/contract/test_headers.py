@@ -10,7 +10,10 @@ from service.web import contract
 EXAMPLES = Path(__file__).parents[2] / "api/examples"
 OPERATIONS = {operation.id: operation for operation in contract.load().operations}
 # Of every answer of HTTP, or said once for all of them in the contract's introduction.
-USUAL = {"content-type", "content-length", "content-encoding", "x-content-type-options", "vary"}
+USUAL = {
+    *("content-type", "content-length", "content-encoding", "vary"),
+    *("x-content-type-options", "content-security-policy", "cross-origin-resource-policy"),
+}
 
 
 @pytest.mark.parametrize("name", OPERATIONS)

@@ -79,6 +79,19 @@ def folder(models, tmp_path):
     return tmp_path / "models"
 
 
+def test_one_is_replaced_though_a_file_is_broken_by_now(folder):
+    with process(folder, POSEFIELD_WORKERS="2", POSEFIELD_RELOAD="0") as child:
+        url = address(child)
+        (folder / "broken.onnx").write_bytes(b"not a model")
+        first, second = children(child.pid)
+        os.kill(first, signal.SIGKILL)
+        assert within(20, lambda: len(children(child.pid)) == 2)
+        os.kill(second, signal.SIGKILL)
+        assert within(20, lambda: asked(url))
+        child.send_signal(signal.SIGTERM)
+        assert child.wait(20) == 0
+
+
 def test_one_that_cannot_be_replaced_is_told_by_the_exit_code(folder):
     with process(folder, POSEFIELD_WORKERS="2", POSEFIELD_RELOAD="0") as child:
         url = address(child)

@@ -272,7 +272,7 @@ def test_two_places_of_one_name_are_refused_at_the_start(put, tmp_path):
     put("walk.onnx", 1)
     put("walk/1.onnx", 2)
     with pytest.raises(ModelError, match="a second model named 'walk'"):
-        Shelf([tmp_path], ROOM)
+        Shelf([tmp_path], ROOM).check()
 
 
 def test_a_second_place_of_a_name_leaves_the_first(put, tmp_path):
@@ -290,7 +290,7 @@ def test_a_broken_file_stops_the_start(put, tmp_path):
     put("a.onnx", 1)
     (tmp_path / "b.onnx").write_bytes(b"broken")
     with pytest.raises(ModelError) as caught:
-        Shelf([tmp_path], ROOM)
+        Shelf([tmp_path], ROOM).check()
     assert caught.value.path == str(tmp_path / "b.onnx")
 
 
