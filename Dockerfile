@@ -10,7 +10,8 @@ RUN apt-get update && \
     apt-get install --yes --no-install-recommends binutils && \
     rm -rf /var/lib/apt/lists/*
 RUN pip install --no-cache-dir uv==0.13.8
-# Object stores are 16 MB, Dask another 18: --build-arg EXTRAS="--extra store --extra dask". Parquet is 170.
+# Object stores are 16 MB, Dask another 18, tokens (jwt) 15, traces (trace) 5, Parquet 170:
+# --build-arg EXTRAS="--extra store --extra jwt".
 ARG EXTRAS="--extra store"
 WORKDIR /src
 # Dependencies change seldom, the service often: they get a layer of their own.
