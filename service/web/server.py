@@ -55,7 +55,7 @@ def answer(
     """
     settings = work.settings
     shelf = Shelf(work.places, Bounds(settings.versions, settings.versions_memory))
-    # A file that is broken by now stops a process no more than it stopped the one that died.
+    # Where nobody answers any more, half the models are better than none.
     if not (work.again and shelf.library.models):
         shelf.check()
     readiness = Readiness(shelf)

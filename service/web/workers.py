@@ -41,7 +41,7 @@ MARGIN = 5.0
 class Work:
     """What each process is to answer for, how, and the sockets that all of them listen on.
 
-    again: whether it takes the place of one that died.
+    again: whether it takes the place of the last one that died, with what can still be opened.
     """
 
     places: tuple[str, ...]
@@ -165,8 +165,10 @@ class Keeper:
         worker.channel, worker.reader, worker.fault = here, here.makefile("rb"), None
         worker.started = time.monotonic()
         self.selector.register(here, selectors.EVENT_READ, worker)
+        # While another answers for what has been broken since, this one waits for its repair.
+        again = self.announced and not any(other.listens for other in self.workers)
         with suppress(OSError):
-            here.sendall(pickle.dumps((self.work.places, self.work.settings, self.announced)))
+            here.sendall(pickle.dumps((self.work.places, self.work.settings, again)))
 
     def _hear(self, worker: Worker) -> None:
         try:

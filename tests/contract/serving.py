@@ -87,7 +87,7 @@ class Crowd:
         while not self._ended:
             try:
                 wire = socket.create_connection(self.where, timeout=10)
-            except ConnectionRefusedError:
+            except (ConnectionRefusedError, ConnectionResetError):
                 return
             with wire:
                 self._ask_over(wire, keeps, pause)

@@ -83,6 +83,8 @@ def run(spec, app, accepted, modes, examples):
     """Failures that the phases find, one line each, and how many requests each sent."""
     generation = GenerationConfig(modes=modes, max_examples=examples, deterministic=True)
     checks = ChecksConfig(positive_data_acceptance=accepted)
+    # A list that is too long may be a body that is too long.
+    checks.negative_data_rejection.expected_statuses.append("413")
     project = ProjectConfig(generation=generation, checks=checks, continue_on_failure=True)
     project.phases.update(phases=list(PHASES))
     fewer = GenerationConfig(modes=modes, max_examples=max(1, examples // 8), deterministic=True)
