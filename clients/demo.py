@@ -7,6 +7,7 @@ Needs nothing but Python's own library and the `posefield` command. Ends by itse
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import urllib.error
@@ -37,7 +38,9 @@ def main() -> None:
 def start(model: Path) -> tuple[subprocess.Popen[str], str]:
     """Service on a free port, and its address, once it listens."""
     command = [Path(sys.executable).with_name("posefield"), "serve", model, "--port", "0"]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    # What is said of the answers is for people here, and no log.
+    quiet = {**os.environ, "POSEFIELD_LOG": "off"}
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=quiet)
     assert server.stdout is not None
     line = server.stdout.readline()
     if " at http" not in line:
