@@ -133,7 +133,7 @@ class Synthesizer:
         level: int = 0,
     ) -> Moments:
         """The question of `pose` as far as it can be checked before the model is asked."""
-        question = self._door.question(controls, extrapolate, performer, level)
+        question = self.door.question(controls, extrapolate, performer, level)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
         when = [limits.number(f"times/{i}", value) for i, value in enumerate(times)]
@@ -148,7 +148,7 @@ class Synthesizer:
     def poses(self, asked: Sequence[Moments]) -> list[Row]:
         """What the graph says to questions of as many times and of one level, in one call.
 
-        Where `session.exact`, a question gets the same bytes whatever it is asked with.
+        Where `exact`, a question gets the same bytes whatever it is asked with.
         """
         first = asked[0].question
         if len(asked) == 1 and len(asked[0].when) == 1:
@@ -175,7 +175,8 @@ class Synthesizer:
         return self._exact[level]
 
     @cached_property
-    def _door(self) -> Door:
+    def door(self) -> Door:
+        """What questions about one character must pass."""
         return Door(self.session.card)
 
     @cached_property
@@ -208,9 +209,7 @@ class Synthesizer:
         The N steps of a loop share the duration evenly, but are played at fps. Raises as `pose`
         does, and InvalidField for a loop of what is no cycle and names that no role leads to.
         """
-        question = self._door.question(
-            asked.controls, asked.extrapolate, asked.performer, asked.level
-        )
+        question = self._asked(asked)
         joints = self._joints(asked)
         when = course.times(asked, self._duration(question), most)
         answer = self._answer(question, when)
@@ -233,9 +232,7 @@ class Synthesizer:
         asked for at once, and a question whose end is the clip's own would pass here and be refused
         later. Raises as `clip` does.
         """
-        question = self._door.question(
-            asked.controls, asked.extrapolate, asked.performer, asked.level
-        )
+        question = self._asked(asked)
         self._joints(asked)
         times = course.times(asked, self._duration(question))
         # A loop ends with its first frame again.
@@ -243,7 +240,7 @@ class Synthesizer:
 
     def _asked(self, asked: ClipQuestion) -> Question:
         who, level = asked.performer, asked.level
-        return self._door.question(asked.controls, asked.extrapolate, who, level)
+        return self.door.question(asked.controls, asked.extrapolate, who, level)
 
     def _duration(self, question: Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""

@@ -14,7 +14,8 @@ from service.motion.answer import Captured, Reasons
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
-from service.synthesis import door, limits
+from service.synthesis import limits
+from service.synthesis.door import Question
 from service.synthesis.question import Policy
 from service.synthesis.synthesizer import Synthesizer
 
@@ -45,25 +46,22 @@ def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
     card = model.session.card
     if card.kriging is None:
         raise InvalidField("model", f"{model.identity}, {OLD}")
-    limits.check_names(card, asked.controls)
-    labels = door.labels(card.performers, asked.performer)
-    controls = {c.name: door.required(c, asked.controls) for c in card.controls}
-    said = door.outside(card.controls, np.array([*controls.values()]), asked.extrapolate)
-    point = _point(card, controls, labels)
+    question = model.door.question(asked.controls, asked.extrapolate, asked.performer, level=0)
+    point = _point(card, question)
     distances = model.session.weigher.distances(point)[0]
     weights = model.session.weigher.weights(point)[0]
     order = np.argsort(distances, kind="stable")
     near, others = order[: asked.nearest], order[asked.nearest :]
     found = tuple(_captured(card, i, distances[i], weights[i]) for i in near.tolist())
     rest = float(weights[others].sum())
-    who = asked.performer
+    controls, who, said = question.controls, question.performer, question.warnings
     return Reasons(model.identity, controls, who, said, found, len(others), rest)
 
 
-def _point(card: ModelCard, controls: Mapping[str, float], labels: Floats) -> Floats:
+def _point(card: ModelCard, question: Question) -> Floats:
     """Point (1, d + p) of the field."""
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
-    return np.hstack([field.half_ranges(np.array([[*controls.values()]]), low, high), labels])
+    return np.hstack([field.half_ranges(question.point, low, high), question.labels])
 
 
 def _captured(card: ModelCard, index: int, distance: float, weight: float) -> Captured:

@@ -144,9 +144,10 @@ class Exchange:
         if route.offers:
             scope["format"] = negotiation.format_of(self._request, route.offers)
         if "model" in scope["path_params"]:
-            scope["model"] = scope["library"].find(_key(scope["path_params"]))
+            key = _key(scope["path_params"])
+            scope["model"] = scope["library"].find(key)
             if operation.pure:
-                self._lifetime = site.service.lifetime(_key(scope["path_params"]))
+                self._lifetime = site.service.lifetime(key)
                 self._check_held(*self._parts(route))
         elif page := site.service.pages.get(operation.id):
             self._lifetime = caching.PUBLIC + caching.AGAIN

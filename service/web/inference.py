@@ -17,6 +17,7 @@ from service.web import answers, body, inference_query, problems
 from service.web import tensors as wire
 from service.web.problems import RequestFault
 from service.web.service import CROWDS, Handler, Service
+from service.web.service import model as _model
 from service.web.tensors import Received
 
 HEADER = "Inference-Header-Content-Length"
@@ -99,12 +100,6 @@ OPERATIONS: dict[str, Handler] = {
     "inferVersion": infer,
 }
 """Handler of each operationId."""
-
-
-def _model(request: Request) -> Synthesizer:
-    """The model and version that a path names, found before the operation began."""
-    found: Synthesizer = request.scope["model"]
-    return found
 
 
 def _port(name: str, datatype: str, shape: list[int]) -> dict[str, Any]:

@@ -57,40 +57,40 @@ async def list_models(service: Service, request: Request) -> Response:
 
 async def get_model(service: Service, request: Request) -> Response:
     """What a model says of itself."""
-    return answers.document(answers.card(_model(service, request)))
+    return answers.document(answers.card(_model(request)))
 
 
 async def get_pose(service: Service, request: Request) -> Response:
     """Poses asked for by query parameters."""
-    model = _model(service, request)
+    model = _model(request)
     question = query.pose_of_pairs(query.pairs(request.scope["query_string"]))
     return await _pose(service, model, question)
 
 
 async def query_pose(service: Service, request: Request) -> Response:
     """Poses asked for by a body."""
-    model = _model(service, request)
+    model = _model(request)
     content = await body.read(request, service.settings.body_limit)
     return await _pose(service, model, query.pose_of_body(content))
 
 
 async def get_clip(encoder: Encoder, service: Service, request: Request) -> Response:
     """A clip in the encoder's format, asked for by query parameters."""
-    model = _model(service, request)
+    model = _model(request)
     question = query.file_of_pairs(query.pairs(request.scope["query_string"]))
     return await _clip(service, model, question, encoder)
 
 
 async def query_clip(encoder: Encoder, service: Service, request: Request) -> Response:
     """A clip in the encoder's format, asked for by a body."""
-    model = _model(service, request)
+    model = _model(request)
     content = await body.read(request, service.settings.body_limit)
     return await _clip(service, model, query.file_of_body(content), encoder)
 
 
 async def query_crowd(encoder: CrowdEncoder, service: Service, request: Request) -> Response:
     """Poses of a crowd in the encoder's format, asked for by a body."""
-    model, settings = _model(service, request), service.settings
+    model, settings = _model(request), service.settings
     content = await body.read(request, settings.crowd_body_limit)
     joints = len(model.session.card.skeleton)
     fits = poses_within(settings.output_limit, joints, encoder.per_joint)
@@ -105,7 +105,7 @@ def _crowd(model: Synthesizer, encoder: CrowdEncoder, content: bytes, most: floa
 
 async def get_crowd(ending: str, service: Service, request: Request) -> Response:
     """A crowd that walks, as USD that is sent while it is made."""
-    model, pairs = _model(service, request), query.pairs(request.scope["query_string"])
+    model, pairs = _model(request), query.pairs(request.scope["query_string"])
     question = walk_query.of_pairs(pairs, service.settings)
     made, pieces = await to_thread.run_sync(_walking, model, question, ending, limiter=CROWDS)
     name, media_type = f"{model.name}.{ending}", ENCODERS[ending].media_type
@@ -129,7 +129,7 @@ async def query_clips(
     encoders: Mapping[str, Encoder], pack: Pack, service: Service, request: Request
 ) -> Response:
     """Many clips in an archive that is sent while they are made, asked for by a body."""
-    model, settings = _model(service, request), service.settings
+    model, settings = _model(request), service.settings
     content = await body.read(request, settings.clips_body_limit)
     order = await to_thread.run_sync(
         clips_query.order, model, encoders, content, settings, limiter=CLIPS

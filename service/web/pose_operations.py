@@ -17,14 +17,14 @@ AT_ONCE = 2000
 
 async def get_pose(encoder: PoseEncoder, served: Service, request: Request) -> Response:
     """Poses in the encoder's format, asked for by query parameters."""
-    model = service.model(served, request)
+    model = service.model(request)
     question = query.pose_of_pairs(query.pairs(request.scope["query_string"]))
     return await _pose(model, question, encoder)
 
 
 async def query_pose(encoder: PoseEncoder, served: Service, request: Request) -> Response:
     """Poses in the encoder's format, asked for by a body."""
-    model = service.model(served, request)
+    model = service.model(request)
     content = await body.read(request, served.settings.body_limit)
     return await _pose(model, query.pose_of_body(content), encoder)
 

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar, cast, get_args
 from urllib.parse import parse_qsl
 
@@ -28,12 +29,8 @@ Pairs = Sequence[tuple[str, str]]
 """Names and values of a query string in their order."""
 
 Word = TypeVar("Word")
-# typing takes a microsecond for each.
-_NAMESS = get_args(Names)
-_POLICYS = get_args(Policy)
-_ROOTS = get_args(Root)
-_UNITS = get_args(Unit)
-_UPS = get_args(Up)
+# get_args takes a microsecond.
+_choices = cache(get_args)
 FLAGS = {"true": True, "false": False}
 
 
@@ -120,8 +117,8 @@ def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
 def file_of_pairs(pairs: Pairs) -> FileQuestion:
     """Question of query parameters: those of the contract's clip paths, and one per control."""
     single = unique(pairs)
-    unit: Unit | None = _word(single, "unit", _UNITS, None)
-    up: Up | None = _word(single, "up", _UPS, None)
+    unit: Unit | None = _word(single, "unit", _choices(Unit), None)
+    up: Up | None = _word(single, "up", _choices(Up), None)
     return FileQuestion(_clip_of_single(single), unit, up)
 
 
@@ -129,8 +126,8 @@ def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
     """Question of texts by name, of which none is left over: what is no option is a control."""
     policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
-    names = _word(single, "names", _NAMESS, NAMES)
-    root = _word(single, "root", _ROOTS, ROOT)
+    names = _word(single, "names", _choices(Names), NAMES)
+    root = _word(single, "root", _choices(Root), ROOT)
     loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
     numbers = numbers_of(single)
     return ClipQuestion(
@@ -189,7 +186,7 @@ def unique(pairs: Pairs) -> dict[str, str]:
 
 def policy_of(single: dict[str, str]) -> Policy:
     """What is said of `extrapolate`, which is taken out, or the usual."""
-    return _word(single, "extrapolate", _POLICYS, POLICY)
+    return _word(single, "extrapolate", _choices(Policy), POLICY)
 
 
 def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Word) -> Word:

@@ -67,7 +67,7 @@ class Service:
 Handler = Callable[[Service, Request], Awaitable[Response]]
 
 
-def model(service: Service, request: Request) -> Synthesizer:
+def model(request: Request) -> Synthesizer:
     """The model that a path names, which was found before the operation began."""
     found: Synthesizer = request.scope["model"]
     return found

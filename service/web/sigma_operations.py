@@ -18,13 +18,13 @@ AT_ONCE = 1024
 
 async def get_sigma(encoder: GridEncoder, served: Service, request: Request) -> Response:
     """A grid in the encoder's format, asked for by query parameters."""
-    model, pairs = service.model(served, request), query.pairs(request.scope["query_string"])
+    model, pairs = service.model(request), query.pairs(request.scope["query_string"])
     return await _answer(model, sigma_query.of_pairs(pairs, served.settings), encoder)
 
 
 async def query_sigma(encoder: GridEncoder, served: Service, request: Request) -> Response:
     """A grid in the encoder's format, asked for by a body."""
-    model = service.model(served, request)
+    model = service.model(request)
     content = await body.read(request, served.settings.body_limit)
     return await _answer(model, sigma_query.of_body(content, served.settings), encoder)
 

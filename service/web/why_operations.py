@@ -16,13 +16,13 @@ AT_ONCE = 100
 
 async def get_why(served: Service, request: Request) -> Response:
     """Reasons asked for by query parameters."""
-    model = service.model(served, request)
+    model = service.model(request)
     return await _answer(model, why_query.of_pairs(query.pairs(request.scope["query_string"])))
 
 
 async def query_why(served: Service, request: Request) -> Response:
     """Reasons asked for by a body."""
-    model = service.model(served, request)
+    model = service.model(request)
     content = await body.read(request, served.settings.body_limit)
     return await _answer(model, why_query.of_body(content))
 
