@@ -2,10 +2,12 @@
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import stores
 
 from model_export import export, ingest, recipe, train
 from model_export.export import Exported
@@ -14,6 +16,20 @@ from model_export.recipe import Recipe
 from model_export.sample import stroll, write
 from model_export.train import Trained
 from service import cli
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory) -> Iterator[str]:
+    """Address of an object store's server."""
+    with stores.serving(tmp_path_factory.mktemp("store") / "said") as address:
+        yield address
+
+
+@pytest.fixture
+def store_environment(store, monkeypatch) -> None:
+    """The environment that says where the store is and who asks."""
+    for name, value in stores.told(store).items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture

@@ -86,11 +86,16 @@ ENCODERS = {
 
 @dataclass(frozen=True)
 class PoseEncoder:
-    """How one format of poses at some times is named and made."""
+    """How one format of poses at some times is named and made.
+
+    at_once: poses up to which it is asked for and written in so little time (a millisecond) that
+    others may wait for it; of the binary ones that is mostly the graph's.
+    """
 
     extension: str
     media_type: str
     write: Callable[[Table], bytes]
+    at_once: int = 2000
 
     def encode(self, answer: PoseAnswer[Any]) -> bytes:
         """Bytes of an answer."""
@@ -100,7 +105,7 @@ class PoseEncoder:
 POSE_ENCODERS = {
     encoder.extension: encoder
     for encoder in (
-        PoseEncoder("json", JSON, tables.json),
+        PoseEncoder("json", JSON, tables.json, at_once=200),
         PoseEncoder("msgpack", MSGPACK, tables.msgpack),
         PoseEncoder("npz", NPZ, tables.npz),
         PoseEncoder("arrow", ARROW, arrow),

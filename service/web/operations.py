@@ -13,7 +13,6 @@ from service.encode import (
     POSE_ENCODERS,
     CrowdEncoder,
     Encoder,
-    poses,
     poses_within,
 )
 from service.encode import crowd as crowd_usd
@@ -23,7 +22,7 @@ from service.export import pack as packing
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.course import MOST_POSES
-from service.synthesis.synthesizer import Moments, Row, Synthesizer
+from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
     answers,
@@ -41,13 +40,10 @@ from service.web import (
     why_operations,
 )
 from service.web.negotiation import Format, Negotiated
-from service.web.query import FileQuestion, PoseQuestion
+from service.web.query import FileQuestion
 from service.web.service import CLIPS, CROWDS, Handler, Service
 from service.web.service import model as _model
 from service.web.walk_query import WalkQuestion
-
-# 200 poses of 33 joints take 1 ms as JSON; more would hold up other requests.
-INLINE_POSES = 200
 
 
 async def list_models(service: Service, request: Request) -> Response:
@@ -58,20 +54,6 @@ async def list_models(service: Service, request: Request) -> Response:
 async def get_model(service: Service, request: Request) -> Response:
     """What a model says of itself."""
     return answers.document(answers.card(_model(request)))
-
-
-async def get_pose(service: Service, request: Request) -> Response:
-    """Poses asked for by query parameters."""
-    model = _model(request)
-    question = query.pose_of_pairs(query.pairs(request.scope["query_string"]))
-    return await _pose(service, model, question)
-
-
-async def query_pose(service: Service, request: Request) -> Response:
-    """Poses asked for by a body."""
-    model = _model(request)
-    content = await body.read(request, service.settings.body_limit)
-    return await _pose(service, model, query.pose_of_body(content))
 
 
 async def get_clip(encoder: Encoder, service: Service, request: Request) -> Response:
@@ -165,8 +147,6 @@ async def get_metrics(service: Service, request: Request) -> Response:
 _FIXED: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
-    "getPoseJson": get_pose,
-    "queryPoseJson": query_pose,
     **pose_operations.OPERATIONS,
     **sigma_operations.OPERATIONS,
     **why_operations.OPERATIONS,
@@ -204,20 +184,6 @@ OPERATIONS: dict[str, Handler] = {
     "querySigma": _negotiated("querySigma", GRID_ENCODERS),
 }
 """Handler of each operationId."""
-
-
-async def _pose(service: Service, model: Synthesizer, question: PoseQuestion) -> Response:
-    controls, times, policy = question.controls, question.times, question.extrapolate
-    asked = model.moments(controls, times, policy, question.performer, question.level)
-    if len(times) > INLINE_POSES:
-        content = await to_thread.run_sync(_posed, model, asked, None)
-    else:
-        content = _posed(model, asked, await service.batcher.row(model, asked))
-    return Response(content, media_type="application/json")
-
-
-def _posed(model: Synthesizer, asked: Moments, row: Row | None) -> bytes:
-    return poses.json(model.posed(asked, row or model.poses([asked])[0]))
 
 
 async def _clip(

@@ -2,10 +2,8 @@
 
 import asyncio
 import io
-import os
 import socket
 import subprocess
-import sys
 import tarfile
 import threading
 import time
@@ -17,6 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import httpx
+import serving
 import uvicorn
 from starlette.types import ASGIApp
 
@@ -65,16 +64,8 @@ class Served:
 @contextmanager
 def process(*paths: Path, **environ: str) -> Iterator[Served]:
     """The service as a process of its own; killed where the test leaves it running."""
-    command = [Path(sys.executable).with_name("posefield"), "serve", *paths]
-    quiet = {"POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "1"}
-    given = {**os.environ, **quiet, **environ}
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, env=given, stdout=pipe, stderr=pipe) as child:
-        try:
-            host, port = child.stdout.readline().decode().split("//")[-1].split(":")
-            yield Served(child, (host, int(port)))
-        finally:
-            child.kill()
+    with serving.process(*paths, POSEFIELD_WORKERS="1", **environ) as child:
+        yield Served(child, serving.host_and_port(serving.address(child)))
 
 
 @dataclass(frozen=True)

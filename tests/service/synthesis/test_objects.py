@@ -9,25 +9,13 @@ from service.synthesis.library import Bounds
 from service.synthesis.objects import connect
 from service.synthesis.shelf import Shelf
 
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory):
-    """Address of a store's server."""
-    with stores.serving(tmp_path_factory.mktemp("server") / "said") as address:
-        yield address
-
-
-@pytest.fixture(autouse=True)
-def told(server, monkeypatch):
-    """The environment that says where the store is and who asks."""
-    for name, value in stores.told(server).items():
-        monkeypatch.setenv(name, value)
+pytestmark = pytest.mark.usefixtures("store_environment")
 
 
 @pytest.fixture
-def url(server, request):
+def url(store, request):
     """URL of a place in a bucket of the test's own."""
-    return f"s3://{stores.bucket(server, request.node.name)}/models"
+    return f"s3://{stores.bucket(store, request.node.name)}/models"
 
 
 @pytest.fixture
