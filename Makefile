@@ -23,6 +23,23 @@ $(ENV): pyproject.toml uv.lock
 .PHONY: install
 install: $(ENV) ## install into .venv what the lock file names
 
+# Node comes with the environment; packages are those of the lock file.
+NODE := clients/node_modules/.installed
+$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json | $(ENV)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --prefix clients --silent --no-audit --no-fund
+	@touch $@
+
+.PHONY: node
+node: $(NODE) ## install into clients/node_modules what its lock file names
+
+# What the service answers `/` with: one file, made of the page's sources and of nothing else.
+PAGE := service/web/viewer/index.html
+$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
+
+.PHONY: page
+page: $(PAGE) ## build the page that the service shows at /
+
 $(SAMPLE)/recipe.toml: | $(ENV)
 	$(BIN)/posefield sample reaching --output $(SAMPLE)
 

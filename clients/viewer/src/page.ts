@@ -1,0 +1,23 @@
+/** What every part of the page is given. A part is a module with `mount(host, page)`. */
+
+import type { Client, ModelCard } from "@posefield/client";
+
+import type { Scene } from "./scene.ts";
+import type { Store } from "./state.ts";
+
+/** Who answers: a service, or a model in the browser itself (offline/). */
+export type Source = Pick<Client, "models" | "card" | "pose" | "clip" | "crowd" | "sigma" | "why">;
+
+export interface Page {
+  readonly store: Store;
+  readonly source: Source;
+  /** Of the model that is shown; parts are mounted anew when another is chosen. */
+  readonly card: ModelCard;
+  readonly scene: Scene;
+  /** Says what happened and goes on; `null` when all is well again. */
+  readonly notice: (fault: unknown) => void;
+  /** Ends when the parts are taken away: listeners and questions hang on it. */
+  readonly signal: AbortSignal;
+}
+
+export type Mount = (host: HTMLElement, page: Page) => void;

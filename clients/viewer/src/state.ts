@@ -1,0 +1,59 @@
+/** What the page shows, in one place; the address bar's hash holds it, so that it can be sent on. */
+
+export type View = "one" | "levels" | "crowd";
+
+export interface State {
+  readonly model: string;
+  /** A number for each control, in its unit. */
+  readonly controls: Readonly<Record<string, number>>;
+  readonly performer: string | null;
+  readonly level: number;
+  /** Seconds from the start of the clip. */
+  readonly time: number;
+  readonly playing: boolean;
+  /** Times as fast as it was moved. */
+  readonly speed: number;
+  readonly loop: boolean;
+  readonly root: "travelling" | "in_place";
+  readonly body: "stick" | "mannequin";
+  readonly ghost: boolean;
+  readonly feet: boolean;
+  readonly view: View;
+  /** The two controls of the map. */
+  readonly across: string;
+  readonly along: string;
+}
+
+export type Listener = (state: State, changed: ReadonlySet<keyof State>) => void;
+
+/** The state and who wants to know of its changes. */
+export class Store {
+  #state: State;
+  readonly #listeners = new Set<Listener>();
+
+  constructor(state: State) {
+    this.#state = state;
+  }
+
+  get state(): State {
+    return this.#state;
+  }
+
+  /** Takes what differs, and tells everybody once. */
+  set(part: Partial<State>): void {
+    const before = this.#state;
+    const entries = Object.entries(part) as [keyof State, State[keyof State]][];
+    const changed = new Set(
+      entries.filter(([key, value]) => before[key] !== value).map(([key]) => key),
+    );
+    if (!changed.size) return;
+    this.#state = { ...before, ...part };
+    for (const listener of this.#listeners) listener(this.#state, changed);
+  }
+
+  /** Returns how to stop being told. */
+  listen(listener: Listener): () => void {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  }
+}

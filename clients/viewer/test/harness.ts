@@ -1,0 +1,40 @@
+/** A browser and the page in it; POSEFIELD_URL says where a service runs, CHROMIUM what to start. */
+
+import { type Browser, chromium, type Page } from "playwright-core";
+
+const ARGUMENTS = [
+  "--no-sandbox",
+  "--use-gl=angle",
+  "--use-angle=swiftshader",
+  "--enable-unsafe-swiftshader",
+  "--no-first-run",
+  "--disable-quic",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+];
+
+export const SERVICE = process.env["POSEFIELD_URL"] ?? "http://127.0.0.1:8000";
+
+export function browser(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+    args: ARGUMENTS,
+  });
+}
+
+/** The page at that address (`/` and a hash); `faults` gathers what goes wrong in it unnoticed. */
+export async function opened(
+  from: Browser,
+  path = "/",
+  size = { width: 1280, height: 720 },
+): Promise<{ page: Page; faults: string[] }> {
+  const page = await from.newPage({ viewport: size });
+  const faults: string[] = [];
+  page.on("pageerror", (fault) => faults.push(String(fault)));
+  page.on("console", (line) => {
+    if (line.type() === "error") faults.push(line.text());
+  });
+  await page.goto(SERVICE + path);
+  return { page, faults };
+}
