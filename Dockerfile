@@ -28,8 +28,9 @@ WORKDIR /src
 # service/web/openapi.yaml is a link into api/.
 COPY api api
 COPY service service
+# `make page` builds it, once for every machine: the image needs no Node.
 # hadolint ignore=SC2086
-RUN uv sync --frozen --no-dev --no-editable ${EXTRAS}
+RUN test -f service/web/viewer/index.html && uv sync --frozen --no-dev --no-editable ${EXTRAS}
 # What is in it, by what is installed: /opt/posefield/share/sbom.cdx.json (CycloneDX).
 RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
 

@@ -51,18 +51,18 @@ demo: $(MODEL) ## sample, train, serve, ask over HTTP: clips in build/demo
 	$(BIN)/python clients/demo.py $(MODEL) build/demo
 
 .PHONY: run
-run: $(MODEL) ## the same, but the service stays up on port 8000
+run: $(MODEL) $(PAGE) ## the same, but the service stays up on port 8000
 	$(BIN)/posefield serve build/models
 
 .PHONY: test
-test: $(ENV) ## lint, types, layers and all tests (no Blender, no browser)
+test: $(PAGE) ## lint, types, layers and all tests (no Blender, no browser)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto
 
 .PHONY: interop
-interop: $(ENV) ## other readers of our files, other engines of a model, the image really built
+interop: $(PAGE) ## other readers of our files, other engines of a model, the image really built
 	$(BIN)/python tests/interop/run.py
 
 .PHONY: audit
@@ -79,4 +79,4 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist .venv .venv-blender .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist service/web/viewer clients/node_modules .venv .venv-blender .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis

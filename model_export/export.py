@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost, levels, phase, samples, strangers, threads
+from model_export import cost, fidelity, levels, phase, samples, strangers, threads
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -156,6 +156,8 @@ def _card(
         sources=tuple(example.row.source for example in examples),
         kriging=_plainly(trained.pose.hyper),
         roles={str(role): joint for role, joint in recipe.roles.items()},
+        left_out=tuple(map(_round, np.sqrt(trained.missed))),
+        event=fidelity.event(recipe, examples),
     )
 
 

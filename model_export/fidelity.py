@@ -14,6 +14,7 @@ from model_export.ingest import Example
 from model_export.recipe import Recipe
 from model_export.tensor import MotionTensor
 from service.motion import skeleton
+from service.motion.card import Event
 from service.motion.conventions import Floats
 from service.motion.errors import TrainingError
 
@@ -112,10 +113,21 @@ def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
     return Moment(names.index(event.joint), _frame(recipe, event.at, examples))
 
 
+def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
+    """The same for who knows no canonical frames; None where the recipe names no event."""
+    found = moment(recipe, examples)
+    if found is None or recipe.event is None:
+        return None
+    return Event(found.joint, round(_share(recipe, recipe.event.at, examples), 4))
+
+
 def _frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> int:
     """Canonical frame of the event: landmarks were brought to the mean of their times."""
-    last = recipe.motion.frames - 1
+    return round((recipe.motion.frames - 1) * _share(recipe, at, examples))
+
+
+def _share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:
     if at == "end":
-        return last
+        return 1.0
     mark = recipe.clips.landmarks.index(at)
-    return round(last * float(np.mean([example.landmarks[mark] for example in examples])))
+    return float(np.mean([example.landmarks[mark] for example in examples]))

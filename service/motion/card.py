@@ -38,6 +38,17 @@ class Control:
 
 
 @dataclass(frozen=True)
+class Event:
+    """What the motion is for: a joint, at a moment.
+
+    share: of a clip's duration, in the mean over the captured ones.
+    """
+
+    joint: int
+    share: float
+
+
+@dataclass(frozen=True)
 class ModelCard:
     """Everything a client needs to know of a model but its weights.
 
@@ -51,7 +62,9 @@ class ModelCard:
     measured. provenance: recipe, hashes of the data, versions, licence. roles: joints by the part
     that each plays (service/motion/roles.py), empty where nobody said. sources (N,): file and
     frames of each captured clip. kriging: what the weight of each of them hangs on; None, and no
-    sources, in files older than these.
+    sources, in files older than these. left_out (N,): how far each of them lies from what the
+    others predict for it, root mean square over joints and frames, m; empty in files older than
+    this. event: None where the recipe names none, and in files older than this.
     """
 
     name: str
@@ -74,6 +87,8 @@ class ModelCard:
     roles: Mapping[str, str] = field(default_factory=dict)
     sources: tuple[str, ...] = ()
     kriging: Hyper | None = None
+    left_out: tuple[float, ...] = ()
+    event: Event | None = None
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""
@@ -103,6 +118,8 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "roles": dict(card.roles),
         "sources": list(card.sources),
         "kriging": _plain_hyper(card.kriging),
+        "left_out": list(card.left_out),
+        "event": asdict(card.event) if card.event else None,
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -174,7 +191,13 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         roles=_roles(plain),
         sources=tuple(plain.get("sources", ())),
         kriging=_hyper(plain.get("kriging")),
+        left_out=tuple(plain.get("left_out", ())),
+        event=_event(plain.get("event")),
     )
+
+
+def _event(plain: Mapping[str, Any] | None) -> Event | None:
+    return None if plain is None else Event(**plain)
 
 
 def _hyper(plain: Mapping[str, Any] | None) -> Hyper | None:

@@ -58,7 +58,9 @@ def build(
     rules = policy.of(settings)
     policy.check_exposure(settings, rules)
     origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
-    service = Service(readiness, settings, pages.made(agreed), rules, origins, telling)
+    service = Service(
+        readiness, settings, agreed.version, pages.made(agreed), rules, origins, telling
+    )
     routes = [_route(operation, handlers[operation.id], service) for operation in agreed.operations]
     return App(Site(Map(routes), service, _missing))
 

@@ -50,6 +50,11 @@ class Contract:
     document: Mapping[str, Any]
     operations: tuple[Operation, ...]
 
+    @property
+    def version(self) -> str:
+        """Of the contract, not of the service."""
+        return str(self.document["info"]["version"])
+
 
 def load() -> Contract:
     """Contract that lies beside this module."""

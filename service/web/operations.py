@@ -125,7 +125,7 @@ async def query_clips(
 
 async def live(service: Service, request: Request) -> Response:
     """That the process answers."""
-    return answers.document({"status": "live"})
+    return answers.document({"status": "live", "contract": service.contract})
 
 
 async def ready(service: Service, request: Request) -> Response:

@@ -42,10 +42,12 @@ class Page:
 
 @dataclass(frozen=True)
 class Service:
-    """What every operation may use; pages: by operationId."""
+    """What every operation may use; contract: its version. pages: by
+    operationId."""
 
     readiness: Readiness
     settings: Settings
+    contract: str
     pages: Mapping[str, Page]
     rules: Policy
     origins: frozenset[bytes] = frozenset()

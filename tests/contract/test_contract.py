@@ -78,7 +78,7 @@ def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats,
         assert answer["content"] == {found.media_type: contents[found.media_type]}
 
 
-PAGES = {"/openapi.yaml", "/openapi.json", "/docs", "/problems"}
+PAGES = {"/openapi.yaml", "/openapi.json", "/docs", "/problems", "/"}
 OPEN = {"/livez", "/readyz", "/v2", "/v2/health/live", "/v2/health/ready", *PAGES}
 
 

@@ -15,13 +15,13 @@ from service.web import contract, pages
 from service.web.access import keys
 from service.web.app import create_app
 from service.web.contract import Contract
-from service.web.pages import docs, html
+from service.web.pages import docs, html, viewer
 from service.web.pages.texts import TEXTS
 from service.web.problems import KINDS
 from service.web.settings import Settings
 
 HTML = ["/docs", "/problems"]
-ALL = ["/openapi.yaml", "/openapi.json", *HTML]
+ALL = ["/openapi.yaml", "/openapi.json", "/", *HTML]
 
 
 def test_the_contract_is_served_as_it_is_written(ask, spec):
@@ -153,3 +153,45 @@ def test_every_kind_of_problem_has_its_text_and_its_place(ask):
         assert f'<article id="{kind.name}">' in page
         for part in (kind.type, str(kind.status)):
             assert part in page
+
+
+@pytest.fixture
+def built(tmp_path, monkeypatch):
+    """Puts a page where the built one lies."""
+
+    def put(text: str) -> str:
+        path = tmp_path / "index.html"
+        path.write_text(text)
+        monkeypatch.setattr(viewer, "BUILT", path)
+        return viewer.page().headers["Content-Security-Policy"]
+
+    return put
+
+
+def test_the_viewer_runs_what_was_built_and_nothing_else(built):
+    one = built("<script type='module' crossorigin>go()</script><style>a { b: c }</style>")
+    for tag, content in (("script", "go()"), ("style", "a { b: c }")):
+        digest = b64encode(sha256(content.encode()).digest()).decode()
+        assert f"{tag}-src 'sha256-{digest}';" in one
+    assert "default-src 'none'" in one and "unsafe" not in one
+    assert built("<script>go( )</script>").partition("style-src")[0] not in one
+    assert "script-src 'none'" in built("<p>nothing")
+
+
+def test_without_a_built_page_it_says_how_to_build_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(viewer, "BUILT", tmp_path / "index.html")
+    assert b"make page" in viewer.page().content
+
+
+def test_the_built_page_is_served_and_loads_nothing(ask):
+    answer = ask("GET", "/")
+    assert answer.content == viewer.BUILT.read_bytes()
+    text = re.sub(
+        r"<script\b[^>]*>.*?</script>|<style\b[^>]*>.*?</style>", "", answer.text, flags=re.S
+    )
+    assert loads(text.replace('<link rel="icon" href="data:,"', "")) == []
+    assert " style=" not in text
+
+
+def test_the_service_says_which_contract_it_speaks(ask, spec):
+    assert ask("GET", "/livez").json() == {"status": "live", "contract": spec["info"]["version"]}

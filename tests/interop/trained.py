@@ -35,6 +35,15 @@ def family() -> tuple[Synthesizer, bytes]:
         return _trained(path, path.parent)
 
 
+@cache
+def real(name: str) -> bytes | None:
+    """File of the model of a recipe for real motion; None where there is none of it."""
+    if not DATA.exists():
+        print(f"no motion capture in {DATA}: set POSEFIELD_DATA")
+        return None
+    return _trained(ROOT / f"model_export/recipes/{name}.toml", DATA)[1]
+
+
 def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, data)

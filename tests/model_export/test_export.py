@@ -140,6 +140,21 @@ def test_the_whole_familys_file_opens_as_a_model(full_family):
     assert card.control("turn").values == ()
 
 
+def test_the_card_says_how_far_each_clip_lies_from_the_others_word(full_family):
+    path, said = full_family
+    card = session.load(path).card
+    mean = np.sqrt(np.mean(np.square(card.left_out)))
+    assert len(card.left_out) == len(card.examples) == 92
+    assert abs(mean - said["leave_one_out_rms_m"]) < 1e-5
+    # Negative control: they are not all alike.
+    assert max(card.left_out) > 2 * min(card.left_out)
+
+
+def test_the_card_says_what_the_motion_is_for(full_family):
+    card = session.load(full_family[0]).card
+    assert (card.skeleton.names[card.event.joint], card.event.share) == ("RightHand", 1.0)
+
+
 def test_graph_and_reference_agree_at_ten_thousand_points(exported, model_path, opened):
     assert export.POINTS == 10_000 and export.ALLOWED == GATE
     worst = export.gate(exported.model, model_path.read_bytes(), opened.card)

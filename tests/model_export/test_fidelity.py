@@ -66,18 +66,23 @@ def test_joint_weights_weigh_the_rms_alone(judge, reduced, gaps):
 def test_without_an_event_there_is_no_effector(small_recipe, trained, reduced):
     plain = small_recipe.model_copy(update={"event": None})
     assert fidelity.judge(plain, trained.examples, trained.tensor).of(reduced).effector is None
+    assert fidelity.event(plain, trained.examples) is None
 
 
 def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, trained):
     marks = np.linspace(0.2, 0.6, len(trained.examples))
     marked = [replace(e, landmarks=(0.1, m)) for e, m in zip(trained.examples, marks, strict=True)]
     clips = small_recipe.clips.model_copy(update={"landmarks": ["lift", "touch"]})
-    frames = {}
+    frames, shares = {}, {}
     for at in ("lift", "touch", "end"):
         event = Event(joint="LeftHand", at=at)
         own = small_recipe.model_copy(update={"clips": clips, "event": event})
         frames[at] = fidelity.judge(own, marked, trained.tensor).moment.frame
+        told = fidelity.event(own, marked)
+        assert trained.skeleton.names[told.joint] == "LeftHand"
+        shares[at] = told.share
     assert frames == {"lift": 4, "touch": 16, "end": 39}
+    assert shares == {"lift": 0.1, "touch": 0.4, "end": 1.0}
 
 
 def test_a_joint_that_is_not_there_is_refused_by_name(small_recipe, trained):

@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from service.web import contract
 from service.web.contract import Contract
-from service.web.pages import docs, problems
+from service.web.pages import docs, problems, viewer
 from service.web.service import Handler, Page, Service
 
 
@@ -19,6 +19,7 @@ def made(agreed: Contract) -> dict[str, Page]:
         "getContractJson": Page(orjson.dumps(agreed.document), "application/json"),
         "getDocs": docs.page(agreed),
         "getProblems": problems.page(),
+        "getViewer": viewer.page(),
     }
 
 
@@ -29,5 +30,5 @@ async def _answer(name: str, service: Service, request: Request) -> Response:
 
 OPERATIONS: dict[str, Handler] = {
     name: partial(_answer, name)
-    for name in ("getContract", "getContractJson", "getDocs", "getProblems")
+    for name in ("getContract", "getContractJson", "getDocs", "getProblems", "getViewer")
 }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from service.motion import card
-from service.motion.card import Control, ModelCard
+from service.motion.card import Control, Event, ModelCard
 from service.motion.detail import Level
 from service.motion.field import Hyper
 from service.motion.skeleton import Skeleton
@@ -45,6 +45,8 @@ CARD = ModelCard(
     roles={"hips": "hips", "upperChest": "chest"},
     sources=("a.bvh", "b.bvh, frames 3 to 90", "c.bvh"),
     kriging=Hyper("matern52", (0, 1), np.array([0.3, 0.1 + 0.2]), 1e-3, 0.7),
+    left_out=(0.01, 0.02, 0.5),
+    event=Event(1, 0.75),
 )
 
 
@@ -66,7 +68,7 @@ def test_card_read_is_the_card_written():
     assert replace(read, skeleton=CARD.skeleton, kriging=CARD.kriging) == CARD
 
 
-OPTIONAL = ("performers", "roles", "sources", "kriging")
+OPTIONAL = ("performers", "roles", "sources", "kriging", "left_out", "event")
 
 
 @pytest.mark.parametrize("field", [f.name for f in fields(ModelCard) if f.name not in OPTIONAL])
@@ -84,15 +86,13 @@ def test_a_card_that_says_nothing_of_roles_has_none():
     assert card.load(metadata).roles == {}
 
 
-def test_a_card_older_than_sources_has_none():
-    metadata = card.dump(CARD)
-    del metadata["posefield.sources"], metadata["posefield.kriging"]
-    read = card.load(metadata)
-    assert (read.sources, read.kriging) == ((), None)
-    assert card.dump(read) == metadata | {
-        "posefield.sources": "[]",
-        "posefield.kriging": "null",
-    }
+def test_an_older_card_has_none_of_what_it_could_not_say():
+    none = {"sources": "[]", "kriging": "null", "left_out": "[]", "event": "null"}
+    none = {f"posefield.{name}": text for name, text in none.items()}
+    older = {key: text for key, text in card.dump(CARD).items() if key not in none}
+    read = card.load(older)
+    assert (read.sources, read.kriging, read.left_out, read.event) == ((), None, (), None)
+    assert card.dump(read) == older | none
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,62 @@
+"""The page in a browser: everything on it is clicked, for a procedural and a real model."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import debian
+import environment
+import httpx
+import running
+import trained
+
+VIEWER = environment.ROOT / "clients/viewer"
+REAL = "cmu_walk"
+
+
+def faults(node: Path) -> list[str]:
+    """What is wrong with the page, a line each; what the browser's tests say is printed."""
+    if reason := debian.missing({"chromium": "chromium"}):
+        print(f"no browser: {reason}")
+        return []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        models = _models(folder / "models")
+        (port,) = running.ports(1)
+        told = {"POSEFIELD_PORT": str(port), "POSEFIELD_LOG": "off"}
+        posefield = Path(sys.executable).with_name("posefield")
+        with running.started([posefield, "serve", models], folder / "service.txt", **told):
+            address = f"http://127.0.0.1:{port}"
+            running.wait(lambda: httpx.get(f"{address}/readyz").status_code == 200)
+            return _clicked(node, address, models)
+
+
+def _models(folder: Path) -> Path:
+    folder.mkdir()
+    (folder / "reaching.onnx").write_bytes(trained.family()[1])
+    if (content := trained.real(REAL)) is not None:
+        (folder / f"{REAL}.onnx").write_bytes(content)
+    return folder
+
+
+def _clicked(node: Path, address: str, models: Path) -> list[str]:
+    tests = sorted(VIEWER.glob("test/*.page.ts"))
+    told = {
+        "POSEFIELD_URL": address,
+        "POSEFIELD_MODELS": str(models),
+        "POSEFIELD_COMMAND": str(Path(sys.executable).with_name("posefield")),
+    }
+    # One after the other: they measure.
+    command = [node, "--test", "--test-concurrency=1", "--test-reporter=spec", *tests]
+    done = subprocess.run(command, cwd=VIEWER, env=os.environ | told, text=True)
+    return [f"page: {len(tests)} files of tests ended with {done.returncode}"] * bool(
+        done.returncode
+    )
+
+
+if __name__ == "__main__":
+    found = faults(environment.node()[0])
+    print("\n".join(found) or "no fault in the page")
+    sys.exit(bool(found))
