@@ -13,6 +13,7 @@ OPERATIONS = {operation.id: operation for operation in contract.load().operation
 USUAL = {
     *("content-type", "content-length", "content-encoding", "vary"),
     *("x-content-type-options", "content-security-policy", "cross-origin-resource-policy"),
+    "referrer-policy",
 }
 
 
