@@ -1,0 +1,65 @@
+"""Asks a posefield service: poses as NumPy arrays, clips and crowds as files, crowds as tables.
+
+    from posefield_client import Client
+
+    with Client("http://localhost:8000") as client:
+        client.model("walk").clip(speed=1.4).save("clip.usdc")
+
+Metres, seconds, Y up; quaternions are unit, w x y z, local to the parent. What can go wrong is
+drawn in posefield_client.errors.
+"""
+
+from posefield_client import errors
+from posefield_client.aio import AsyncClient, AsyncClip, AsyncCrowd, AsyncModel, AsyncSaving
+from posefield_client.cache import NOTHING, Cache, Memory
+from posefield_client.client import Client, Clip, Crowd, Model, Saving
+from posefield_client.disk import Disk
+from posefield_client.errors import PosefieldError
+from posefield_client.generated import (
+    CONTRACT,
+    Camera,
+    Control,
+    ManifestEntry,
+    ModelCard,
+    NamedClipQuestion,
+    Reasons,
+    Trust,
+)
+from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
+from posefield_client.retry import NEVER, Retry
+from posefield_client.saving import Progress, Saved
+
+__all__ = [
+    "CONTRACT",
+    "NEVER",
+    "NOTHING",
+    "AsyncClient",
+    "AsyncClip",
+    "AsyncCrowd",
+    "AsyncModel",
+    "AsyncSaving",
+    "Cache",
+    "Camera",
+    "Client",
+    "Clip",
+    "ClipNumbers",
+    "Control",
+    "Crowd",
+    "CrowdPoses",
+    "Disk",
+    "ManifestEntry",
+    "Memory",
+    "Model",
+    "ModelCard",
+    "NamedClipQuestion",
+    "Pose",
+    "PosefieldError",
+    "Progress",
+    "Reasons",
+    "Retry",
+    "Saved",
+    "Saving",
+    "SigmaGrid",
+    "Trust",
+    "errors",
+]

@@ -1,0 +1,223 @@
+"""The client that others need not wait for: the same questions, awaited."""
+
+from collections.abc import Awaitable, Callable, Coroutine
+from functools import wraps
+from os import PathLike
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import anyio
+import httpx
+
+from posefield_client import asking, files, numbers, questions, saving, tables, transport
+from posefield_client.cache import Cache
+from posefield_client.errors import PosefieldError
+from posefield_client.exchange import Core
+from posefield_client.files import Files
+from posefield_client.generated import Control, ModelCard
+from posefield_client.numbers import ClipNumbers, CrowdPoses
+from posefield_client.retry import Retry
+from posefield_client.saving import Saved, Watch
+from posefield_client.wire import Call, Reply, Send, Sleep, Steps
+
+P = ParamSpec("P")
+T = TypeVar("T")
+F = TypeVar("F")
+Later = Coroutine[Any, Any, T]
+
+
+def _ask(question: Callable[P, Call[T]]) -> Callable[Concatenate["AsyncClient", P], Later[T]]:
+    """Method that asks a question of the service."""
+
+    @wraps(question)
+    async def method(self: "AsyncClient", /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return await self.run(self.core.answer(question(*args, **kwargs)))
+
+    return method
+
+
+def _ask_model(
+    question: Callable[Concatenate[str, P], Call[T]],
+) -> Callable[Concatenate["AsyncModel", P], Later[T]]:
+    """Method that asks a question of the model."""
+
+    @wraps(question)
+    async def method(self: "AsyncModel", /, *args: P.args, **kwargs: P.kwargs) -> T:
+        call = question(self.name, *args, **kwargs)
+        return await self.client.run(self.client.core.answer(call))
+
+    return method
+
+
+def _lazy(
+    kind: Callable[["AsyncClient", Files], F], question: Callable[Concatenate[str, P], Files]
+) -> Callable[Concatenate["AsyncModel", P], F]:
+    """Method that gives what will be asked for when it is needed."""
+
+    @wraps(question)
+    def method(self: "AsyncModel", /, *args: P.args, **kwargs: P.kwargs) -> F:
+        return kind(self.client, question(self.name, *args, **kwargs))
+
+    return method
+
+
+class AsyncClient:
+    """A service at an address, asked from one event loop; arguments as Client.
+
+    Files and what is kept on disk are written between two pieces of an answer, which takes the loop
+    about as long as a small write does.
+    """
+
+    def __init__(
+        self,
+        base_url: str,
+        key: str | None = None,
+        *,
+        timeout: float | httpx.Timeout = 30.0,
+        retry: Retry = Retry(),  # noqa: B008  # it is frozen
+        cache: Cache | Path | None = None,
+        sleep: Callable[[float], Awaitable[None]] = anyio.sleep,
+    ) -> None:
+        self._place = transport.place(base_url, key, timeout)
+        self.core: Core = transport.core(self._place, retry, cache)
+        self._http = httpx.AsyncClient(timeout=timeout)
+        self._sleep = sleep
+
+    models = _ask(questions.models)
+    live = _ask(questions.live)
+    ready = _ask(questions.ready)
+
+    def model(self, name: str) -> "AsyncModel":
+        """The model of a name, or of name@hash; it is not asked for anything yet."""
+        return AsyncModel(self, asking.model_name(name))
+
+    async def close(self) -> None:
+        """End all connections."""
+        await self._http.aclose()
+
+    async def __aenter__(self) -> "AsyncClient":
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def run(self, steps: Steps[T]) -> T:
+        """What comes of steps, each of which is taken. Raises PosefieldError."""
+        try:
+            wish = next(steps)
+            while True:
+                try:
+                    came = await self._do(wish)
+                except PosefieldError as fault:
+                    wish = steps.throw(fault)
+                else:
+                    wish = steps.send(came)
+        except StopIteration as end:
+            found: T = end.value
+            return found
+        finally:
+            steps.close()
+
+    async def _do(self, wish: Send | Sleep) -> Reply | None:
+        if isinstance(wish, Sleep):
+            await self._sleep(wish.seconds)
+            return None
+        response = None
+        try:
+            response = await self._http.send(self._place.request(wish), stream=True)
+            try:
+                return await self._read(wish, response)
+            finally:
+                await response.aclose()
+        except httpx.HTTPError as found:
+            raise transport.fault(found, wish, response is not None) from found
+
+    async def _read(self, wish: Send, response: httpx.Response) -> Reply:
+        take = transport.begin(wish, response)
+        if take is None:
+            return transport.reply(wish, response, await response.aread())
+        async for chunk in response.aiter_bytes():
+            take(chunk)
+        return transport.reply(wish, response, b"")
+
+
+class AsyncSaving:
+    """What is asked for when it is saved or read."""
+
+    def __init__(self, client: AsyncClient, files: Files) -> None:
+        self._client = client
+        self._files = files
+
+    async def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
+        """Write to a file whose ending says in which format; it is whole, or not there."""
+        steps = saving.save(self._client.core, self._files, Path(path), progress)
+        return await self._client.run(steps)
+
+    async def content(self, format: str) -> bytes:  # noqa: A002  # the contract's own word
+        """The bytes of a format."""
+        return await self._client.run(saving.content(self._client.core, self._files, format))
+
+    async def _numbers(self, read: Callable[[Reply], T], ending: str = "msgpack") -> T:
+        call = Call(self._files.request(ending), read)
+        return await self._client.run(self._client.core.answer(call))
+
+
+class AsyncClip(AsyncSaving):
+    """A clip of a model."""
+
+    @property
+    def numbers(self) -> Later[ClipNumbers]:
+        """Its frames as arrays, to be awaited."""
+        return self._numbers(numbers.clip)
+
+
+class AsyncCrowd(AsyncSaving):
+    """A pose of each of many characters."""
+
+    @property
+    def numbers(self) -> Later[CrowdPoses]:
+        """The poses as arrays, to be awaited."""
+        return self._numbers(numbers.crowd)
+
+    async def table(self) -> Any:
+        """The poses as a pyarrow.Table, one row a character; needs posefield-client[arrow]."""
+        return await self._numbers(tables.read, "arrow")
+
+
+class AsyncModel:
+    """A model of a service, by its name."""
+
+    def __init__(self, client: AsyncClient, name: str) -> None:
+        self.client = client
+        self.name = name
+        self._card: ModelCard | None = None
+
+    pose = _ask_model(questions.pose)
+    why = _ask_model(questions.why)
+    sigma = _ask_model(questions.sigma)
+    read_card = _ask_model(questions.card)
+    clip = _lazy(AsyncClip, files.clip)
+    clips = _lazy(AsyncSaving, files.clips)
+    crowd = _lazy(AsyncCrowd, files.crowd)
+    crowd_walk = _lazy(AsyncSaving, files.walk)
+
+    @property
+    def card(self) -> Later[ModelCard]:
+        """What the model says of itself, to be awaited; asked for once."""
+        return self._read_once()
+
+    @property
+    def controls(self) -> Later[dict[str, Control]]:
+        """Its controls by name, in the card's order, to be awaited."""
+        return self._controls()
+
+    async def _read_once(self) -> ModelCard:
+        if self._card is None:
+            self._card = await self.read_card()
+        return self._card
+
+    async def _controls(self) -> dict[str, Control]:
+        return {control.name: control for control in (await self.card).controls}
+
+    def __repr__(self) -> str:
+        return f"AsyncModel({self.name!r})"

@@ -1,0 +1,211 @@
+"""The client that waits for its answers."""
+
+import time
+from collections.abc import Callable
+from contextlib import closing
+from functools import cached_property, wraps
+from os import PathLike
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import httpx
+
+from posefield_client import asking, files, numbers, questions, saving, tables, transport
+from posefield_client.cache import Cache
+from posefield_client.errors import PosefieldError
+from posefield_client.exchange import Core
+from posefield_client.files import Files
+from posefield_client.generated import Control, ModelCard
+from posefield_client.numbers import ClipNumbers, CrowdPoses
+from posefield_client.retry import Retry
+from posefield_client.saving import Saved, Watch
+from posefield_client.wire import Call, Reply, Send, Sleep, Steps
+
+P = ParamSpec("P")
+T = TypeVar("T")
+F = TypeVar("F")
+
+
+def _ask(question: Callable[P, Call[T]]) -> Callable[Concatenate["Client", P], T]:
+    """Method that asks a question of the service."""
+
+    @wraps(question)
+    def method(self: "Client", /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return self.run(self.core.answer(question(*args, **kwargs)))
+
+    return method
+
+
+def _ask_model(
+    question: Callable[Concatenate[str, P], Call[T]],
+) -> Callable[Concatenate["Model", P], T]:
+    """Method that asks a question of the model."""
+
+    @wraps(question)
+    def method(self: "Model", /, *args: P.args, **kwargs: P.kwargs) -> T:
+        call = question(self.name, *args, **kwargs)
+        return self.client.run(self.client.core.answer(call))
+
+    return method
+
+
+def _lazy(
+    kind: Callable[["Client", Files], F], question: Callable[Concatenate[str, P], Files]
+) -> Callable[Concatenate["Model", P], F]:
+    """Method that gives what will be asked for when it is needed."""
+
+    @wraps(question)
+    def method(self: "Model", /, *args: P.args, **kwargs: P.kwargs) -> F:
+        return kind(self.client, question(self.name, *args, **kwargs))
+
+    return method
+
+
+class Client:
+    """A service at an address, asked by one or more threads.
+
+    key: an API key or token; timeout: seconds without a word from the service; cache: a folder, or
+    where else answers are kept (a Memory of 16 MiB, if nothing is said; NOTHING keeps none); sleep:
+    how to wait.
+    """
+
+    def __init__(
+        self,
+        base_url: str,
+        key: str | None = None,
+        *,
+        timeout: float | httpx.Timeout = 30.0,
+        retry: Retry = Retry(),  # noqa: B008  # it is frozen
+        cache: Cache | Path | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._place = transport.place(base_url, key, timeout)
+        self.core: Core = transport.core(self._place, retry, cache)
+        self._http = httpx.Client(timeout=timeout)
+        self._sleep = sleep
+
+    models = _ask(questions.models)
+    live = _ask(questions.live)
+    ready = _ask(questions.ready)
+
+    def model(self, name: str) -> "Model":
+        """The model of a name, or of name@hash; it is not asked for anything yet."""
+        return Model(self, asking.model_name(name))
+
+    def close(self) -> None:
+        """End all connections."""
+        self._http.close()
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def run(self, steps: Steps[T]) -> T:
+        """What comes of steps, each of which is taken. Raises PosefieldError."""
+        try:
+            wish = next(steps)
+            while True:
+                try:
+                    came = self._do(wish)
+                except PosefieldError as fault:
+                    wish = steps.throw(fault)
+                else:
+                    wish = steps.send(came)
+        except StopIteration as end:
+            found: T = end.value
+            return found
+        finally:
+            steps.close()
+
+    def _do(self, wish: Send | Sleep) -> Reply | None:
+        if isinstance(wish, Sleep):
+            self._sleep(wish.seconds)
+            return None
+        response = None
+        try:
+            response = self._http.send(self._place.request(wish), stream=True)
+            with closing(response):
+                return self._read(wish, response)
+        except httpx.HTTPError as found:
+            raise transport.fault(found, wish, response is not None) from found
+
+    def _read(self, wish: Send, response: httpx.Response) -> Reply:
+        take = transport.begin(wish, response)
+        if take is None:
+            return transport.reply(wish, response, response.read())
+        for chunk in response.iter_bytes():
+            take(chunk)
+        return transport.reply(wish, response, b"")
+
+
+class Saving:
+    """What is asked for when it is saved or read."""
+
+    def __init__(self, client: Client, files: Files) -> None:
+        self._client = client
+        self._files = files
+
+    def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
+        """Write to a file whose ending says in which format; it is whole, or not there."""
+        return self._client.run(saving.save(self._client.core, self._files, Path(path), progress))
+
+    def content(self, format: str) -> bytes:  # noqa: A002  # the contract's own word
+        """The bytes of a format."""
+        return self._client.run(saving.content(self._client.core, self._files, format))
+
+    def _numbers(self, read: Callable[[Reply], T], ending: str = "msgpack") -> T:
+        return self._client.run(self._client.core.answer(Call(self._files.request(ending), read)))
+
+
+class Clip(Saving):
+    """A clip of a model."""
+
+    @cached_property
+    def numbers(self) -> ClipNumbers:
+        """Its frames as arrays; asked for once."""
+        return self._numbers(numbers.clip)
+
+
+class Crowd(Saving):
+    """A pose of each of many characters."""
+
+    @cached_property
+    def numbers(self) -> CrowdPoses:
+        """The poses as arrays; asked for once."""
+        return self._numbers(numbers.crowd)
+
+    def table(self) -> Any:
+        """The poses as a pyarrow.Table, one row a character; needs posefield-client[arrow]."""
+        return self._numbers(tables.read, "arrow")
+
+
+class Model:
+    """A model of a service, by its name."""
+
+    def __init__(self, client: Client, name: str) -> None:
+        self.client = client
+        self.name = name
+
+    pose = _ask_model(questions.pose)
+    why = _ask_model(questions.why)
+    sigma = _ask_model(questions.sigma)
+    read_card = _ask_model(questions.card)
+    clip = _lazy(Clip, files.clip)
+    clips = _lazy(Saving, files.clips)
+    crowd = _lazy(Crowd, files.crowd)
+    crowd_walk = _lazy(Saving, files.walk)
+
+    @cached_property
+    def card(self) -> ModelCard:
+        """What the model says of itself; asked for once."""
+        return self.read_card()
+
+    @cached_property
+    def controls(self) -> dict[str, Control]:
+        """Its controls by name, in the card's order."""
+        return {control.name: control for control in self.card.controls}
+
+    def __repr__(self) -> str:
+        return f"Model({self.name!r})"

@@ -1,0 +1,98 @@
+"""Answers kept in a folder, which several processes may share."""
+
+import os
+import secrets
+import time
+import warnings
+from contextlib import suppress
+from hashlib import blake2b
+from pathlib import Path
+
+import msgspec
+
+from posefield_client.cache import Kept
+
+DIGEST = 16
+FORGOTTEN = 3600.0
+"""Seconds after which what a process left half-written is taken away."""
+
+
+class Disk:
+    """The answers used last, up to some bytes, one file each.
+
+    A file is written beside and renamed, and begins with the digest of the rest: whatever else is
+    found there is none. Each process looks at the folder's size after it has written a sixteenth of
+    the limit; meanwhile it may be passed by as much.
+    """
+
+    def __init__(self, folder: Path, limit: int = 2**30) -> None:
+        self.folder = folder
+        self.limit = limit
+        self.largest = limit // 16
+        self._written = limit
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+    def find(self, name: str) -> Kept | None:
+        """The answer of that name."""
+        path = self.folder / name
+        try:
+            found = _read(path.read_bytes())
+            # What is used last is let go last.
+            os.utime(path)
+        except (OSError, ValueError):
+            return None
+        return found
+
+    def keep(self, name: str, kept: Kept) -> None:
+        """Keep an answer; where the folder cannot be written, warn and go on without."""
+        content = msgspec.msgpack.encode((kept.headers, kept.content, kept.until))
+        part = self.folder / f"{name}.{secrets.token_hex(6)}.part"
+        try:
+            with os.fdopen(
+                os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb"
+            ) as file:
+                file.write(_digest(content))
+                file.write(content)
+            part.replace(self.folder / name)
+        except OSError as fault:
+            with suppress(OSError):
+                part.unlink()
+            warnings.warn(f"answers cannot be kept in {self.folder}: {fault}", stacklevel=2)
+        self._written += len(content)
+        if self._written > self.limit // 16:
+            self._written = 0
+            self._tidy()
+
+    def _tidy(self) -> None:
+        """Take away what was not used for longest, down to seven eighths of the limit."""
+        found = sorted(filter(None, map(_looked_at, self.folder.iterdir())), reverse=True)
+        size = 0
+        for used, length, path in found:
+            size += length
+            left_over = path.suffix == ".part" and used < time.time() - FORGOTTEN
+            if size > self.limit * 7 // 8 or left_over:
+                # Another process may have been faster.
+                with suppress(OSError):
+                    path.unlink()
+
+
+def _looked_at(path: Path) -> tuple[float, int, Path] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime, found.st_size, path
+
+
+def _digest(content: bytes) -> bytes:
+    return blake2b(content, digest_size=DIGEST).digest()
+
+
+_KEPT = msgspec.msgpack.Decoder(tuple[dict[str, str], bytes, float])
+
+
+def _read(content: bytes) -> Kept:
+    """ValueError where these are not the bytes that were written."""
+    if content[:DIGEST] != _digest(content[DIGEST:]):
+        raise ValueError("no answer, or a torn one")
+    return Kept(*_KEPT.decode(content[DIGEST:]))

@@ -1,0 +1,256 @@
+"""What can go wrong, as one tree.
+
+PosefieldError
+├── WrongQuestion              nothing was sent: a name, ending or number that cannot be
+├── Problem                    the service says what is wrong; itself, of a kind still unknown
+│   ├── WrongRequest           the request breaks the contract
+│   │   ├── BadParameter, BadBody, MalformedRequest, UnsupportedMediaType, NotAcceptable,
+│   │   ├── NoSuchPath, MethodNotAllowed,
+│   │   └── BodyTooLarge, UrlTooLong, HeadTooLarge, RequestTooSlow
+│   ├── NotAllowed             the key
+│   │   └── Unauthenticated, Forbidden
+│   ├── Unanswerable           there is no answer to this question
+│   │   └── UnknownModel, UnknownFormat, InvalidField, OutsideSamples
+│   ├── Busy                   asked again by itself, until patience ends
+│   │   └── Overloaded, Late, NotReady, NoConnectionLeft
+│   └── InternalError          the service failed
+├── Unreachable                no service answers; asked again by itself
+├── TimedOut                   it took too long; asked again by itself
+├── Broken                     the answer was cut in its middle; asked again by itself
+│   └── IncompleteAnswer       it ended, but is not whole
+└── Unexpected                 this is no answer of the contract that this client knows
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import msgspec
+
+from posefield_client import generated
+from posefield_client.generated import CONTRACT
+
+TYPE_PREFIX = "urn:posefield:problem:"
+MEDIA_TYPE = "application/problem+json"
+GATEWAYS = (429, 502, 503, 504)
+"""Statuses by which something before the service says that it is not there now."""
+
+
+class PosefieldError(Exception):
+    """Whatever this client raises on purpose."""
+
+    again: ClassVar[bool] = False
+    """Whether the same question may have an answer later."""
+    retry_after: float | None = None
+    """Seconds after which the service wants to be asked again."""
+
+
+class WrongQuestion(PosefieldError, ValueError):
+    """Nothing was sent: what is asked for cannot be."""
+
+
+class Problem(PosefieldError):
+    """The service says what is wrong, by a document of RFC 9457.
+
+    status: of HTTP; kind: the last part of `type`; title, detail: for people; instance: the
+    request's id, which the service's log has; errors: where in the request the fault lies.
+    """
+
+    kinds: ClassVar[dict[str, type["Problem"]]] = {}
+
+    def __init_subclass__(cls, kind: str = "") -> None:
+        if kind:
+            cls.kinds[kind] = cls
+
+    def __init__(self, said: generated.Problem, retry_after: float | None = None) -> None:
+        super().__init__(f"{said.title}: {said.detail}" if said.detail else said.title)
+        self.status = said.status
+        self.kind = said.type.removeprefix(TYPE_PREFIX)
+        self.title = said.title
+        self.detail = said.detail
+        self.instance = said.instance
+        self.errors = said.errors
+        self.retry_after = retry_after
+
+
+class WrongRequest(Problem):
+    """The request breaks the contract."""
+
+
+class BadParameter(WrongRequest, kind="bad-parameter"):
+    """A query parameter cannot be read."""
+
+
+class BadBody(WrongRequest, kind="bad-body"):
+    """The body cannot be read."""
+
+
+class MalformedRequest(WrongRequest, kind="malformed-request"):
+    """What arrived was not HTTP as the service reads it."""
+
+
+class UnsupportedMediaType(WrongRequest, kind="unsupported-media-type"):
+    """The body must be JSON."""
+
+
+class NotAcceptable(WrongRequest, kind="not-acceptable"):
+    """Nothing that is accepted is there."""
+
+
+class NoSuchPath(WrongRequest, kind="no-such-path"):
+    """Nothing lies at this path: the address is another's, or the service is older."""
+
+
+class MethodNotAllowed(WrongRequest, kind="method-not-allowed"):
+    """The path does not take this method."""
+
+
+class BodyTooLarge(WrongRequest, kind="body-too-large"):
+    """The question is larger than the service accepts."""
+
+
+class UrlTooLong(WrongRequest, kind="url-too-long"):
+    """The URL is longer than the service accepts."""
+
+
+class HeadTooLarge(WrongRequest, kind="head-too-large"):
+    """The request's head is larger than the service accepts."""
+
+
+class RequestTooSlow(WrongRequest, kind="request-too-slow"):
+    """The request took too long to arrive."""
+
+
+class NotAllowed(Problem):
+    """The key does not do."""
+
+
+class Unauthenticated(NotAllowed, kind="unauthenticated"):
+    """The service wants a key, and there is none, or one that does not hold."""
+
+
+class Forbidden(NotAllowed, kind="forbidden"):
+    """The key may not do this."""
+
+
+class Unanswerable(Problem):
+    """The question is well said, and has no answer."""
+
+
+class UnknownModel(Unanswerable, kind="unknown-model"):
+    """No model of that name, or none that the key may read."""
+
+
+class UnknownFormat(Unanswerable, kind="unknown-format"):
+    """No format of that name."""
+
+
+class InvalidField(Unanswerable, kind="invalid-field"):
+    """A control or another field is missing, unknown or out of range."""
+
+
+class OutsideSamples(Unanswerable, kind="outside-samples"):
+    """The controls lie outside what was sampled, and `extrapolate` is "refuse"."""
+
+
+class Busy(Problem):
+    """The service cannot answer now."""
+
+    again = True
+
+
+class Overloaded(Busy, kind="overloaded"):
+    """The service has too much to do."""
+
+
+class Late(Busy, kind="late"):
+    """The answer took the service too long."""
+
+
+class NotReady(Busy, kind="not-ready"):
+    """The service should not be asked now."""
+
+
+class NoConnectionLeft(Busy, kind="no-connection-left"):
+    """The service has no connection left."""
+
+
+class InternalError(Problem, kind="internal-error"):
+    """The service failed; its log says how, under `instance`."""
+
+
+class Unreachable(PosefieldError):
+    """No service answers at the address."""
+
+    again = True
+
+
+class TimedOut(PosefieldError):
+    """No answer in time."""
+
+    again = True
+
+
+class Broken(PosefieldError):
+    """The answer was cut in its middle."""
+
+    again = True
+
+
+class IncompleteAnswer(Broken):
+    """The answer ended, but is not whole."""
+
+
+class Unexpected(PosefieldError):
+    """This is no answer of the contract that this client knows.
+
+    found: what came instead; service: the version of the contract that the service says it speaks,
+    None where it says none; client: the one that this client was made for.
+    """
+
+    client = CONTRACT
+
+    def __init__(self, found: str, service: str | None = None) -> None:
+        speaks = (
+            f"speaks contract {service}" if service else "does not say which contract it speaks"
+        )
+        super().__init__(f"{found}; the service {speaks}, this client was made for {CONTRACT}")
+        self.found = found
+        self.service = service
+
+
+_PROBLEM = msgspec.json.Decoder(generated.Problem)
+
+
+def of_answer(
+    status: int, headers: Mapping[str, str], content: bytes, asked: str
+) -> PosefieldError:
+    """Error that an answer other than a good one means; asked: for what, in words."""
+    after = _seconds(headers.get("retry-after", ""))
+    if headers.get("content-type", "").partition(";")[0] == MEDIA_TYPE:
+        return _of_problem(status, content, asked, after)
+    if status in GATEWAYS:
+        missing = Unreachable(f"{asked} was answered with {status}, and not by the service")
+        missing.retry_after = after
+        return missing
+    if "location" in headers:
+        return Unexpected(f"{asked} was sent on to {headers['location']} ({status})")
+    return Unexpected(f"{asked} was answered with {status} and {media_type(headers)}")
+
+
+def _of_problem(status: int, content: bytes, asked: str, after: float | None) -> PosefieldError:
+    try:
+        said = _PROBLEM.decode(content)
+    except msgspec.DecodeError as fault:
+        return Unexpected(f"{asked} was answered with {status} and no problem document: {fault}")
+    kind = Problem.kinds.get(said.type.removeprefix(TYPE_PREFIX), Problem)
+    return kind(said, after)
+
+
+def media_type(headers: Mapping[str, str]) -> str:
+    """What an answer says it is, without its parameters."""
+    return headers.get("content-type", "").partition(";")[0].strip() or "no media type"
+
+
+def _seconds(text: str) -> float | None:
+    """Of a Retry-After header; a date is passed over, for clocks differ."""
+    return float(text) if text.isascii() and text.isdigit() else None

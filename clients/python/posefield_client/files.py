@@ -1,0 +1,178 @@
+"""What can be had as a file: clips, many clips, crowds; each in several formats."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from posefield_client import asking
+from posefield_client.errors import WrongQuestion
+from posefield_client.generated import (
+    OPERATIONS,
+    Camera,
+    ClipQuestion,
+    ClipsQuestion,
+    CrowdQuestion,
+    NamedClipQuestion,
+)
+from posefield_client.questions import Controls, Extrapolate
+from posefield_client.wire import Request
+
+Root = Literal["travelling", "in_place"]
+Names = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
+Instancing = Literal["references", "scenegraph", "flatten"]
+ClipFormat = Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack"]
+Place = Sequence[float]
+
+
+def _formats(operation: str) -> tuple[str, ...]:
+    """Endings of a path that the contract has an operation for."""
+    found = (name.removeprefix(operation) for name in OPERATIONS if name.startswith(operation))
+    return tuple(ending.lower() for ending in found if ending)
+
+
+CLIP, CLIPS = _formats("getClip"), _formats("queryClips")
+CROWD, WALK = _formats("queryCrowd"), _formats("getCrowd")
+
+
+@dataclass(frozen=True)
+class Files:
+    """A question that is answered with a file. count: clips in it, where it is an archive."""
+
+    formats: tuple[str, ...]
+    ask: Callable[[str], Request]
+    count: int | None = None
+
+    def request(self, ending: str) -> Request:
+        """Request for a format; WrongQuestion where there is none of that name."""
+        if ending not in self.formats:
+            raise WrongQuestion(f"format {ending!r}, expected one of {', '.join(self.formats)}")
+        return self.ask(ending.capitalize())
+
+    def ending(self, path: Path) -> str:
+        """The format that a file's name asks for; WrongQuestion where there is none."""
+        found = path.suffix.removeprefix(".").lower()
+        if found not in self.formats:
+            raise WrongQuestion(f"{path.name} ends in none of .{', .'.join(self.formats)}")
+        return found
+
+
+def clip(
+    model: str,
+    /,
+    *,
+    fps: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    loop: bool | None = None,
+    root: Root | None = None,
+    level: int | None = None,
+    performer: str | None = None,
+    names: Names | None = None,
+    unit: Literal["m", "cm"] | None = None,
+    up: Literal["y", "z"] | None = None,
+    extrapolate: Extrapolate | None = None,
+    controls: Controls | None = None,
+    **named: float,
+) -> Files:
+    """A clip, which is asked for when it is saved or its numbers are read."""
+    question = ClipQuestion(
+        controls=asking.controls(controls, named),
+        **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
+        **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
+    )
+    return Files(CLIP, lambda ending: asking.either(f"Clip{ending}", model, question))
+
+
+def clips(
+    model: str,
+    /,
+    clips: Iterable[NamedClipQuestion | Mapping[str, Any]],
+    format: ClipFormat,  # noqa: A002  # the contract's own word
+    *,
+    unit: Literal["m", "cm"] | None = None,
+    up: Literal["y", "z"] | None = None,
+) -> Files:
+    """Many clips of one format in an archive, and a manifest of them."""
+    if format not in CLIP:
+        raise WrongQuestion(f"format {format!r}, expected one of {', '.join(CLIP)}")
+    listed = tuple(_named(place, each) for place, each in enumerate(clips))
+    question = ClipsQuestion(format=format, clips=listed, **asking.said(unit=unit, up=up))
+    ask = partial(_body, "queryClips", model, question)
+    return Files(CLIPS, ask, len(listed))
+
+
+def _named(place: int, given: NamedClipQuestion | Mapping[str, Any]) -> NamedClipQuestion:
+    if isinstance(given, NamedClipQuestion):
+        return given
+    plain = {**given, "controls": asking.controls(given.get("controls"), {})}
+    try:
+        return msgspec.convert(plain, NamedClipQuestion)
+    except msgspec.ValidationError as fault:
+        raise WrongQuestion(f"clip {place}: {fault}") from None
+
+
+def crowd(
+    model: str,
+    /,
+    time: Any,
+    *,
+    position: Any = None,
+    heading: Any = None,
+    performer: str | Sequence[str | None] | None = None,
+    level: int | Sequence[int] | Literal["auto"] | None = None,
+    previous_level: Sequence[int] | None = None,
+    from_level: Sequence[int] | None = None,
+    blend: Any = None,
+    camera: Camera | Mapping[str, Any] | None = None,
+    pixels: float | None = None,
+    budget_ms: float | None = None,
+    root: Root | None = None,
+    extrapolate: Extrapolate | None = None,
+    controls: Mapping[str, Any] | None = None,
+    **named: Any,
+) -> Files:
+    """A pose of each of many characters: what is a list or an array has one value for each."""
+    given = asking.together(controls, named)
+    question = CrowdQuestion(
+        controls={name: asking.column(name, values) for name, values in given.items()},
+        time=asking.column("time", time),
+        **asking.columns(position=position, heading=heading, level=level, blend=blend),
+        **asking.columns(previous_level=previous_level, from_level=from_level),
+        **asking.said(performer=performer, camera=camera, pixels=pixels, budget_ms=budget_ms),
+        **asking.said(root=root, extrapolate=extrapolate),
+    )
+    return Files(CROWD, partial(_body, "queryCrowd", model, question))
+
+
+def walk(
+    model: str,
+    /,
+    *,
+    count: int | None = None,
+    motions: int | None = None,
+    seconds: float | None = None,
+    fps: float | None = None,
+    seed: int | None = None,
+    level: int | None = None,
+    camera: Place | None = None,
+    fov: float | None = None,
+    height: float | None = None,
+    pixels: float | None = None,
+    instancing: Instancing | None = None,
+) -> Files:
+    """A crowd that walks, each its own way; camera: x, y and z of where one looks from, m."""
+    place = None if camera is None else ",".join(map(repr, asking.numbers("camera", camera)))
+    words = {
+        **asking.said(count=count, motions=motions, seconds=seconds, fps=fps, seed=seed),
+        **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
+        **asking.said(instancing=instancing),
+    }
+    return Files(WALK, lambda ending: asking.plain(f"getCrowd{ending}", model, words))
+
+
+def _body(operation: str, model: str, question: msgspec.Struct, ending: str) -> Request:
+    return asking.body(operation + ending, model, question)

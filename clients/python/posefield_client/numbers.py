@@ -1,0 +1,120 @@
+"""Numbers as NumPy arrays, read from binary answers; arrays are read-only views of what came."""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from msgspec import Struct
+
+from posefield_client.generated import Trust
+from posefield_client.wire import Reply
+
+Array = npt.NDArray[Any]
+KINDS = "fiub"
+
+
+class Pose(Struct, frozen=True, eq=False):
+    """Poses at S times of the J joints that the model's card names.
+
+    times [S], s; rotations [S, J, 4], unit quaternions w x y z, local to the parent; root_position
+    [S, 3] and bone_offsets [J, 3], m.
+    """
+
+    trust: Trust
+    times: Array
+    rotations: Array
+    root_position: Array
+    bone_offsets: Array
+
+
+class ClipNumbers(Struct, frozen=True, eq=False):
+    """A clip of F frames of J joints, as Pose; `rate` frames a second.
+
+    names, parents: of the joints, -1 for the root's parent; units: what the numbers are.
+    """
+
+    trust: Trust
+    units: dict[str, str]
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    rate: float
+    times: Array
+    rotations: Array
+    root_position: Array
+    bone_offsets: Array
+
+
+class SigmaGrid(Struct, frozen=True, eq=False):
+    """Sigma over two controls: sigma and inside [rows, columns], m and whether all was sampled.
+
+    across_values [columns], along_values [rows]; controls: values of the others.
+    """
+
+    model: str
+    across: str
+    along: str
+    controls: dict[str, float]
+    performer: str | None
+    units: dict[str, str]
+    across_values: Array
+    along_values: Array
+    sigma: Array
+    inside: Array
+
+
+class CrowdPoses(Struct, frozen=True, eq=False):
+    """A pose of each of N characters, J joints each, in the order of the question.
+
+    rotations [N, J, 4], the root's in the world; root_position [N, 3] in the world and bone_offsets
+    [N, J, 3], m; duration [N], s; sigma [N], m; levels [N]; error_px [N], with a camera.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    units: dict[str, str]
+    warnings: tuple[str, ...]
+    rotations: Array
+    root_position: Array
+    bone_offsets: Array
+    duration: Array
+    sigma: Array
+    levels: Array
+    error_px: Array | None = None
+
+
+def _array(kind: type, found: Any) -> Array:
+    """An array as it travels: a map of `dtype`, `shape` and its little-endian bytes, `data`."""
+    if not isinstance(found, dict) or not found.keys() >= {"dtype", "shape", "data"}:
+        raise ValueError("expected a map of dtype, shape and data")
+    dtype = np.dtype(found["dtype"])
+    if dtype.kind not in KINDS:
+        raise ValueError(f"an array of {found['dtype']}, expected numbers")
+    return np.frombuffer(found["data"], dtype).reshape(found["shape"])
+
+
+_POSE = msgspec.msgpack.Decoder(Pose, dec_hook=_array)
+_CLIP = msgspec.msgpack.Decoder(ClipNumbers, dec_hook=_array)
+_GRID = msgspec.msgpack.Decoder(SigmaGrid, dec_hook=_array)
+_CROWD = msgspec.msgpack.Decoder(CrowdPoses, dec_hook=_array)
+
+
+def pose(reply: Reply) -> Pose:
+    """Poses of an answer in MessagePack; ValueError where it is none."""
+    return _POSE.decode(reply.content)
+
+
+def clip(reply: Reply) -> ClipNumbers:
+    """A clip of an answer in MessagePack; ValueError where it is none."""
+    return _CLIP.decode(reply.content)
+
+
+def grid(reply: Reply) -> SigmaGrid:
+    """A grid of an answer in MessagePack; ValueError where it is none."""
+    return _GRID.decode(reply.content)
+
+
+def crowd(reply: Reply) -> CrowdPoses:
+    """Poses of a crowd of an answer in MessagePack; ValueError where it is none."""
+    return _CROWD.decode(reply.content)

@@ -1,0 +1,163 @@
+"""Files that are whole or not there, and how far they have come."""
+
+import io
+import secrets
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO
+
+import msgspec
+
+from posefield_client import archives
+from posefield_client.archives import Counter
+from posefield_client.exchange import Core, expect
+from posefield_client.files import Files
+from posefield_client.generated import ManifestEntry
+from posefield_client.wire import Reply, Request, Steps
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an answer has come: bytes, of how many where that is known; of an archive files."""
+
+    received: int
+    total: int | None = None
+    files: int | None = None
+    count: int | None = None
+
+
+Watch = Callable[[Progress], object]
+"""Told how far it is. What it raises ends the download, and no file is left."""
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A file that was written, and what the service said of it.
+
+    model: name@hash; sigma, m, and duration, s: of a clip; entries: of an archive, one a clip.
+    """
+
+    path: Path
+    bytes: int
+    model: str | None
+    sigma: float | None
+    duration: float | None
+    warnings: tuple[str, ...]
+    entries: tuple[ManifestEntry, ...]
+
+
+class Part:
+    """A file beside the one that is to be; renamed by `keep`, else gone at the end."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._beside = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+        self.file: BinaryIO
+
+    def __enter__(self) -> "Part":
+        self.file = self._beside.open("xb+")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.file.close()
+        with suppress(FileNotFoundError):
+            self._beside.unlink()
+
+    def keep(self) -> None:
+        """The file is whole: give it its name."""
+        self.file.close()
+        self._beside.replace(self.path)
+
+
+class Into:
+    """Sink that writes to a file and tells how far it is."""
+
+    def __init__(self, file: BinaryIO, ending: str, count: int | None, watch: Watch | None) -> None:
+        self._file = file
+        self._ending = ending
+        self._count = count
+        self._watch = watch
+        self.begin(None)
+
+    def begin(self, total: int | None) -> None:
+        """Forget what came before."""
+        self._file.seek(0)
+        self._file.truncate()
+        self.received, self._total = 0, total
+        self._counter = Counter(self._ending) if self._watch and self._count else None
+
+    def write(self, chunk: bytes) -> None:
+        """Take the next bytes."""
+        self._file.write(chunk)
+        self.received += len(chunk)
+        if self._watch is not None:
+            self._watch(self._progress(chunk))
+
+    def _progress(self, chunk: bytes) -> Progress:
+        if self._counter is None or self._count is None:
+            return Progress(self.received, self._total)
+        self._counter.feed(chunk)
+        # The manifest is a file too.
+        whole = min(self._counter.files, self._count)
+        return Progress(self.received, self._total, whole, self._count)
+
+
+def save(core: Core, files: Files, path: Path, watch: Watch | None) -> Steps[Saved]:
+    """Write an answer to a file; its ending says in which format. PosefieldError, OSError."""
+    ending = files.ending(path)
+    request = files.request(ending)
+    with Part(path) as part:
+        sink = Into(part.file, ending, files.count, watch)
+        reply = yield from core.with_versions(_whole(core, request, sink))
+        entries = _entries(part.file, ending, files.count)
+        part.keep()
+        return _saved(path, sink.received, reply.headers, entries)
+
+
+def content(core: Core, files: Files, ending: str) -> Steps[bytes]:
+    """An answer in a format, as bytes."""
+    request = files.request(ending)
+    reply = yield from core.with_versions(_whole(core, request, None))
+    _entries(io.BytesIO(reply.content), ending, files.count)
+    return reply.content
+
+
+def _whole(core: Core, request: Request, sink: Into | None) -> Steps[Reply]:
+    reply = yield from core.reply(request, sink)
+    expect(request.operation, reply.headers.get("content-type", ""))
+    return reply
+
+
+def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEntry, ...]:
+    """Of an archive that is whole; of other files nothing more is known than their length."""
+    if count is None:
+        return ()
+    file.seek(0)
+    return archives.check(file, ending, count)
+
+
+def _saved(
+    path: Path, size: int, headers: Mapping[str, str], entries: tuple[ManifestEntry, ...]
+) -> Saved:
+    lines = f"[{headers.get('posefield-warning', '')}]".encode()
+    return Saved(
+        path,
+        size,
+        headers.get("posefield-model"),
+        _number(headers.get("posefield-sigma")),
+        _number(headers.get("posefield-duration")),
+        msgspec.json.decode(lines, type=tuple[str, ...]),
+        entries,
+    )
+
+
+def _number(text: str | None) -> float | None:
+    return None if text is None else float(text)

@@ -1,0 +1,115 @@
+"""What both kinds of client share of HTTP: addresses, headers, and what httpx's errors mean."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import httpx
+
+from posefield_client import cache as caches
+from posefield_client.cache import Cache, Memory
+from posefield_client.disk import Disk
+from posefield_client.errors import (
+    Broken,
+    IncompleteAnswer,
+    PosefieldError,
+    TimedOut,
+    Unreachable,
+    WrongQuestion,
+)
+from posefield_client.exchange import Core, expect, named
+from posefield_client.retry import Retry
+from posefield_client.wire import Reply, Send
+
+AGENT = f"posefield-client/{version('posefield-client')}"
+
+
+@dataclass(frozen=True)
+class Place:
+    """A service's address, and what every request to it says."""
+
+    address: str
+    headers: dict[str, str]
+    timeout: httpx.Timeout
+
+    def request(self, send: Send) -> httpx.Request:
+        """The request as httpx sends it; made here, for its client would merge what we know."""
+        asked = send.request
+        headers = self.headers
+        if send.tag is not None:
+            headers = {**headers, "If-None-Match": send.tag}
+        if asked.body is not None:
+            headers = {**headers, "Content-Type": "application/json"}
+        return httpx.Request(
+            asked.operation.method,
+            self.address + asked.target,
+            headers=headers,
+            content=asked.body,
+            extensions={"timeout": self.timeout.as_dict()},
+        )
+
+
+def place(base_url: str, key: str | None, timeout: float | httpx.Timeout) -> Place:
+    """The service at an address; WrongQuestion where that is none."""
+    headers = {"User-Agent": AGENT, "Accept-Encoding": "gzip, deflate"}
+    if key is not None:
+        headers["Authorization"] = f"Bearer {_printable(key)}"
+    return Place(_address(base_url), headers, httpx.Timeout(timeout))
+
+
+def _address(base_url: str) -> str:
+    try:
+        found = httpx.URL(base_url)
+        whole = found.scheme in ("http", "https") and found.host and not found.query
+    except httpx.InvalidURL:
+        whole = False
+    if not whole:
+        raise WrongQuestion(f"address {base_url!r}, expected http:// or https:// and a host")
+    return base_url.rstrip("/")
+
+
+def _printable(key: str) -> str:
+    """The key, of which a message says nothing."""
+    if not key.isascii() or not key.isprintable() or not key:
+        raise WrongQuestion("the key is empty, or holds other than printable ASCII characters")
+    return key
+
+
+def core(place: Place, retry: Retry, cache: Cache | Path | None) -> Core:
+    """What decides for a client; cache None: a Memory of its own."""
+    scope = caches.scope(place.address, place.headers.get("Authorization", ""))
+    kept = Disk(cache) if isinstance(cache, Path) else cache
+    return Core(Memory() if kept is None else kept, retry, scope)
+
+
+def begin(send: Send, response: httpx.Response) -> Callable[[bytes], None] | None:
+    """Where a good answer goes while it comes; None: where there is none, or it is to be held."""
+    if send.sink is None or response.status_code != 200:
+        return None
+    expect(send.request.operation, response.headers.get("content-type", ""))
+    length = response.headers.get("content-length", "")
+    plain = "content-encoding" not in response.headers
+    send.sink.begin(int(length) if plain and length.isdigit() else None)
+    return send.sink.write
+
+
+def reply(send: Send, response: httpx.Response, content: bytes) -> Reply:
+    """The answer, which has come whole; IncompleteAnswer where nobody can know."""
+    headers = response.headers
+    if "content-length" not in headers and "transfer-encoding" not in headers:
+        if response.status_code == 200 and response.http_version == "HTTP/1.1":
+            asked = named(send.request.operation)
+            raise IncompleteAnswer(f"the answer to {asked} does not say where it ends")
+    return Reply(response.status_code, headers, content)
+
+
+def fault(found: httpx.HTTPError, send: Send, began: bool) -> PosefieldError:
+    """What an error of httpx means. began: whether the answer had."""
+    asked = named(send.request.operation)
+    told = str(found) or type(found).__name__
+    if isinstance(found, httpx.TimeoutException):
+        return TimedOut(f"{asked}: {told}")
+    if began:
+        return Broken(f"the answer to {asked} broke off: {told}")
+    return Unreachable(f"{asked}: {told}")
