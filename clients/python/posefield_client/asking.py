@@ -104,7 +104,7 @@ def column(name: str, values: Any) -> Any:
 
 def columns(**given: Any) -> dict[str, Any]:
     """Those that are said, each as column."""
-    return {name: column(name, values) for name, values in said(**given).items()}
+    return {name: column(name, values) for name, values in given.items() if values is not None}
 
 
 def _finite(name: str, values: Any) -> npt.NDArray[Any]:
@@ -129,5 +129,13 @@ def together(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> Mappi
 
 
 def said(**words: Any) -> dict[str, Any]:
-    """Those that are said: not None."""
-    return {name: value for name, value in words.items() if value is not None}
+    """Those that are said: not None. NumPy's become Python's own; numbers are finite."""
+    return {name: _plain(name, value) for name, value in words.items() if value is not None}
+
+
+def _plain(name: str, value: Any) -> Any:
+    found = value.item() if isinstance(value, np.generic) else value
+    # In JSON it would be null, which means something else.
+    if isinstance(found, float) and not math.isfinite(found):
+        raise WrongQuestion(f"{name} is {value!r}, expected a finite number")
+    return found

@@ -1,0 +1,253 @@
+"""Every problem of the service is an error of its own class, and every fault of the network one."""
+
+import asyncio
+import json
+import re
+
+import httpx
+import pytest
+import scripted
+import serving
+from posefield_client import NEVER, AsyncClient, Client, PosefieldError, Retry, errors
+from posefield_client.errors import Problem, Unexpected
+from posefield_client.generated import CONTRACT
+from scripted import Pause, answer, chunked
+
+from service.web import problems
+from service.web.access import keys
+from service.web.pages import problems as page
+from service.web.problems import KINDS
+
+LIST = b'{"models": []}'
+EAGER = Retry(first=0.001)
+
+
+def subclasses(kind):
+    for each in kind.__subclasses__():
+        yield each
+        yield from subclasses(each)
+
+
+def raised(address, ask=lambda client: client.models(), retry=NEVER, **given):
+    """What the client raises that waits."""
+    with (
+        Client(address, retry=retry, **given) as client,
+        pytest.raises(PosefieldError) as caught,
+    ):
+        ask(client)
+    return caught.value
+
+
+def raised_later(address, ask=lambda client: client.models(), **given):
+    """What the client raises that is awaited."""
+
+    async def go():
+        async with AsyncClient(address, retry=NEVER, **given) as client:
+            await ask(client)
+
+    with pytest.raises(PosefieldError) as caught:
+        asyncio.run(go())
+    return caught.value
+
+
+def refusal(kind):
+    content = json.dumps(page.example(kind)).encode()
+    return answer(content, problems.MEDIA_TYPE, kind.status)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_every_kind_of_problem_is_a_class_of_its_own(kind):
+    version = answer(json.dumps({"contract": CONTRACT}).encode())
+    with scripted.serving(refusal(kind), version) as server:
+        fault = raised(server.address)
+    said = page.example(kind)
+    assert type(fault) is Problem.kinds[kind.name]
+    assert type(fault).__name__.lower() == kind.name.replace("-", "")
+    assert (fault.kind, fault.status) == (kind.name, kind.status)
+    assert (fault.title, fault.detail) == (said["title"], said["detail"])
+    assert fault.instance == said["instance"]
+    assert [e.detail for e in fault.errors] == [e["detail"] for e in said["errors"]]
+    assert said["title"] in str(fault)
+
+
+def test_there_are_no_classes_of_kinds_that_are_not():
+    assert set(Problem.kinds) == {kind.name for kind in KINDS}
+
+
+def test_a_kind_that_is_newer_than_the_client_is_a_problem():
+    said = page.example(KINDS[0]) | {"type": "urn:posefield:problem:moon-too-full", "phase": 0.5}
+    with scripted.serving(answer(json.dumps(said).encode(), problems.MEDIA_TYPE, 400)) as server:
+        fault = raised(server.address)
+    assert type(fault) is Problem
+    assert fault.kind == "moon-too-full"
+
+
+def test_the_tree_is_drawn_in_the_head_of_the_module():
+    drawn = set(re.findall(r"\b[A-Z][A-Za-z]+\b", errors.__doc__.partition("\n\n")[2]))
+    assert {each.__name__ for each in subclasses(PosefieldError)} | {"PosefieldError"} == drawn
+
+
+def test_what_can_help_to_ask_again_is_asked_again():
+    again = {each.__name__ for each in subclasses(PosefieldError) if each.again}
+    busy = {kind.name.replace("-", "") for kind in problems.OF_LOAD} | {"noconnectionleft", "busy"}
+    network = {"unreachable", "timedout", "broken", "incompleteanswer"}
+    assert {name.lower() for name in again} == busy | network
+
+
+@pytest.mark.parametrize(
+    ("ask", "kind"),
+    [
+        (lambda m, c: m("reich").card, errors.UnknownModel),
+        (lambda m, c: m("reach@0000000000000000").card, errors.UnknownModel),
+        (lambda m, c: m("reach").pose(0), errors.InvalidField),
+        (lambda m, c: m("reach").pose(100, **c), errors.InvalidField),
+        (lambda m, c: m("reach").pose(0, performer="nobody", **c), errors.InvalidField),
+        (
+            lambda m, c: m("reach").pose(0, extrapolate="refuse", **c | {"turn": 1000}),
+            errors.OutsideSamples,
+        ),
+        (lambda m, c: m("reach").clip(fps="x", **c).content("usdc"), errors.BadParameter),
+        (lambda m, c: m("reach").clip(loop=True, **c).content("usdc"), errors.InvalidField),
+        (lambda m, c: m("reach").crowd([0, 1], turn=[1, 2, 3]).numbers, errors.InvalidField),
+    ],
+)
+def test_the_service_itself_is_understood(ask, kind, address, controls):
+    fault = raised(address, lambda client: ask(client.model, controls))
+    later = raised_later(address, lambda client: ask(client.model, controls))
+    assert type(fault) is type(later) is kind
+    assert str(fault) == str(later)
+    assert fault.errors
+
+
+def test_a_service_that_wants_keys(models):
+    key, other = keys.make(), keys.make()
+    told = keys.line("one", ["read:walk"], key)
+    with serving.process(models, POSEFIELD_KEYS=told) as child:
+        place = serving.address(child)
+        assert type(raised(place)) is errors.Unauthenticated
+        assert type(raised(place, key=other)) is errors.Unauthenticated
+        with Client(place, key=key) as client:
+            assert [model.name for model in client.models()] == ["walk"]
+        assert type(raised(place, lambda c: c.model("reach").card, key=key)) is errors.UnknownModel
+
+
+def test_a_key_is_never_in_a_message():
+    fault = raised_at_the_door(key="geheim\n")
+    assert "geheim" not in str(fault)
+
+
+def raised_at_the_door(address="http://127.0.0.1:1", **given):
+    with pytest.raises(errors.WrongQuestion) as caught:
+        Client(address, **given)
+    return caught.value
+
+
+@pytest.mark.parametrize("address", ["localhost:8000", "", "ftp://x", "http://", "http://x?a=b"])
+def test_an_address_that_is_none(address):
+    assert repr(address) in str(raised_at_the_door(address))
+
+
+def test_nobody_there():
+    with scripted.serving() as server:
+        pass
+    fault = raised(server.address)
+    assert type(fault) is type(raised_later(server.address)) is errors.Unreachable
+    assert "GET /v1/models" in str(fault)
+
+
+@pytest.mark.parametrize(
+    "said", [b"", b"HTTP/1.1 200 OK\r\nContent-", b"SSH-2.0-OpenSSH_9\r\n\r\n"]
+)
+def test_nothing_that_is_http(said):
+    with scripted.serving(said, said) as server:
+        assert type(raised(server.address)) is errors.Unreachable
+        assert type(raised_later(server.address)) is errors.Unreachable
+
+
+@pytest.mark.parametrize("before", [b"", answer(LIST)[:-3]])
+def test_too_slow(before):
+    slow = [before, Pause(1)]
+    with scripted.serving(slow, slow) as server:
+        assert type(raised(server.address, timeout=0.2)) is errors.TimedOut
+        assert type(raised_later(server.address, timeout=0.2)) is errors.TimedOut
+
+
+@pytest.mark.parametrize(
+    "said", [answer(LIST)[:-3], chunked(LIST, ended=False, kind="application/json")]
+)
+def test_cut_in_the_middle(said):
+    with scripted.serving(said, said) as server:
+        assert type(raised(server.address)) is errors.Broken
+        assert type(raised_later(server.address)) is errors.Broken
+
+
+def test_an_answer_of_which_nobody_knows_the_end():
+    said = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n\r\n" + LIST
+    with scripted.serving(said) as server:
+        assert type(raised(server.address)) is errors.IncompleteAnswer
+
+
+def test_bytes_that_are_not_in_the_coding_that_is_said():
+    with scripted.serving(answer(LIST, Content_Encoding="gzip")) as server:
+        assert type(raised(server.address)) is errors.Broken
+
+
+@pytest.mark.parametrize("status", errors.GATEWAYS)
+def test_something_before_the_service_says_that_it_is_not_there(status):
+    with scripted.serving(answer(b"<html>", "text/html", status)) as server:
+        fault = raised(server.address)
+    assert type(fault) is errors.Unreachable
+    assert str(status) in str(fault)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        answer(b"<html>welcome</html>", "text/html"),
+        answer(b"{}"),
+        answer(b"[1,"),
+        answer(b'{"models": [{"name": 3}]}'),
+        answer(b"", status=302, Location="https://elsewhere.example/"),
+        answer(b"no", "text/plain", 404),
+        answer(b"{}", problems.MEDIA_TYPE, 400),
+        answer(b"", status=304),
+    ],
+)
+def test_an_answer_of_another_version_says_of_which(said):
+    version = answer(b'{"status": "live", "contract": "9.1.0"}')
+    with scripted.serving(said, version, said, version) as server:
+        fault, later = raised(server.address), raised_later(server.address)
+    assert type(fault) is type(later) is Unexpected
+    assert (fault.service, fault.client) == ("9.1.0", CONTRACT)
+    assert str(fault) == str(later)
+    assert f"speaks contract 9.1.0, this client was made for {CONTRACT}" in str(fault)
+    assert [line for line in server.lines if line != "GET /v1/models"] == ["GET /livez"] * 2
+
+
+def test_an_older_service_is_asked_for_its_document():
+    document = answer(b'{"info": {"version": "2.0.0"}}')
+    said = [answer(b"{}"), answer(b'{"status": "live"}'), document]
+    with scripted.serving(*said) as server:
+        assert raised(server.address).service == "2.0.0"
+    assert server.lines[1:] == ["GET /livez", "GET /openapi.json"]
+
+
+def test_what_is_no_service_says_no_version():
+    page = answer(b"<html>", "text/html")
+    with scripted.serving(page, page, page) as server:
+        fault = raised(server.address)
+    assert fault.service is None
+    assert "does not say which contract" in str(fault)
+
+
+def test_a_path_that_an_older_service_does_not_have_is_noted():
+    version = answer(b'{"contract": "1.0.0"}')
+    with scripted.serving(refusal(problems.NO_SUCH_PATH), version) as server:
+        fault = raised(server.address)
+    assert type(fault) is errors.NoSuchPath
+    assert fault.__notes__ == [f"service: contract 1.0.0; this client: {CONTRACT}"]
+
+
+def test_the_real_service_speaks_the_contract(address):
+    document = httpx.get(f"{address}/openapi.json").json()
+    assert document["info"]["version"] == CONTRACT
