@@ -46,6 +46,16 @@ class Disk:
     def keep(self, name: str, kept: Kept) -> None:
         """Keep an answer; where the folder cannot be written, warn and go on without."""
         content = msgspec.msgpack.encode((kept.headers, kept.content, kept.until))
+        try:
+            self._write(name, content)
+            self._written += len(content)
+            if self._written > self.limit // 16:
+                self._written = 0
+                self._tidy()
+        except OSError as fault:
+            warnings.warn(f"answers cannot be kept in {self.folder}: {fault}", stacklevel=2)
+
+    def _write(self, name: str, content: bytes) -> None:
         part = self.folder / f"{name}.{secrets.token_hex(6)}.part"
         try:
             with os.fdopen(
@@ -54,14 +64,9 @@ class Disk:
                 file.write(_digest(content))
                 file.write(content)
             part.replace(self.folder / name)
-        except OSError as fault:
-            with suppress(OSError):
-                part.unlink()
-            warnings.warn(f"answers cannot be kept in {self.folder}: {fault}", stacklevel=2)
-        self._written += len(content)
-        if self._written > self.limit // 16:
-            self._written = 0
-            self._tidy()
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
 
     def _tidy(self) -> None:
         """Take away what was not used for longest, down to seven eighths of the limit."""
