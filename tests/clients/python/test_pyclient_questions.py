@@ -1,0 +1,173 @@
+"""What can be asked, how it is said, and what is refused before anything is sent."""
+
+import subprocess
+import sys
+
+import msgspec
+import numpy as np
+import posefield_client
+import pytest
+from posefield_client import Camera, Client, NamedClipQuestion, files, generated, numbers, questions
+from posefield_client.errors import WrongQuestion
+from posefield_client.wire import Reply
+
+NOWHERE = Client("http://127.0.0.1:1")
+
+
+def target(call):
+    return call.request.target
+
+
+def test_controls_by_keyword_and_by_mapping_are_the_same():
+    assert target(questions.pose("m", 0, turn=1)) == target(
+        questions.pose("m", 0, controls={"turn": 1})
+    )
+
+
+def test_names_that_are_no_python_words():
+    asked = questions.pose("m", 0, controls={"hip height/left": 1, "größe": 2})
+    assert target(asked).endswith("?hip+height%2Fleft=1&gr%C3%B6%C3%9Fe=2&time=0")
+
+
+@pytest.mark.parametrize("name", ["model", "times", "self", "clips", "format"])
+def test_a_control_may_be_called_what_a_parameter_is(name):
+    assert f"{name}=1" in files.clip("m", **{name: 1}).request("usdc").target
+
+
+@pytest.mark.parametrize("one", [0.5, np.float64(0.5), np.float32(0.5), np.array(0.5)])
+def test_a_number_of_any_kind(one):
+    assert target(questions.pose("m", one, turn=0.5)).endswith("pose.msgpack?turn=0.5&time=0.5")
+
+
+@pytest.mark.parametrize("many", [[0, 0.5], (0, 0.5), np.array([0, 0.5]), np.array([0, 0.5], "f4")])
+def test_times_of_any_kind(many):
+    shown = target(questions.pose("m", many, turn=np.int64(3)))
+    assert shown.replace("0.0", "0").endswith("pose.msgpack?turn=3&time=0&time=0.5")
+
+
+def test_a_long_question_goes_by_post():
+    short, long = (questions.pose("m", [0.123] * n, turn=1).request for n in (100, 1000))
+    assert (short.operation.method, long.operation.method) == ("GET", "POST")
+    assert msgspec.json.decode(long.body) == {"controls": {"turn": 1}, "times": [0.123] * 1000}
+
+
+def test_what_is_not_said_is_not_sent():
+    asked = files.clips("m", [NamedClipQuestion(controls={"a": 1})], "usdc").request("zip")
+    assert msgspec.json.decode(asked.body) == {"format": "usdc", "clips": [{"controls": {"a": 1}}]}
+    asked = files.crowd("m", 0, a=[1, 2], camera=Camera(position=(0, 1, 2), fov=1, height=10))
+    assert msgspec.json.decode(asked.request("npz").body) == {
+        "controls": {"a": [1, 2]},
+        "time": 0,
+        "camera": {"position": [0, 1, 2], "fov": 1, "height": 10},
+    }
+
+
+def test_truths_are_said_as_the_contract_says_them():
+    assert files.clip("m", loop=True).request("glb").target.endswith("/clip.glb?loop=true")
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda m: m.pose(float("nan"), a=1), "times"),
+        (lambda m: m.pose([0, float("inf")], a=1), "times"),
+        (lambda m: m.pose(np.array([0, np.nan]), a=1), "times"),
+        (lambda m: m.pose("0", a=1), "times"),
+        (lambda m: m.pose(0, a="1"), "a is '1'"),
+        (lambda m: m.pose(0, a=True), "a is True"),
+        (lambda m: m.pose(0, a=None), "a is None"),
+        (lambda m: m.pose(0, controls={"a": 1}, a=2), "given twice: a"),
+        (lambda m: m.clip(end=float("nan")), "end is nan"),
+        (lambda m: m.clip(fps=np.float32("inf")), "fps"),
+        (lambda m: m.crowd([0, np.nan], a=1), "time"),
+        (lambda m: m.crowd([0, 1], a=["x", "y"]), "a holds"),
+        (lambda m: m.clips([], "fbx"), "format 'fbx', expected one of usda"),
+        (lambda m: m.clips([{"controls": {}, "frames": 3}], "glb"), "clip 0: .*frames"),
+        (lambda m: m.clips([{"controls": {"a": "x"}}], "glb"), "a is 'x'"),
+        (lambda m: m.clip(a=1).content("fbx"), "format 'fbx'"),
+    ],
+)
+def test_what_cannot_be_asked_is_not(ask, said):
+    with pytest.raises(WrongQuestion, match=said):
+        ask(NOWHERE.model("m"))
+
+
+@pytest.mark.parametrize("name", ["", "..", "a/b", "a@b", "Reach", "reach@0123", "x" * 65])
+def test_names_that_no_model_has(name):
+    with pytest.raises(WrongQuestion, match="expected a name or name@hash"):
+        NOWHERE.model(name)
+
+
+@pytest.mark.parametrize(
+    "packed",
+    [
+        [1, 2],
+        {"dtype": "<f4", "shape": [2]},
+        {"dtype": "<f4", "shape": [3], "data": bytes(8)},
+        {"dtype": "<f4", "shape": [2], "data": bytes(7)},
+        {"dtype": "O", "shape": [1], "data": bytes(8)},
+        {"dtype": "fish", "shape": [1], "data": bytes(8)},
+        {"dtype": "<f4", "shape": "x", "data": bytes(8)},
+    ],
+)
+def test_an_array_that_is_none_is_refused(packed):
+    grid = dict.fromkeys(("model", "across", "along"), "x") | {"controls": {}, "units": {}}
+    arrays = dict.fromkeys(("across_values", "along_values", "sigma", "inside"), packed)
+    whole = msgspec.msgpack.encode({**grid, "performer": None, **arrays})
+    with pytest.raises((ValueError, TypeError)):
+        numbers.grid(Reply(200, {}, whole))
+
+
+def test_arrays_cannot_be_written_to(address, controls):
+    with Client(address) as client:
+        pose = client.model("reach").pose([0, 0.1], **controls)
+    assert pose.rotations.dtype == np.float32
+    with pytest.raises(ValueError, match="read-only"):
+        pose.rotations[0] = 0
+
+
+def test_a_card_is_asked_for_once_and_again_where_that_is_wanted(address):
+    with Client(address) as client:
+        model = client.model("reach")
+        assert model.card is model.card
+        assert model.read_card() == model.card
+        assert list(model.controls) == [control.name for control in model.card.controls]
+        assert client.model(model.card.identity).card.identity == model.card.identity
+
+
+def test_what_a_newer_service_adds_is_passed_over_and_what_an_older_lacks_is_empty():
+    entry = {"name": "m", "identity": "m@0", "versions": [], "description": "", "mood": "good"}
+    content = msgspec.json.encode({"models": [entry], "total": 1})
+    assert questions.models().read(Reply(200, {}, content))[0].name == "m"
+    said = b'{"type": "x", "title": "", "status": 400, "detail": "", "instance": "", "errors": []}'
+    assert msgspec.json.decode(said, type=generated.Problem).error is None
+
+
+ALONE = """
+import sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {"service", "model_export", "pyarrow"}:
+            raise ImportError("hidden: " + name)
+sys.meta_path.insert(0, Hidden())
+"""
+
+
+def python(code):
+    command = [sys.executable, "-W", "error", "-c", ALONE + code]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_it_needs_nothing_of_the_service_nor_pyarrow():
+    done = python("import posefield_client; print(posefield_client.CONTRACT)")
+    assert (done.returncode, done.stdout.strip()) == (0, posefield_client.CONTRACT), done.stderr
+
+
+def test_without_pyarrow_a_table_says_what_to_install():
+    done = python("from posefield_client import tables; tables.read(None)")
+    assert "pip install posefield-client[arrow]" in done.stderr
+
+
+def test_what_is_hidden_cannot_be_imported():
+    """Negative control of the two above."""
+    assert "hidden: service" in python("import service").stderr

@@ -1,0 +1,238 @@
+"""Files are whole or not there, whatever happens to the network, and say how far they are."""
+
+import asyncio
+import io
+import json
+
+import numpy as np
+import pytest
+import scripted
+from posefield_client import NEVER, AsyncClient, Client, Progress, Retry, archives, errors
+from posefield_client.archives import Counter
+from posefield_client.files import CLIP
+from scripted import answer, chunked
+
+USDC = "model/vnd.usdc"
+EAGER = Retry(first=0.001)
+
+
+def by_waiting(address, path, ask=lambda model: model.clip(turn=1), retry=NEVER, **given):
+    with Client(address, retry=retry) as client:
+        return ask(client.model("reach")).save(path, **given)
+
+
+def by_awaiting(address, path, ask=lambda model: model.clip(turn=1), retry=NEVER, **given):
+    async def save():
+        async with AsyncClient(address, retry=retry) as client:
+            return await ask(client.model("reach")).save(path, **given)
+
+    return asyncio.run(save())
+
+
+BOTH = pytest.mark.parametrize("save", [by_waiting, by_awaiting])
+CUT = {
+    "length": answer(bytes(100_000), USDC)[:-1],
+    "chunks": chunked(bytes(70_000), ended=False, kind=USDC),
+    "head": b"HTTP/1.1 200 OK\r\nContent-Ty",
+    "endless": b"HTTP/1.1 200 OK\r\nContent-Type: model/vnd.usdc\r\n\r\nhalf",
+}
+
+
+@BOTH
+@pytest.mark.parametrize("cut", CUT)
+def test_a_cut_clip_leaves_nothing(cut, save, tmp_path):
+    with scripted.serving(CUT[cut]) as server:
+        with pytest.raises((errors.Broken, errors.Unreachable)):
+            save(server.address, tmp_path / "clip.usdc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+def test_what_was_there_stays_until_the_new_file_is_whole(save, tmp_path):
+    path = tmp_path / "clip.usdc"
+    path.write_bytes(b"before")
+    with scripted.serving(CUT["length"], answer(b"after", USDC)) as server:
+        with pytest.raises(errors.Broken):
+            save(server.address, path)
+        assert path.read_bytes() == b"before"
+        save(server.address, path)
+    assert path.read_bytes() == b"after"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@BOTH
+def test_a_cut_clip_is_asked_for_again_from_its_beginning(save, tmp_path):
+    seen = []
+    with scripted.serving(CUT["length"], answer(b"whole", USDC)) as server:
+        saved = save(server.address, tmp_path / "clip.usdc", retry=EAGER, progress=seen.append)
+    assert (tmp_path / "clip.usdc").read_bytes() == b"whole"
+    assert saved.bytes == 5
+    assert seen[0].received > 5
+    assert seen[-1] == Progress(5, 5)
+
+
+@BOTH
+@pytest.mark.parametrize("said", [answer(b"<html>", "text/html"), answer(b"no", "text/plain", 404)])
+def test_what_is_no_clip_is_not_written(said, save, tmp_path):
+    with scripted.serving(said, answer(b"{}"), answer(b"{}")) as server:
+        with pytest.raises(errors.Unexpected):
+            save(server.address, tmp_path / "clip.usdc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+def test_whoever_watches_may_end_it(save, tmp_path):
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    with scripted.serving(answer(b"whole", USDC)) as server, pytest.raises(KeyboardInterrupt):
+        save(server.address, tmp_path / "clip.usdc", progress=stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+def test_without_the_folder_nothing_is_asked(save, tmp_path):
+    with scripted.serving() as server, pytest.raises(FileNotFoundError):
+        save(server.address, tmp_path / "none/clip.usdc")
+    assert server.asked == []
+
+
+@pytest.mark.parametrize("name", ["clip.fbx", "clip", "clip.usdc.gz", ".usdc"])
+def test_another_ending_names_those_that_there_are(name, tmp_path):
+    with pytest.raises(errors.WrongQuestion) as caught:
+        by_waiting("http://127.0.0.1:1", tmp_path / name)
+    assert all(f".{ending}" in str(caught.value) for ending in CLIP)
+
+
+@pytest.mark.parametrize("ending", CLIP)
+def test_the_ending_is_the_format(ending, address, controls, tmp_path):
+    path = tmp_path / f"clip.{ending}"
+    saved = by_waiting(address, path, lambda model: model.clip(fps=25, **controls))
+    with Client(address) as client:
+        assert path.read_bytes() == client.model("reach").clip(fps=25, **controls).content(ending)
+    assert saved.bytes == path.stat().st_size
+    assert saved.model.startswith("reach@")
+    assert saved.sigma > 0
+    assert saved.duration > 0
+    assert saved.warnings == ()
+
+
+def test_capitals_are_the_same_ending(address, controls, tmp_path):
+    by_waiting(address, str(tmp_path / "CLIP.USDC"), lambda model: model.clip(**controls))
+    assert (tmp_path / "CLIP.USDC").read_bytes().startswith(b"PXR-USDC")
+
+
+def test_warnings_come_with_the_file(address, controls, tmp_path):
+    far = {**controls, "turn": 90, "target_height": 3}
+    saved = by_waiting(address, tmp_path / "clip.glb", lambda model: model.clip(**far))
+    with Client(address) as client:
+        told = client.model("reach").pose(0, **far).trust.warnings
+    assert saved.warnings == told
+    assert len(told) == 2
+
+
+def test_a_file_may_be_read_by_those_whom_the_process_lets(address, controls, tmp_path):
+    other = tmp_path / "other"
+    other.touch()
+    by_waiting(address, tmp_path / "clip.bvh", lambda model: model.clip(**controls))
+    assert (tmp_path / "clip.bvh").stat().st_mode == other.stat().st_mode
+
+
+@BOTH
+@pytest.mark.parametrize("ending", ["zip", "tar"])
+def test_an_archive_says_how_far_it_is_and_what_is_in_it(save, ending, address, controls, tmp_path):
+    clips = [
+        {"controls": {**controls, "turn": float(turn)}, "name": f"t{turn}"} for turn in range(9)
+    ]
+    seen, path = [], tmp_path / f"x.{ending}"
+    saved = save(address, path, lambda m: m.clips(clips, "glb"), progress=seen.append)
+    assert [entry.name for entry in saved.entries] == [clip["name"] for clip in clips]
+    assert seen[-1] == Progress(path.stat().st_size, None, 9, 9)
+    counts = [each.files for each in seen]
+    assert counts == sorted(counts)
+    assert len(set(counts)) > 2
+
+
+@pytest.fixture(scope="module", params=["zip", "tar"])
+def archive(request, address, controls):
+    """An archive of three clips, and its kind."""
+    clips = [{"controls": controls, "fps": fps} for fps in (5, 10, 15)]
+    with Client(address) as client:
+        content = client.model("reach").clips(clips, "bvh").content(request.param)
+    return request.param, content
+
+
+@pytest.mark.parametrize("size", [1, 7, 512, 4096, 10**9])
+def test_files_are_counted_in_pieces_of_any_size(size, archive):
+    ending, content = archive
+    counter = Counter(ending)
+    for start in range(0, len(content), size):
+        counter.feed(content[start : start + size])
+    assert counter.files == 4
+
+
+def test_an_archive_that_breaks_off_anywhere_is_seen(archive, rng):
+    ending, content = archive
+    assert len(archives.check(io.BytesIO(content), ending, 3)) == 3
+    # After its last file a tar is but zeros.
+    last = len(content) if ending == "zip" else content.rindex(b"}\n")
+    for end in [0, 1, last - 1, *rng.integers(0, last, 40)]:
+        with pytest.raises(errors.IncompleteAnswer):
+            archives.check(io.BytesIO(content[:end]), ending, 3)
+
+
+def test_an_archive_of_fewer_clips_is_not_whole(archive):
+    ending, content = archive
+    with pytest.raises(errors.IncompleteAnswer, match="holds 4 files, expected 5"):
+        archives.check(io.BytesIO(content), ending, 4)
+
+
+@BOTH
+def test_an_archive_without_a_manifest_leaves_nothing(save, archive, controls, tmp_path):
+    ending, content = archive
+    media_type = {"zip": "application/zip", "tar": "application/x-tar"}[ending]
+    start = content.index(b"manifest.jsonl") - (30 if ending == "zip" else 0)
+    with scripted.serving(chunked(content[:start], kind=media_type)) as server:
+        with pytest.raises(errors.IncompleteAnswer):
+            save(
+                server.address,
+                tmp_path / f"x.{ending}",
+                lambda model: model.clips([{"controls": controls}] * 3, "bvh"),
+            )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_crowd_that_walks_is_a_file(address, tmp_path):
+    with Client(address) as client:
+        walk = client.model("walk").crowd_walk(count=3, seconds=0.5, camera=(30, 1.7, -60))
+        saved = walk.save(tmp_path / "crowd.usdz")
+        with pytest.raises(errors.WrongQuestion, match=r"\.usda, \.usdc, \.usdz"):
+            walk.save(tmp_path / "crowd.glb")
+    assert (tmp_path / "crowd.usdz").read_bytes()[:2] == b"PK"
+    assert saved.model.startswith("walk@")
+
+
+def test_a_crowd_is_arrays_and_a_table(address, controls, tmp_path):
+    turns = np.linspace(-20, 20, 5, dtype=np.float32)
+    with Client(address) as client:
+        crowd = client.model("reach").crowd([0.1] * 5, **{**controls, "turn": turns})
+        found, table = crowd.numbers, crowd.table()
+        crowd.save(tmp_path / "crowd.npz")
+    assert found.rotations.shape[:1] == found.levels.shape == (5,)
+    assert found.error_px is None
+    stored = np.load(tmp_path / "crowd.npz")
+    assert np.array_equal(stored["rotations"], found.rotations)
+    assert np.array_equal(table["sigma"].to_numpy(), found.sigma)
+    joints = table["rotations"].combine_chunks().to_numpy_ndarray()
+    assert np.array_equal(joints, found.rotations)
+
+
+def test_numbers_of_a_clip_are_those_of_its_file(address, controls):
+    with Client(address) as client:
+        clip = client.model("reach").clip(fps=10, end=0.5, **controls)
+        found, written = clip.numbers, json.loads(clip.content("json"))
+        assert clip.numbers is found
+    assert list(found.names) == written["names"]
+    assert found.rate == 10
+    assert np.abs(found.rotations - written["rotations"]).max() < 1e-6
+    assert np.abs(found.root_position - written["root_position"]).max() < 1e-5
