@@ -11,6 +11,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import client
 import clips_http
 import crowd
 import crowd_usd
@@ -54,6 +55,7 @@ def main() -> None:
         *serve_rivals.rows(model),
         *serve_models.rows(model),
         *serve_growth.rows(model),
+        *client.rows(model),
         *export_usd.rows(),
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]

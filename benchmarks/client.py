@@ -1,0 +1,100 @@
+"""What a pose costs by posefield_client, beside httpx alone: the same URL, the same body, read into
+the same arrays. The first asks for keywords, makes the URL, looks whether it has the answer, checks
+what came and would ask again; the second has a URL.
+
+    .venv/bin/python benchmarks/client.py [MODEL]
+
+Both ask the real service, and a server that answers the same bytes at once, in turn in one run.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import serve_process
+from posefield_client import NOTHING, Client
+from posefield_client.numbers import pose
+from posefield_client.wire import Reply
+from rows import Row, table
+
+HERE = Path(__file__).parent
+MODEL = HERE.parent / "build/models/reaching.onnx"
+GOAL = 1.5
+ROUNDS, WARM = 3000, 200
+MEDIA_TYPE = "application/vnd.msgpack"
+
+
+def main() -> None:
+    """Measure and print."""
+    print(table(rows(Path(sys.argv[1]) if sys.argv[1:] else MODEL)))
+
+
+def rows(model: Path) -> list[Row]:
+    """How many times as long a pose takes; once with the real service, once with none."""
+    with serve_process.posefield(model) as real, Client(real.url) as client:
+        asked = client.model(model.stem)
+        controls = {name: control.default for name, control in asked.controls.items()}
+        found = httpx.get(url(real.url, model.stem, controls)(0.5)).content
+        rows = [_row("of the service", real.url, model.stem, controls)]
+    with _same(found) as address:
+        return [*rows, _row("of a server that answers at once", address, model.stem, controls)]
+
+
+def _row(whose: str, address: str, model: str, controls: dict[str, float]) -> Row:
+    with httpx.Client() as bare, Client(address, cache=NOTHING) as lone, Client(address) as usual:
+        where = url(address, model, controls)
+        alone, kept = lone.model(model), usual.model(model)
+        ways = {
+            "bare": lambda at: _bare(bare, where(at)),
+            "none kept": lambda at: alone.pose(at, **controls),
+            "client": lambda at: kept.pose(at, **controls),
+        }
+        took = _in_turn(ways)
+    times = ", ".join(f"{name} {seconds * 1e6:.0f} us" for name, seconds in took.items())
+    baseline = f"httpx alone, read alike ({times})"
+    ratio = took["client"] / took["bare"]
+    return Row(f"a pose {whose} by posefield_client", ratio, "times", baseline, None, GOAL)
+
+
+def url(address: str, model: str, controls: dict[str, float]) -> Callable[[float], str]:
+    """The line that the client makes, but for the time."""
+    query = "&".join(f"{name}={value!r}" for name, value in controls.items())
+    start = f"{address}/v1/models/{model}/pose.msgpack?{query}&time="
+    return lambda at: start + repr(at)
+
+
+def _bare(http: httpx.Client, where: str) -> None:
+    answer = http.get(where)
+    pose(Reply(answer.status_code, answer.headers, answer.content))
+
+
+def _in_turn(ways: dict[str, Callable[[float], object]]) -> dict[str, float]:
+    """Median seconds of each, one after the other, each time at a moment of its own."""
+    took: dict[str, list[float]] = {name: [] for name in ways}
+    for turn in range(WARM + ROUNDS):
+        for place, (name, way) in enumerate(ways.items()):
+            at = round(1e-4 * (3 * turn + place), 4)
+            began = time.perf_counter()
+            way(at)
+            took[name].append(time.perf_counter() - began)
+    return {name: statistics.median(each[WARM:]) for name, each in took.items()}
+
+
+@contextmanager
+def _same(content: bytes) -> Iterator[str]:
+    with tempfile.NamedTemporaryFile() as file:
+        file.write(content)
+        file.flush()
+        port = serve_process.free_port()
+        command = [sys.executable, HERE / "client_same.py", file.name, MEDIA_TYPE, str(port)]
+        with serve_process.started("client_same", command, port) as server:
+            yield server.url
+
+
+if __name__ == "__main__":
+    main()
