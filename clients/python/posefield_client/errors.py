@@ -22,7 +22,7 @@ PosefieldError
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -63,6 +63,7 @@ class Problem(PosefieldError):
 
     def __init__(self, said: generated.Problem, retry_after: float | None = None) -> None:
         super().__init__(f"{said.title}: {said.detail}" if said.detail else said.title)
+        self.said = said
         self.status = said.status
         self.kind = said.type.removeprefix(TYPE_PREFIX)
         self.title = said.title
@@ -70,6 +71,10 @@ class Problem(PosefieldError):
         self.instance = said.instance
         self.errors = said.errors
         self.retry_after = retry_after
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # From worker to caller: an exception is made anew from what it was made of.
+        return type(self), (self.said, self.retry_after)
 
 
 class WrongRequest(Problem):
@@ -216,6 +221,9 @@ class Unexpected(PosefieldError):
         super().__init__(f"{found}; the service {speaks}, this client was made for {CONTRACT}")
         self.found = found
         self.service = service
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.found, self.service)
 
 
 _PROBLEM = msgspec.json.Decoder(generated.Problem)

@@ -97,10 +97,10 @@ def begin(send: Send, response: httpx.Response) -> Callable[[bytes], None] | Non
 def reply(send: Send, response: httpx.Response, content: bytes) -> Reply:
     """The answer, which has come whole; IncompleteAnswer where nobody can know."""
     headers = response.headers
-    if "content-length" not in headers and "transfer-encoding" not in headers:
-        if response.status_code == 200 and response.http_version == "HTTP/1.1":
-            asked = named(send.request.operation)
-            raise IncompleteAnswer(f"the answer to {asked} does not say where it ends")
+    endless = "content-length" not in headers and "transfer-encoding" not in headers
+    if endless and response.status_code == 200:
+        asked = named(send.request.operation)
+        raise IncompleteAnswer(f"the answer to {asked} does not say where it ends")
     return Reply(response.status_code, headers, content)
 
 

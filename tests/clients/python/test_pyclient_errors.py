@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import pickle
 import re
 
 import httpx
@@ -13,6 +14,7 @@ from posefield_client.errors import Problem, Unexpected
 from posefield_client.generated import CONTRACT
 from scripted import Pause, answer, chunked
 
+from service.motion.errors import UnknownModel
 from service.web import problems
 from service.web.access import keys
 from service.web.pages import problems as page
@@ -246,6 +248,22 @@ def test_a_path_that_an_older_service_does_not_have_is_noted():
         fault = raised(server.address)
     assert type(fault) is errors.NoSuchPath
     assert fault.__notes__ == [f"service: contract 1.0.0; this client: {CONTRACT}"]
+
+
+def test_errors_travel_between_processes():
+    version = answer(b'{"contract": "9.1.0"}')
+    with scripted.serving(refusal(KINDS[0]), answer(b"{}"), version) as server:
+        for fault in (raised(server.address), raised(server.address)):
+            again = pickle.loads(pickle.dumps(fault))
+            assert type(again) is type(fault)
+            assert (str(again), vars(again)) == (str(fault), vars(fault))
+
+
+def test_a_model_that_disappears(address, controls):
+    gone = refusal(problems.TABLE[UnknownModel])
+    with scripted.serving(gone) as server:
+        fault = raised(server.address, lambda client: client.model("reach").pose(0, **controls))
+    assert type(fault) is errors.UnknownModel
 
 
 def test_the_real_service_speaks_the_contract(address):

@@ -3,6 +3,7 @@
 import asyncio
 import io
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import scripted
 from posefield_client import NEVER, AsyncClient, Client, Progress, Retry, archives, errors
 from posefield_client.archives import Counter
 from posefield_client.files import CLIP
-from scripted import answer, chunked
+from scripted import Pause, answer, chunked
 
 USDC = "model/vnd.usdc"
 EAGER = Retry(first=0.001)
@@ -88,6 +89,39 @@ def test_whoever_watches_may_end_it(save, tmp_path):
     with scripted.serving(answer(b"whole", USDC)) as server, pytest.raises(KeyboardInterrupt):
         save(server.address, tmp_path / "clip.usdc", progress=stop)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_whoever_is_cancelled_leaves_nothing(tmp_path):
+    async def begin(address):
+        async with AsyncClient(address) as client:
+            clip = client.model("reach").clip(turn=1)
+            task = asyncio.create_task(clip.save(tmp_path / "clip.usdc", progress=seen.append))
+            while not seen:
+                await asyncio.sleep(0.01)
+            assert len(list(tmp_path.iterdir())) == 1
+            task.cancel()
+            await asyncio.wait([task])
+            assert task.cancelled()
+
+    seen = []
+    with scripted.serving([answer(bytes(100_000), USDC)[:-1], Pause(0.3)]) as server:
+        asyncio.run(begin(server.address))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_threads_share_a_client(address, controls, tmp_path):
+    with Client(address) as client, ThreadPoolExecutor(8) as threads:
+        model = client.model("reach")
+
+        def ask(turn):
+            given = {**controls, "turn": turn % 5}
+            model.clip(**given).save(tmp_path / f"{turn}.usdc")
+            return model.pose(0.1, **given).trust.controls["turn"]
+
+        assert list(threads.map(ask, range(40))) == [turn % 5 for turn in range(40)]
+    contents = [(tmp_path / f"{turn}.usdc").read_bytes() for turn in range(40)]
+    assert contents == contents[:5] * 8
+    assert len(set(contents)) == 5
 
 
 @BOTH

@@ -1,0 +1,52 @@
+"""The README's examples run as they stand, one after the other."""
+
+import re
+from pathlib import Path
+
+import pytest
+from posefield_client import errors
+from posefield_client.errors import Problem
+from posefield_client.files import CLIP
+
+README = Path(__file__).parents[3] / "clients/python/README.md"
+ADDRESS = "http://localhost:8000"
+
+
+def examples():
+    return re.findall(r"^```python\n(.*?)^```", README.read_text(), re.DOTALL | re.MULTILINE)
+
+
+def test_every_example_runs(address, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for example in examples():
+        exec(compile(example.replace(ADDRESS, address), "README.md", "exec"), names)
+    for each in ("client", "patient", "once", "on_disk", "larger", "more", "none"):
+        names[each].close()
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written == {*("clip.usdc", "clip.glb", "crowd.usdz", "clips.zip", "later.usdc", "kept")}
+    said = capsys.readouterr().out
+    assert "8 of 8 clips" in said
+    assert "turn" in said
+    assert "no answer" not in said
+
+
+def test_an_example_that_fails_would_be_seen():
+    """Negative control: names that are not there are no success."""
+    assert len(examples()) > 8
+    with pytest.raises(ImportError):
+        exec("from posefield_client import Clients", {})
+
+
+def test_every_format_is_named():
+    line = README.read_text().split("The ending says in which format:")[1].split(".")[0]
+    assert set(re.findall(r"`(\w+)`", line)) == set(CLIP)
+
+
+def test_the_table_says_what_is_asked_again():
+    rows = re.findall(r"^\| (`.*?) \|.*\| (yes)? ?\|$", README.read_text(), re.MULTILINE)
+    told = {name: bool(again) for cell, again in rows for name in re.findall(r"`(\w+)`", cell)}
+    assert {"Busy", "Unexpected", "TimedOut", "InternalError"} <= set(told)
+    assert told == {name: getattr(errors, name).again for name in told}
+    assert all(issubclass(getattr(errors, name), errors.PosefieldError) for name in told)
+    assert Problem.again is False
