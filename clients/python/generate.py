@@ -2,8 +2,9 @@
 
     python clients/python/generate.py
 
-datamodel-code-generator was tried first: enumerations of answers became closed (a newer service's
-word would not be read), every pattern was checked again at each answer, and it lists no operations.
+datamodel-code-generator 0.89 was tried first: msgspec cannot read what it makes of Problem.errors,
+its enumerations are closed (a newer service's word would be an error), every limit is checked again
+at each answer, and it lists no operations.
 """
 
 import json
