@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "2.0.0"
+CONTRACT = "2.1.0"
 """Version of the contract that this client was made for."""
 
 
@@ -199,6 +199,15 @@ class ModelCardKriging(Struct, frozen=True, kw_only=True):
     label: float
 
 
+class ModelCardEvent(Struct, frozen=True, kw_only=True):
+    """What the motion is for; null where the recipe names nothing, and in models trained
+    before this was kept.
+    """
+
+    joint: int
+    share: float
+
+
 class ModelCard(Struct, frozen=True, kw_only=True):
     """Everything a client needs to know of a model but its weights."""
 
@@ -224,6 +233,8 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     roles: dict[str, str]
     sources: tuple[str, ...]
     kriging: ModelCardKriging | None
+    left_out: tuple[float, ...] = ()
+    event: ModelCardEvent | None = None
 
 
 class Trust(Struct, frozen=True, kw_only=True):
@@ -292,6 +303,7 @@ class Liveness(Struct, frozen=True, kw_only=True):
     """Schema Liveness of the contract."""
 
     status: str
+    contract: str | None = None
 
 
 class ReloadFaults(Struct, frozen=True, kw_only=True):
@@ -589,6 +601,7 @@ OPERATIONS = {
         Operation("getReadiness", "GET", "/readyz", ("application/json",)),
         Operation("getContract", "GET", "/openapi.yaml", ("application/yaml",)),
         Operation("getContractJson", "GET", "/openapi.json", ("application/json",)),
+        Operation("getViewer", "GET", "/", ("text/html",)),
         Operation("getDocs", "GET", "/docs", ("text/html",)),
         Operation("getProblems", "GET", "/problems", ("text/html",)),
     )

@@ -269,3 +269,5 @@ def test_a_model_that_disappears(address, controls):
 def test_the_real_service_speaks_the_contract(address):
     document = httpx.get(f"{address}/openapi.json").json()
     assert document["info"]["version"] == CONTRACT
+    with Client(address) as client:
+        assert client.live().contract == CONTRACT

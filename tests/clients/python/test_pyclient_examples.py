@@ -33,7 +33,7 @@ NOT_ASKED = {
         for ending in ("Json", "Npz", "Arrow")
     },
     **{name: ENGINES for name, asked in OPERATIONS.items() if asked.path.startswith("/v2")},
-    **dict.fromkeys(["getDocs", "getProblems", "getContract"], "for people to read"),
+    **dict.fromkeys(["getViewer", "getDocs", "getProblems", "getContract"], "for people to read"),
     "getMetrics": "for Prometheus",
     "getContractJson": "asked by itself where an answer is none of the contract",
 }

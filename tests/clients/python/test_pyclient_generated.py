@@ -50,7 +50,7 @@ def optional(contract):
 
 def added(contract):
     found = contract["components"]["schemas"]["Liveness"]["properties"]
-    found["contract"] = {"type": "string"}
+    found["mood"] = {"type": "string"}
 
 
 def renamed(contract):

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import httpx
 import msgspec
 import numpy as np
 import posefield_client
@@ -141,6 +142,15 @@ def test_what_a_newer_service_adds_is_passed_over_and_what_an_older_lacks_is_emp
     assert questions.models().read(Reply(200, {}, content))[0].name == "m"
     said = b'{"type": "x", "title": "", "status": 400, "detail": "", "instance": "", "errors": []}'
     assert msgspec.json.decode(said, type=generated.Problem).error is None
+
+
+def test_cards_of_older_services_are_read(address):
+    card = httpx.get(f"{address}/v1/models/reach").json()
+    now = questions.card("reach").read(Reply(200, {}, msgspec.json.encode(card)))
+    older = {key: value for key, value in card.items() if key not in ("left_out", "event")}
+    then = questions.card("reach").read(Reply(200, {}, msgspec.json.encode(older)))
+    assert (len(now.left_out), then.left_out, then.event) == (len(now.examples), (), None)
+    assert then.controls == now.controls
 
 
 ALONE = """
