@@ -11,6 +11,7 @@ import serving
 from posefield_client import NEVER, NOTHING, Client, Disk, Memory
 from posefield_client import cache as caches
 from posefield_client.cache import Kept
+from posefield_client.exchange import Copy
 from scripted import answer
 
 from service.web.access import keys
@@ -184,11 +185,34 @@ def test_large_answers_are_not_kept(tmp_path, address, controls):
     assert list((tmp_path / "kept").iterdir()) == []
 
 
+def test_a_large_answer_of_unknown_length_is_not_held():
+    copy = Copy(Anything(), 10)
+    copy.begin(None)
+    copy.write(bytes(10))
+    assert copy.content == bytes(10)
+    copy.write(b"x")
+    assert copy.content == b""
+    copy.begin(None)
+    copy.write(b"again")
+    assert copy.content == b"again"
+
+
+class Anything:
+    """Sink that takes anything."""
+
+    def begin(self, total):
+        """Nothing."""
+
+    def write(self, chunk):
+        """Nothing."""
+
+
 WRITERS = """
 import sys
 from pathlib import Path
 from posefield_client import Disk
 from posefield_client.cache import Kept
+from posefield_client.exchange import Copy
 cache = Disk(Path(sys.argv[1]), 100_000)
 for turn in range(400):
     name = str(turn % 40)
