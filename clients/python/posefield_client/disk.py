@@ -73,9 +73,13 @@ class Disk:
         found = sorted(filter(None, map(_looked_at, self.folder.iterdir())), reverse=True)
         size = 0
         for used, length, path in found:
-            size += length
-            left_over = path.suffix == ".part" and used < time.time() - FORGOTTEN
-            if size > self.limit * 7 // 8 or left_over:
+            if path.suffix == ".part":
+                # Somebody may be writing it just now.
+                needless = used < time.time() - FORGOTTEN
+            else:
+                size += length
+                needless = size > self.limit * 7 // 8
+            if needless:
                 # Another process may have been faster.
                 with suppress(OSError):
                     path.unlink()

@@ -173,9 +173,9 @@ def test_what_a_killed_process_left_is_taken_away(tmp_path):
     for file in (old, new):
         file.write_bytes(b"half")
     os.utime(old, (0, 0))
-    Disk(tmp_path).keep("name", Kept({}, b"content", 0.0))
-    Disk(tmp_path, 16).keep("name", Kept({}, b"content", 0.0))
-    assert not old.exists()
+    Disk(tmp_path, 0).keep("name", Kept({}, b"content", 0.0))
+    # Somebody may be writing the new one just now, however little may be kept.
+    assert list(tmp_path.iterdir()) == [new]
 
 
 def test_large_answers_are_not_kept(tmp_path, address, controls):
@@ -212,7 +212,6 @@ import sys
 from pathlib import Path
 from posefield_client import Disk
 from posefield_client.cache import Kept
-from posefield_client.exchange import Copy
 cache = Disk(Path(sys.argv[1]), 100_000)
 for turn in range(400):
     name = str(turn % 40)
@@ -225,9 +224,7 @@ for turn in range(400):
 def test_several_processes_share_a_folder(tmp_path):
     command = [sys.executable, "-W", "error", "-c", WRITERS, str(tmp_path)]
     several = [subprocess.Popen(command, stderr=subprocess.PIPE) for _ in range(4)]
-    assert [(process.wait(60), process.stderr.read()) for process in several] == [(0, b"")] * 4
-    for process in several:
-        process.stderr.close()
+    assert [process.communicate(timeout=60)[1] for process in several] == [b""] * 4
     assert not list(tmp_path.glob("*.part"))
     assert sum(file.stat().st_size for file in tmp_path.iterdir()) < 2 * 100_000
 
