@@ -4,10 +4,11 @@ Controls are keywords, or a mapping `controls` where their names are no Python w
 out is left to the service, whose contract says what it then is.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 import msgspec
+import numpy.typing as npt
 
 from posefield_client import asking, numbers
 from posefield_client.generated import (
@@ -29,6 +30,7 @@ T = TypeVar("T")
 
 Extrapolate = Literal["warn", "refuse"]
 Controls = Mapping[str, float]
+Times = float | Sequence[float] | npt.NDArray[Any]
 
 
 def models() -> Call[tuple[ModelSummary, ...]]:
@@ -54,7 +56,7 @@ def card(model: str, /) -> Call[ModelCard]:
 def pose(
     model: str,
     /,
-    times: Any,
+    times: Times,
     *,
     performer: str | None = None,
     level: int | None = None,

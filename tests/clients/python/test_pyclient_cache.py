@@ -213,7 +213,7 @@ from pathlib import Path
 from posefield_client import Disk
 from posefield_client.cache import Kept
 cache = Disk(Path(sys.argv[1]), 100_000)
-for turn in range(400):
+for turn in range(200):
     name = str(turn % 40)
     found = cache.find(name)
     assert found is None or found.content == name.encode() * 2000, name
