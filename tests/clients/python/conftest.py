@@ -19,9 +19,9 @@ def models(labelled_path, walk_path, tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def address(models):
-    """Where a service listens that is a process of its own."""
+    """Where a service listens that is a process of its own, which is killed after 90 seconds."""
     import serving
 
     with serving.process(models) as child:

@@ -145,7 +145,7 @@ def raised_at_the_door(address="http://127.0.0.1:1", **given):
 
 
 @pytest.mark.parametrize(
-    "address", ["localhost:8000", "", "ftp://x", "http://", "http://[", "http://x?a=b"]
+    "address", ["localhost:8000", "", "ftp://x", "http://", "http://x:y", "http://x?a=b"]
 )
 def test_an_address_that_is_none(address):
     assert repr(address) in str(raised_at_the_door(address))
