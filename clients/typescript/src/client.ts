@@ -1,130 +1,216 @@
-/** Questions over HTTP. */
+/** Questions to a service, as promises. */
 
-import { decode } from "@msgpack/msgpack";
-
-import { Problem, Unexpected, Unreachable } from "./errors.ts";
-import { crowd, motion, type Packed, poses } from "./numbers.ts";
+import { END, expectEnd, opened } from "./archives.ts";
+import { json, read } from "./documents.ts";
+import { Unexpected } from "./errors.ts";
+import { named } from "./named.ts";
+import { crowd, motion, poses } from "./numbers.ts";
+import { get, link, post, type Request, request, under } from "./questions.ts";
+import { streamed } from "./streams.ts";
 import type {
+  Archive,
+  ArchiveFormat,
   ClipFormat,
   ClipQuestion,
+  CrowdFormat,
   CrowdPoses,
   CrowdQuestion,
+  Download,
   ModelCard,
   ModelSummary,
   Motion,
+  NamedClipQuestion,
   PoseQuestion,
   Poses,
+  Readiness,
   Reasons,
   SigmaGrid,
   SigmaQuestion,
+  Transfer,
+  TransferOptions,
+  WalkQuestion,
   WhyQuestion,
 } from "./types.ts";
+import { Wire } from "./wire.ts";
 
 export interface ClientOptions {
   /** API key or token, sent as `Authorization: Bearer`. */
   readonly key?: string;
+  /** Milliseconds without a byte after which a question ends with TimedOut; 30,000. */
+  readonly timeout?: number;
+  /** How often to ask again where a fault may pass; 3. */
+  readonly retries?: number;
+  /** Milliseconds before asking again for the first time, each time after that twice as many; 200. */
+  readonly pause?: number;
+  /** Bytes of answers to keep, for where no browser does it; 0. */
+  readonly cacheBytes?: number;
+  /** Characters up to which a question is a link (GET), beyond them a body (POST); 2,000. */
+  readonly longestLink?: number;
+  /** Asks in place of the platform's own. */
+  readonly fetch?: typeof fetch;
 }
 
-/** A file as the service names it. */
-export interface Download {
-  readonly name: string;
-  readonly mediaType: string;
-  readonly content: Uint8Array<ArrayBuffer>;
+export interface ArchiveOptions extends TransferOptions {
+  /** What the clips are sent in; zip. */
+  readonly as?: ArchiveFormat;
 }
+
+type Content = Uint8Array<ArrayBuffer>;
 
 export class Client {
   readonly base: string;
-  readonly #headers: Record<string, string>;
+  readonly #longest: number;
+  readonly #wire: Wire;
 
+  /** base: scheme, host and port of the service; empty for where the page comes from. */
   constructor(base = "", options: ClientOptions = {}) {
     this.base = base.replace(/\/+$/, "");
-    this.#headers = options.key ? { Authorization: `Bearer ${options.key}` } : {};
+    this.#longest = options.longestLink ?? 2000;
+    this.#wire = new Wire({
+      base: this.base,
+      headers: options.key ? { Authorization: `Bearer ${options.key}` } : {},
+      timeout: options.timeout ?? 30_000,
+      retries: options.retries ?? 3,
+      pause: options.pause ?? 200,
+      cacheBytes: options.cacheBytes ?? 0,
+      // Called as a method of anything else, a browser's own refuses.
+      fetch: options.fetch ?? ((...words) => fetch(...words)),
+    });
   }
 
   async models(signal?: AbortSignal): Promise<readonly ModelSummary[]> {
-    const { models } = (await this.#json("/v1/models", signal)) as { models: ModelSummary[] };
-    return models;
+    return this.#read(get("/v1/models"), (found) => read("ModelList", found).models, signal);
   }
 
   async card(model: string, signal?: AbortSignal): Promise<ModelCard> {
-    return (await this.#json(`/v1/models/${model}`, signal)) as ModelCard;
+    return this.#read(get(under(model, "")), (found) => read("ModelCard", found), signal);
   }
 
   async pose(model: string, question: PoseQuestion, signal?: AbortSignal): Promise<Poses> {
-    return poses(await this.#packed(`/v1/models/${model}/pose.msgpack`, question, signal));
+    return this.#read(this.#request(model, "/pose.msgpack", question), poses, signal);
   }
 
+  /** A clip as numbers. */
   async clip(model: string, question: ClipQuestion, signal?: AbortSignal): Promise<Motion> {
-    return motion(await this.#packed(`/v1/models/${model}/clip.msgpack`, question, signal));
+    return this.#read(this.#request(model, "/clip.msgpack", question), motion, signal);
   }
 
+  /** One pose of each of many characters. */
   async crowd(model: string, question: CrowdQuestion, signal?: AbortSignal): Promise<CrowdPoses> {
-    return crowd(await this.#packed(`/v1/models/${model}/crowd.msgpack`, question, signal));
+    return this.#read(post(under(model, "/crowd.msgpack"), question), crowd, signal);
   }
 
+  /** Sigma over two controls. */
   async sigma(model: string, question: SigmaQuestion, signal?: AbortSignal): Promise<SigmaGrid> {
-    const answer = await this.#ask(`/v1/models/${model}/sigma.json`, question, signal);
-    return (await answer.json()) as SigmaGrid;
+    const asked = this.#request(model, "/sigma.json", question);
+    return this.#read(asked, (found) => read("SigmaGrid", found), signal);
   }
 
+  /** Which captured clips an answer is made of. */
   async why(model: string, question: WhyQuestion, signal?: AbortSignal): Promise<Reasons> {
-    const answer = await this.#ask(`/v1/models/${model}/why`, question, signal);
-    return (await answer.json()) as Reasons;
+    const asked = this.#request(model, "/why", question);
+    return this.#read(asked, (found) => read("Reasons", found), signal);
   }
 
+  /** A clip as a file. */
   async file(
     model: string,
     format: ClipFormat,
     question: ClipQuestion,
     signal?: AbortSignal,
   ): Promise<Download> {
-    const answer = await this.#ask(`/v1/models/${model}/clip.${format}`, question, signal);
-    const mediaType = answer.headers.get("Content-Type") ?? "";
-    return {
-      name: `${model}.${format}`,
-      mediaType,
-      content: new Uint8Array(await answer.arrayBuffer()),
-    };
+    const asked = this.#request(model, `/clip.${format}`, question);
+    return this.#file(asked, `${model}.${format}`, { signal });
   }
 
-  async #json(path: string, signal?: AbortSignal): Promise<unknown> {
-    return (await this.#fetch(path, { method: "GET" }, signal)).json();
+  /** Characters that walk, as a file. */
+  async crowdFile(
+    model: string,
+    format: CrowdFormat,
+    question: WalkQuestion,
+    options: TransferOptions = {},
+  ): Promise<Download> {
+    const asked = get(link(under(model, `/crowd.${format}`), question));
+    return this.#file(asked, `${model}.${format}`, options);
   }
 
-  async #packed(path: string, question: object, signal?: AbortSignal): Promise<Packed> {
-    const answer = await this.#ask(path, question, signal);
-    return decode(new Uint8Array(await answer.arrayBuffer())) as Packed;
+  /** Many clips in one file, looked through: all are there, and as long as they should be. */
+  async archive(
+    model: string,
+    format: ClipFormat,
+    clips: readonly NamedClipQuestion[],
+    { as = "zip", ...options }: ArchiveOptions = {},
+  ): Promise<Archive> {
+    const asked = post(under(model, `/clips.${as}`), { format, clips });
+    const download = await this.#file(asked, `${model}.${as}`, options);
+    return this.#explained(async () => opened(download, as, clips.length));
   }
 
-  async #ask(path: string, question: object, signal?: AbortSignal): Promise<Response> {
-    return this.#fetch(path, { method: "POST", body: JSON.stringify(question) }, signal);
+  /** The same while it comes, for what is too large to be held. */
+  async stream(
+    model: string,
+    format: ClipFormat,
+    clips: readonly NamedClipQuestion[],
+    { as = "zip", signal, onProgress }: ArchiveOptions = {},
+  ): Promise<Transfer> {
+    const asked = post(under(model, `/clips.${as}`), { format, clips });
+    const begun = await this.#explained(() => this.#wire.begin(asked, signal));
+    const body = streamed(begun, END, (end) => expectEnd(as, end), onProgress);
+    return { ...named(begun.answer.headers, `${model}.${as}`), body };
   }
 
-  async #fetch(path: string, init: RequestInit, signal?: AbortSignal): Promise<Response> {
-    const headers = {
-      ...this.#headers,
-      ...(init.body ? { "Content-Type": "application/json" } : {}),
-    };
-    let answer: Response;
+  /** The link to a clip's file, to be sent on. */
+  url(model: string, format: ClipFormat, question: ClipQuestion): string {
+    const path = link(under(model, `/clip.${format}`), question);
+    return this.base ? this.base + path : new URL(path, globalThis.location?.href).href;
+  }
+
+  /** What the service says before it is sent questions; a Problem of kind not-ready, if it is not. */
+  async ready(signal?: AbortSignal): Promise<Readiness> {
+    return this.#explained(async () => {
+      const { content } = await this.#wire.once(get("/readyz"), signal);
+      return read("Readiness", content);
+    });
+  }
+
+  /** Version of the contract that the service speaks. */
+  async contract(signal?: AbortSignal): Promise<string> {
+    const { content } = await this.#wire.once(get("/livez"), signal);
+    const live = json(content) as { readonly contract?: unknown } | null;
+    if (typeof live?.contract === "string") return live.contract;
+    const whole = await this.#wire.once(get("/openapi.json"), signal);
+    const said = json(whole.content) as { readonly info?: { readonly version?: unknown } } | null;
+    if (typeof said?.info?.version === "string") return said.info.version;
+    throw new Unexpected("the service does not say which version of the contract it speaks");
+  }
+
+  #request(model: string, rest: string, question: object): Request {
+    return request(under(model, rest), question, this.#longest);
+  }
+
+  async #file(asked: Request, fallback: string, options: TransferOptions): Promise<Download> {
+    return this.#explained(async () => {
+      const { headers, content } = await this.#wire.whole(asked, options);
+      return { ...named(headers, fallback), content };
+    });
+  }
+
+  async #read<Answer>(
+    asked: Request,
+    as: (content: Content) => Answer,
+    signal: AbortSignal | undefined,
+  ): Promise<Answer> {
+    return this.#explained(async () => as((await this.#wire.whole(asked, { signal })).content));
+  }
+
+  /** An answer; what is unexpected in it is told with both versions, where they differ. */
+  async #explained<Answer>(ask: () => Promise<Answer>): Promise<Answer> {
     try {
-      answer = await fetch(this.base + path, { ...init, headers, ...(signal ? { signal } : {}) });
+      return await ask();
     } catch (fault) {
-      if (signal?.aborted) throw fault;
-      throw new Unreachable(`${this.base || "the service"} does not answer`, { cause: fault });
+      if (!(fault instanceof Unexpected)) throw fault;
+      const service = await this.contract().catch(() => null);
+      throw new Unexpected(fault.message, { cause: fault.cause, service });
     }
-    if (!answer.ok) throw await problem(answer);
-    return answer;
   }
-}
-
-async function problem(answer: Response): Promise<Error> {
-  if (!answer.headers.get("Content-Type")?.startsWith("application/problem+json")) {
-    return new Unexpected(`status ${answer.status} without a problem's description`);
-  }
-  const { type, title, detail } = (await answer.json()) as {
-    type: string;
-    title: string;
-    detail?: string;
-  };
-  return new Problem(answer.status, type.split(/[/#]/).at(-1) ?? "", title, detail ?? "");
 }

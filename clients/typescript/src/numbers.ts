@@ -1,78 +1,158 @@
-/** Arrays as they travel in MessagePack, as typed arrays. */
+/**
+ * Arrays as they travel in MessagePack, as typed arrays.
+ *
+ * They travel as maps of dtype, shape and little-endian bytes, which is how every engine that runs
+ * this holds them too. They are views of the answer where their numbers begin at a multiple of
+ * their size, else copies.
+ */
+
+import { decode } from "@msgpack/msgpack";
 
 import { Unexpected } from "./errors.ts";
 import type { CrowdPoses, Motion, Poses, Trust } from "./types.ts";
 
-export type Packed = Record<string, unknown>;
+type Packed = Readonly<Record<string, unknown>>;
+type Shape = readonly number[];
 
 interface PackedArray {
   readonly dtype: string;
-  readonly shape: readonly number[];
-  readonly data: Uint8Array;
+  readonly shape: Shape;
+  readonly data: Uint8Array<ArrayBuffer>;
 }
 
-export function poses(found: Packed): Poses {
+export function poses(content: Uint8Array<ArrayBuffer>): Poses {
+  return posesOf(unpacked(content));
+}
+
+export function motion(content: Uint8Array<ArrayBuffer>): Motion {
+  const found = unpacked(content);
+  const own = posesOf(found);
+  const names = strings(found, "names");
+  expectLength("names", names.length, own.boneOffsets.length / 3);
   return {
-    trust: found["trust"] as Trust,
-    times: Float64Array.from(numbers(found, "times")),
-    rotations: single(found, "rotations"),
-    rootPosition: single(found, "root_position"),
-    boneOffsets: single(found, "bone_offsets"),
+    ...own,
+    names,
+    parents: integers(found, "parents", names.length),
+    rate: number(found, "rate"),
+    frames: own.times.length,
+    units: record<Record<string, string>>(found, "units"),
   };
 }
 
-export function motion(found: Packed): Motion {
+export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
+  const found = unpacked(content);
+  const [count = 0, joints = 0] = array(found, "rotations").shape;
   return {
-    ...poses(found),
-    names: found["names"] as string[],
-    parents: [...numbers(found, "parents")],
-    rate: found["rate"] as number,
-    frames: found["frames"] as number,
+    model: text(found, "model"),
+    names: strings(found, "names"),
+    parents: integers(found, "parents", joints),
+    warnings: strings(found, "warnings"),
+    rotations: float32(found, "rotations", [count, joints, 4]),
+    rootPosition: float32(found, "root_position", [count, 3]),
+    boneOffsets: float32(found, "bone_offsets", [count, joints, 3]),
+    duration: float32(found, "duration", [count]),
+    sigma: float32(found, "sigma", [count]),
+    levels: Int32Array.from(int8(found, "levels", [count])),
+    errorPx: "error_px" in found ? float32(found, "error_px", [count]) : null,
   };
 }
 
-export function crowd(found: Packed): CrowdPoses {
+function posesOf(found: Packed): Poses {
+  const [frames = 0, joints = 0] = array(found, "rotations").shape;
   return {
-    model: found["model"] as string,
-    names: found["names"] as string[],
-    parents: [...numbers(found, "parents")],
-    warnings: found["warnings"] as string[],
-    rotations: single(found, "rotations"),
-    rootPosition: single(found, "root_position"),
-    boneOffsets: single(found, "bone_offsets"),
-    duration: single(found, "duration"),
-    sigma: single(found, "sigma"),
-    levels: Int32Array.from(numbers(found, "levels")),
-    errorPx: "error_px" in found ? single(found, "error_px") : null,
+    trust: record<Trust>(found, "trust"),
+    times: float64(found, "times", [frames]),
+    rotations: float32(found, "rotations", [frames, joints, 4]),
+    rootPosition: float32(found, "root_position", [frames, 3]),
+    boneOffsets: float32(found, "bone_offsets", [joints, 3]),
   };
 }
 
-function single(found: Packed, name: string): Float32Array {
-  return Float32Array.from(numbers(found, name));
+function unpacked(content: Uint8Array<ArrayBuffer>): Packed {
+  try {
+    return record({ answer: decode(content) }, "answer");
+  } catch (fault) {
+    if (fault instanceof Unexpected) throw fault;
+    throw new Unexpected(`the answer is no MessagePack: ${fault}`, { cause: fault });
+  }
 }
 
-function numbers(found: Packed, name: string): ArrayLike<number> & Iterable<number> {
+function float32(found: Packed, name: string, shape: Shape): Float32Array<ArrayBuffer> {
+  const { buffer, byteOffset, byteLength } = bytes(found, name, "<f4", 4, shape);
+  return new Float32Array(buffer, byteOffset, byteLength / 4);
+}
+
+function float64(found: Packed, name: string, shape: Shape): Float64Array<ArrayBuffer> {
+  const { buffer, byteOffset, byteLength } = bytes(found, name, "<f8", 8, shape);
+  return new Float64Array(buffer, byteOffset, byteLength / 8);
+}
+
+function int8(found: Packed, name: string, shape: Shape): Int8Array<ArrayBuffer> {
+  const { buffer, byteOffset, byteLength } = bytes(found, name, "|i1", 1, shape);
+  return new Int8Array(buffer, byteOffset, byteLength);
+}
+
+/** The bytes of an array of a shape, where numbers of their size may begin. */
+function bytes(
+  found: Packed,
+  name: string,
+  dtype: string,
+  size: number,
+  shape: Shape,
+): Uint8Array<ArrayBuffer> {
+  const { data, ...own } = array(found, name);
+  const [said, expected] = [`${own.dtype} (${own.shape})`, `${dtype} (${shape})`];
+  if (said !== expected) throw new Unexpected(`${name}: found ${said}, expected ${expected}`);
+  expectLength(`bytes of ${name}`, data.length, size * shape.reduce((a, b) => a * b, 1));
+  return data.byteOffset % size ? data.slice() : data;
+}
+
+function array(found: Packed, name: string): PackedArray {
+  const { dtype, shape, data } = record<Partial<PackedArray>>(found, name);
+  if (typeof dtype === "string" && Array.isArray(shape) && data instanceof Uint8Array) {
+    return { dtype, shape, data };
+  }
+  throw new Unexpected(`${name}: found no array`);
+}
+
+function record<Kind extends object = Packed>(found: Packed, name: string): Kind {
   const value = found[name];
-  if (Array.isArray(value)) return value as number[];
-  const packed = value as PackedArray | undefined;
-  const kind = packed && KINDS[packed.dtype];
-  if (!kind) throw new Unexpected(`${name}: found ${packed?.dtype ?? "nothing"}, expected numbers`);
-  // Copied to where numbers of their size may begin.
-  return new kind(packed.data.slice().buffer);
+  if (typeof value === "object" && value && !Array.isArray(value)) return value as Kind;
+  throw unlike(name, value, "a map");
 }
 
-const KINDS: Record<
-  string,
-  new (
-    buffer: ArrayBuffer,
-  ) => Float32Array | Float64Array | Int32Array | BigInt64Array extends infer A
-    ? A extends ArrayLike<number>
-      ? A & Iterable<number>
-      : never
-    : never
-> = {
-  "<f4": Float32Array as never,
-  "<f8": Float64Array as never,
-  "<i4": Int32Array as never,
-  "|u1": Uint8Array as never,
-};
+function text(found: Packed, name: string): string {
+  const value = found[name];
+  if (typeof value === "string") return value;
+  throw unlike(name, value, "a text");
+}
+
+function number(found: Packed, name: string): number {
+  const value = found[name];
+  if (typeof value === "number") return value;
+  throw unlike(name, value, "a number");
+}
+
+function strings(found: Packed, name: string): readonly string[] {
+  const value = found[name];
+  if (Array.isArray(value) && value.every((each) => typeof each === "string")) return value;
+  throw unlike(name, value, "a list of texts");
+}
+
+function integers(found: Packed, name: string, length: number): readonly number[] {
+  const value = found[name];
+  if (!Array.isArray(value) || !value.every(Number.isInteger)) {
+    throw unlike(name, value, "a list of whole numbers");
+  }
+  expectLength(name, value.length, length);
+  return value;
+}
+
+function unlike(name: string, value: unknown, expected: string): Unexpected {
+  const kind = value === undefined ? "nothing" : JSON.stringify(value).slice(0, 40);
+  return new Unexpected(`${name}: found ${kind}, expected ${expected}`);
+}
+
+function expectLength(name: string, found: number, expected: number): void {
+  if (found !== expected) throw new Unexpected(`${name}: found ${found}, expected ${expected}`);
+}

@@ -1,34 +1,38 @@
 /** What is asked and answered, named as the contract names it. */
 
-import type { components } from "./schema.ts";
+import type { components, operations } from "./schema.ts";
 
 type Schemas = components["schemas"];
 
+export type ManifestEntry = Schemas["ManifestEntry"];
 export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
-export type Trust = Schemas["Trust"];
+export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
 export type SigmaGrid = Schemas["SigmaGrid"];
+export type Trust = Schemas["Trust"];
 
 /** A question as one may write it: what has a default may be left out. */
 export type PoseQuestion = Asked<Schemas["PoseQuestion"], "controls" | "times">;
 export type ClipQuestion = Asked<Schemas["ClipQuestion"], "controls">;
+export type NamedClipQuestion = Asked<Schemas["NamedClipQuestion"], "controls">;
 export type CrowdQuestion = Asked<Schemas["CrowdQuestion"], "controls" | "time">;
 export type SigmaQuestion = Asked<Schemas["SigmaQuestion"], "across" | "along">;
 export type WhyQuestion = Asked<Schemas["WhyQuestion"], "controls">;
 
+/** Characters that walk; the camera as three numbers, m. */
+export type WalkQuestion = Omit<Walk, "camera"> & {
+  readonly camera?: readonly [x: number, y: number, z: number];
+};
+
+type Walk = NonNullable<operations["getCrowdUsdc"]["parameters"]["query"]>;
 type Asked<Question, Needed extends keyof Question> = Pick<Question, Needed> & Partial<Question>;
 
-export type ClipFormat =
-  | "usda"
-  | "usdc"
-  | "usdz"
-  | "glb"
-  | "bvh"
-  | "json"
-  | "npz"
-  | "arrow"
-  | "msgpack";
+export type ClipFormat = Schemas["ClipsQuestion"]["format"];
+export type CrowdFormat = "usda" | "usdc" | "usdz";
+
+/** What many clips are sent in. */
+export type ArchiveFormat = "zip" | "tar";
 
 /** Poses of the joints that the model's card names, at S times: metres, seconds, Y up. */
 export interface Poses {
@@ -48,6 +52,8 @@ export interface Motion extends Poses {
   readonly parents: readonly number[];
   readonly rate: number;
   readonly frames: number;
+  /** What the numbers are: other lengths and another axis up, where the question asked for them. */
+  readonly units: Readonly<Record<string, string>>;
 }
 
 /** A pose of each of N characters, roots in the world. */
@@ -67,4 +73,48 @@ export interface CrowdPoses {
   readonly levels: Int32Array;
   /** N, where a camera was given. */
   readonly errorPx: Float32Array | null;
+}
+
+/** What the head of an answer says of a file. */
+export interface Named {
+  /** As the service names it. */
+  readonly name: string;
+  readonly mediaType: string;
+  /** Which model answered, as name@hash. */
+  readonly model: string | null;
+  /** As in Trust, m; of a single clip. */
+  readonly sigma: number | null;
+  /** As in Trust, s; of a single clip. */
+  readonly duration: number | null;
+  readonly warnings: readonly string[];
+}
+
+/** A file, whole. */
+export interface Download extends Named {
+  readonly content: Uint8Array<ArrayBuffer>;
+}
+
+/** Many clips, all there: what an archive's manifest says of each, and its files by their paths. */
+export interface Archive extends Download {
+  readonly entries: readonly ManifestEntry[];
+  readonly files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
+}
+
+/** A file that is still coming. It ends with an error where it does not come whole. */
+export interface Transfer extends Named {
+  readonly body: ReadableStream<Uint8Array<ArrayBuffer>>;
+}
+
+/** Bytes that have come, and how many there will be where the service has said so. */
+export interface Progress {
+  readonly received: number;
+  readonly total: number | null;
+}
+
+export type OnProgress = (progress: Progress) => void;
+
+/** What may be said beside the question for a large file. */
+export interface TransferOptions {
+  readonly signal?: AbortSignal | undefined;
+  readonly onProgress?: OnProgress | undefined;
 }

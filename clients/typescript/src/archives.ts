@@ -1,0 +1,48 @@
+/** Archives of many clips: tar and zip of stored files, whose last file is a manifest of the others. */
+
+import { lines } from "./documents.ts";
+import { Broken } from "./errors.ts";
+import { members as tarMembers } from "./tar.ts";
+import type { Archive, ArchiveFormat, Download, ManifestEntry } from "./types.ts";
+import { members as zipMembers } from "./zip.ts";
+
+export type Member = readonly [path: string, content: Uint8Array<ArrayBuffer>];
+
+/** Bytes at the end of an archive by which one sees that it is whole. */
+export const END = 1024;
+
+const MANIFEST = "manifest.jsonl";
+const MEMBERS = { zip: zipMembers, tar: tarMembers };
+
+/** The files of an archive that was asked for so many clips; Broken where not all are there. */
+export function opened(download: Download, format: ArchiveFormat, clips: number): Archive {
+  const members = [...MEMBERS[format](download.content)];
+  const [name, manifest] = members.pop() ?? [];
+  if (name !== MANIFEST || !manifest) {
+    throw new Broken(`the archive ends with ${name ?? "nothing"}, expected ${MANIFEST}`);
+  }
+  const files = new Map(members);
+  const entries = lines("ManifestEntry", manifest);
+  if (entries.length !== clips) {
+    throw new Broken(`the archive holds ${entries.length} clips, expected ${clips}`);
+  }
+  for (const entry of entries) expectFile(files, entry);
+  return { ...download, entries, files };
+}
+
+/** Throws Broken where the last bytes of an archive are not those of a whole one. */
+export function expectEnd(format: ArchiveFormat, end: Uint8Array): void {
+  if (!ENDS[format](end)) throw new Broken(`the ${format} ended in the middle`);
+}
+
+const ENDS = {
+  // The record of the end has 22 bytes, and a service's no comment.
+  zip: (end: Uint8Array) => String.fromCharCode(...end.slice(-22, -18)) === "PK\x05\x06",
+  tar: (end: Uint8Array) => end.length === END && end.every((byte) => byte === 0),
+};
+
+function expectFile(files: ReadonlyMap<string, Uint8Array>, { file, bytes }: ManifestEntry): void {
+  const found = files.get(file)?.length;
+  if (found === bytes) return;
+  throw new Broken(`${file} has ${found ?? "no"} bytes in the archive, expected ${bytes}`);
+}

@@ -1,0 +1,24 @@
+/** What the head of an answer says of the file in it. */
+
+import type { Named } from "./types.ts";
+
+/** fallback: a name for where the service gives none. */
+export function named(headers: Headers, fallback: string): Named {
+  return {
+    name: /filename="([^"]+)"/.exec(headers.get("Content-Disposition") ?? "")?.[1] ?? fallback,
+    mediaType: headers.get("Content-Type") ?? "",
+    model: headers.get("Posefield-Model"),
+    sigma: number(headers.get("Posefield-Sigma")),
+    duration: number(headers.get("Posefield-Duration")),
+    warnings: warnings(headers.get("Posefield-Warning")),
+  };
+}
+
+function number(text: string | null): number | null {
+  return text === null ? null : Number(text);
+}
+
+/** Each is a JSON string in ASCII; lines of one header are joined by commas. */
+function warnings(joined: string | null): readonly string[] {
+  return joined === null ? [] : (JSON.parse(`[${joined}]`) as string[]);
+}

@@ -1,0 +1,47 @@
+/** How long an answer is waited for. */
+
+/** A signal that ends with the caller's own, or when nothing has come for some milliseconds. */
+export class Patience {
+  /** Whether nothing came for too long. */
+  over = false;
+  readonly #milliseconds: number;
+  readonly #caller: AbortSignal | undefined;
+  readonly #ending = new AbortController();
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(milliseconds: number, caller: AbortSignal | undefined) {
+    this.#milliseconds = milliseconds;
+    this.#caller = caller;
+    caller?.throwIfAborted();
+    caller?.addEventListener("abort", this.#abort);
+    this.renew();
+  }
+
+  get signal(): AbortSignal {
+    return this.#ending.signal;
+  }
+
+  /** Something has come. */
+  renew(): void {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(this.#expire, this.#milliseconds);
+  }
+
+  /** All has come, or nothing more is wanted. */
+  end(): void {
+    clearTimeout(this.#timer);
+    this.#caller?.removeEventListener("abort", this.#abort);
+  }
+
+  /** Throws the caller's reason, if it is the caller who has ended this. */
+  throwIfCancelled(): void {
+    this.#caller?.throwIfAborted();
+  }
+
+  readonly #abort = (): void => this.#ending.abort(this.#caller?.reason);
+
+  readonly #expire = (): void => {
+    this.over = true;
+    this.#ending.abort();
+  };
+}
