@@ -2,13 +2,13 @@
 
 import { lines } from "./documents.ts";
 import { Broken } from "./errors.ts";
-import { members as tarMembers } from "./tar.ts";
+import { isEnd, members as tarMembers } from "./tar.ts";
 import type { Archive, ArchiveFormat, Download, ManifestEntry } from "./types.ts";
 import { members as zipMembers } from "./zip.ts";
 
 export type Member = readonly [path: string, content: Uint8Array<ArrayBuffer>];
 
-/** Bytes at the end of an archive by which one sees that it is whole. */
+/** So many bytes at the end of an archive say whether it is whole. */
 export const END = 1024;
 
 const MANIFEST = "manifest.jsonl";
@@ -30,15 +30,15 @@ export function opened(download: Download, format: ArchiveFormat, clips: number)
   return { ...download, entries, files };
 }
 
-/** Throws Broken where the last bytes of an archive are not those of a whole one. */
-export function expectEnd(format: ArchiveFormat, end: Uint8Array): void {
-  if (!ENDS[format](end)) throw new Broken(`the ${format} ended in the middle`);
+/** Throws Broken where an archive of so many bytes does not end as a whole one. */
+export function expectEnd(format: ArchiveFormat, end: Uint8Array, bytes: number): void {
+  if (!ENDS[format](end, bytes)) throw new Broken(`the ${format} ended after ${bytes} bytes`);
 }
 
 const ENDS = {
   // The record of the end has 22 bytes, and a service's no comment.
   zip: (end: Uint8Array) => String.fromCharCode(...end.slice(-22, -18)) === "PK\x05\x06",
-  tar: (end: Uint8Array) => end.length === END && end.every((byte) => byte === 0),
+  tar: (end: Uint8Array, bytes: number) => bytes % 512 === 0 && isEnd(end),
 };
 
 function expectFile(files: ReadonlyMap<string, Uint8Array>, { file, bytes }: ManifestEntry): void {

@@ -155,7 +155,7 @@ export class Client {
   ): Promise<Transfer> {
     const asked = post(under(model, `/clips.${as}`), { format, clips });
     const begun = await this.#explained(() => this.#wire.begin(asked, signal));
-    const body = streamed(begun, END, (end) => expectEnd(as, end), onProgress);
+    const body = streamed(begun, END, (...end) => expectEnd(as, ...end), onProgress);
     return { ...named(begun.answer.headers, `${model}.${as}`), body };
   }
 

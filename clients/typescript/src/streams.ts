@@ -7,24 +7,26 @@ type Piece = Uint8Array<ArrayBuffer>;
 
 /**
  * The body of an answer. It ends with an error where the answer is cut, or where `check`, which is
- * given the last bytes of it, up to `kept` of them, throws.
+ * given the last bytes of it, up to `kept` of them, and how many there were, throws.
  */
 export function streamed(
   begun: Begun,
   kept: number,
-  check: (end: Uint8Array) => void,
+  check: (end: Uint8Array, bytes: number) => void,
   onProgress?: OnProgress,
 ): ReadableStream<Piece> {
   const source = pieces(begun, onProgress);
   let end: Uint8Array = new Uint8Array();
+  let bytes = 0;
   return new ReadableStream<Piece>({
     async pull(stream) {
       const { done, value } = await source.next();
       if (done) {
-        check(end);
+        check(end, bytes);
         return stream.close();
       }
       end = last(end, value, kept);
+      bytes += value.length;
       stream.enqueue(value);
     },
     async cancel() {

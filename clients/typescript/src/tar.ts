@@ -5,12 +5,15 @@ import { Broken } from "./errors.ts";
 
 const BLOCK = 512;
 
+/** Bytes at the end of every tar, all of them zero. */
+const END = 2 * BLOCK;
+
 /** The files of a tar in their order; Broken where it ends before its end does. */
 export function* members(content: Uint8Array<ArrayBuffer>): Generator<Member, void> {
   let long: string | null = null;
   for (let at = 0; ; ) {
     const head = content.subarray(at, at + BLOCK);
-    if (head.length === BLOCK && head.every((byte) => byte === 0)) return;
+    if (at === content.length - END && isEnd(content.subarray(at))) return;
     const start = at + BLOCK;
     const size = Number.parseInt(field(head, 124, 12), 8);
     at = start + BLOCK * Math.ceil(size / BLOCK);
@@ -24,6 +27,11 @@ export function* members(content: Uint8Array<ArrayBuffer>): Generator<Member, vo
       long = null;
     }
   }
+}
+
+/** Whether some bytes end with those that end a tar. */
+export function isEnd(bytes: Uint8Array): boolean {
+  return bytes.length >= END && bytes.subarray(-END).every((byte) => byte === 0);
 }
 
 function field(head: Uint8Array, start: number, length: number): string {

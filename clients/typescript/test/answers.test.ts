@@ -1,0 +1,142 @@
+/** Answers of the real service, as this client gives them. */
+
+import assert from "node:assert/strict";
+import { before, test } from "node:test";
+
+import { Client, CONTRACT, type PoseQuestion, Problem } from "../src/index.ts";
+import { defaults, observed, URL_OF_SERVICE } from "./service.ts";
+
+const client = new Client(URL_OF_SERVICE);
+let question: PoseQuestion;
+
+before(async () => {
+  question = { controls: await defaults(client), times: [0, 0.1, 0.25] };
+});
+
+interface PoseDocument {
+  readonly rotations: number[][][];
+  readonly root_position: number[][];
+  readonly bone_offsets: number[][];
+  readonly times: number[];
+}
+
+test("poses are the numbers that the service says as text", async () => {
+  const found = await client.pose("reach", question);
+  const body = JSON.stringify(question);
+  const headers = { "Content-Type": "application/json" };
+  const init = { method: "POST", headers, body };
+  const answer = await fetch(`${URL_OF_SERVICE}/v1/models/reach/pose.json`, init);
+  const said = (await answer.json()) as PoseDocument;
+  assert.deepEqual([...found.times], said.times);
+  assert.deepEqual(found.rotations, Float32Array.from(said.rotations.flat(2)));
+  assert.deepEqual(found.rootPosition, Float32Array.from(said.root_position.flat()));
+  assert.deepEqual(found.boneOffsets, Float32Array.from(said.bone_offsets.flat()));
+  assert.equal(found.trust.model, (await client.card("reach")).identity);
+});
+
+test("a clip is as long as its rate and frames say", async () => {
+  const { controls } = question;
+  const found = await client.clip("reach", { controls, fps: 25, unit: "cm" });
+  assert.equal(found.frames, found.times.length);
+  assert.equal(found.frames, 1 + Math.floor(found.trust.duration * 25));
+  assert.equal(found.rotations.length, found.frames * found.names.length * 4);
+  assert.equal(found.units["length"], "centimetre");
+  const metres = await client.clip("reach", { controls, fps: 25 });
+  assert.ok(Math.abs(found.rootPosition[1]! - 100 * metres.rootPosition[1]!) < 1e-3);
+});
+
+test("a crowd has a pose for each character, and errors in pixels where there is a camera", async () => {
+  const asked = { controls: question.controls, time: [0, 0.1, 0.2, 0.3, 0.4] };
+  const plain = await client.crowd("reach", asked);
+  assert.equal(plain.errorPx, null);
+  assert.deepEqual(plain.levels, Int32Array.from([0, 0, 0, 0, 0]));
+  const camera = { position: [0, 1.7, -40], fov: 0.9, height: 1080 };
+  const seen = await client.crowd("reach", { ...asked, level: "auto", camera });
+  assert.equal(seen.errorPx?.length, 5);
+  assert.equal(seen.rotations.length, 5 * seen.names.length * 4);
+});
+
+test("a crowd that walks comes as a file, with progress", async () => {
+  const steps: number[] = [];
+  const onProgress = ({ received }: { received: number }) => steps.push(received);
+  const asked = { count: 3, seconds: 0.5, camera: [1e-7, 1.7, -60] as const };
+  const found = await client.crowdFile("walk", "usdc", asked, { onProgress });
+  assert.equal(found.name, "walk.usdc");
+  assert.equal(steps.at(-1), found.content.length);
+  assert.equal(new TextDecoder().decode(found.content.subarray(0, 8)), "PXR-USDC");
+});
+
+test("a file says how far it may be trusted", async () => {
+  const [first = ""] = Object.keys(question.controls);
+  const far = { ...question.controls, [first]: question.controls[first]! * 1.5 };
+  const found = await client.file("reach", "bvh", { controls: far });
+  const { trust } = await client.pose("reach", { controls: far, times: [0] });
+  assert.deepEqual(
+    [found.name, found.mediaType, found.model],
+    ["reach.bvh", "application/x-bvh", trust.model],
+  );
+  assert.deepEqual(found.warnings, trust.warnings);
+  assert.equal(found.warnings.length, 1);
+  assert.ok(Math.abs(found.sigma! - trust.sigma) < 1e-6);
+  assert.ok(Math.abs(found.duration! - trust.duration) < 1e-6);
+});
+
+test("a link gives the same file", async () => {
+  const { controls } = question;
+  const asked = { controls, fps: 60, performer: "tall", loop: false, end: null };
+  const link = client.url("reach", "glb", asked);
+  const answer = await fetch(link);
+  assert.equal(answer.status, 200);
+  const { content } = await client.file("reach", "glb", asked);
+  assert.deepEqual(new Uint8Array(await answer.arrayBuffer()), content);
+});
+
+test("a long question is a body, and has the same answer", async () => {
+  const times = Array.from({ length: 300 }, (_, index) => index / 1000);
+  const { client: short, sent } = observed();
+  const long = observed(undefined, { longestLink: 7000 });
+  const asked = { ...question, times };
+  assert.deepEqual(await short.pose("reach", asked), await long.client.pose("reach", asked));
+  assert.deepEqual([sent[0]?.method, long.sent[0]?.method], ["POST", "GET"]);
+});
+
+test("the service is ready, and speaks this client's version", async () => {
+  const { models } = await client.ready();
+  assert.deepEqual(
+    models.map((identity) => identity.split("@")[0]),
+    ["reach", "walk"],
+  );
+  assert.equal(await client.contract(), CONTRACT);
+});
+
+test("a refusal says what, where and under which id", async () => {
+  const asked = client.pose("reach", { ...question, times: [1e6] });
+  const problem: unknown = await asked.catch((fault) => fault);
+  assert.ok(problem instanceof Problem);
+  assert.deepEqual([problem.status, problem.kind], [422, "invalid-field"]);
+  assert.equal(problem.places[0]?.parameter, "time");
+  assert.match(problem.message, /times\/0: 1e\+06 s, expected 0 to/);
+  assert.match(problem.requestId, /^[\w.-]+$/);
+});
+
+test("a body's fault is pointed at", async () => {
+  const controls = { stature: 1.7 };
+  const body = observed(undefined, { longestLink: 0 }).client;
+  await assert.rejects(body.pose("reach", { controls, times: [0] }), (fault: unknown) => {
+    return fault instanceof Problem && fault.places[0]?.pointer?.startsWith("/controls") === true;
+  });
+});
+
+test("a model that is not there is told by its kind", async () => {
+  for (const name of ["gone", "reach@0123456789abcdef"]) {
+    await assert.rejects(client.card(name), (fault: unknown) => {
+      return fault instanceof Problem && fault.kind === "unknown-model";
+    });
+  }
+});
+
+test("a name is one part of a path, whatever is in it", async () => {
+  const { client, sent } = observed(undefined, { retries: 0 });
+  await assert.rejects(client.card("walk/../reach?x#y"));
+  assert.equal(sent[0]?.path, "/v1/models/walk%2F..%2Freach%3Fx%23y");
+});

@@ -1,0 +1,210 @@
+/** The examples beside the contract: the client asks what they ask, and reads what they answer. */
+
+import assert from "node:assert/strict";
+import { readdirSync, readFileSync } from "node:fs";
+import { test } from "node:test";
+
+import type {
+  ArchiveFormat,
+  Client,
+  ClipFormat,
+  ClipQuestion,
+  CrowdFormat,
+  CrowdQuestion,
+  NamedClipQuestion,
+  PoseQuestion,
+  SigmaQuestion,
+  WalkQuestion,
+  WhyQuestion,
+} from "../src/index.ts";
+import { observed } from "./service.ts";
+
+const EXAMPLES = new URL("../../../api/examples/", import.meta.url);
+
+type Ask = (client: Client, model: string, question: unknown) => Promise<unknown>;
+
+const clips = (as: ArchiveFormat): Ask => {
+  return (client, model, question) => {
+    const { format, clips } = question as { format: ClipFormat; clips: NamedClipQuestion[] };
+    return client.archive(model, format, clips, { as });
+  };
+};
+const file = (format: ClipFormat): Ask => {
+  return (client, model, question) => client.file(model, format, question as ClipQuestion);
+};
+const walk = (format: CrowdFormat): Ask => {
+  return (client, model, question) => client.crowdFile(model, format, question as WalkQuestion);
+};
+const pose: Ask = (client, model, question) => client.pose(model, question as PoseQuestion);
+const sigma: Ask = (client, model, question) => client.sigma(model, question as SigmaQuestion);
+const why: Ask = (client, model, question) => client.why(model, question as WhyQuestion);
+
+const REACHED: Record<string, Ask> = {
+  listModels: async (client) => ({ models: await client.models() }),
+  getModel: (client, model) => client.card(model),
+  getPoseMsgpack: pose,
+  queryPoseMsgpack: pose,
+  getClipUsda: file("usda"),
+  queryClipUsda: file("usda"),
+  getClipUsdc: file("usdc"),
+  queryClipUsdc: file("usdc"),
+  getClipUsdz: file("usdz"),
+  queryClipUsdz: file("usdz"),
+  getClipGlb: file("glb"),
+  queryClipGlb: file("glb"),
+  getClipBvh: file("bvh"),
+  queryClipBvh: file("bvh"),
+  getClipJson: file("json"),
+  queryClipJson: file("json"),
+  getClipNpz: file("npz"),
+  queryClipNpz: file("npz"),
+  getClipArrow: file("arrow"),
+  queryClipArrow: file("arrow"),
+  getClipMsgpack: (client, model, question) => client.clip(model, question as ClipQuestion),
+  queryClipMsgpack: (client, model, question) => client.clip(model, question as ClipQuestion),
+  queryClipsZip: clips("zip"),
+  queryClipsTar: clips("tar"),
+  queryCrowdMsgpack: (client, model, question) => client.crowd(model, question as CrowdQuestion),
+  getCrowdUsda: walk("usda"),
+  getCrowdUsdc: walk("usdc"),
+  getCrowdUsdz: walk("usdz"),
+  getWhy: why,
+  queryWhy: why,
+  getSigmaJson: sigma,
+  querySigmaJson: sigma,
+  getReadiness: (client) => client.ready(),
+  getLiveness: (client) => client.contract(),
+};
+
+const NEGOTIATED = "this client always names the format in the path";
+const OTHER_TOOLS = "for readers of NumPy or Arrow; here the same numbers come as MessagePack";
+const FOR_PEOPLE = "the same numbers as text, for people";
+const INFERENCE = "spoken by clients of the Open Inference Protocol";
+const PAGE = "a page, for browsers";
+
+const LEFT_OUT: Record<string, string> = {
+  getPose: NEGOTIATED,
+  queryPose: NEGOTIATED,
+  getClip: NEGOTIATED,
+  queryClip: NEGOTIATED,
+  queryClips: NEGOTIATED,
+  getCrowd: NEGOTIATED,
+  queryCrowd: NEGOTIATED,
+  getSigma: NEGOTIATED,
+  querySigma: NEGOTIATED,
+  getPoseJson: FOR_PEOPLE,
+  queryPoseJson: FOR_PEOPLE,
+  queryCrowdJson: FOR_PEOPLE,
+  getPoseNpz: OTHER_TOOLS,
+  queryPoseNpz: OTHER_TOOLS,
+  getPoseArrow: OTHER_TOOLS,
+  queryPoseArrow: OTHER_TOOLS,
+  queryCrowdNpz: OTHER_TOOLS,
+  queryCrowdArrow: OTHER_TOOLS,
+  getSigmaMsgpack: "a grid's JSON is small enough",
+  querySigmaMsgpack: "a grid's JSON is small enough",
+  getSigmaNpz: OTHER_TOOLS,
+  querySigmaNpz: OTHER_TOOLS,
+  getSigmaArrow: OTHER_TOOLS,
+  querySigmaArrow: OTHER_TOOLS,
+  getInferenceServer: INFERENCE,
+  getInferenceLiveness: INFERENCE,
+  getInferenceReadiness: INFERENCE,
+  getInferenceModel: INFERENCE,
+  getInferenceModelReadiness: INFERENCE,
+  getInferenceVersion: INFERENCE,
+  getInferenceVersionReadiness: INFERENCE,
+  infer: INFERENCE,
+  inferVersion: INFERENCE,
+  getMetrics: "read by Prometheus",
+  getContract: "the contract is in this client's types",
+  getContractJson: "only asked of services whose /livez says no version: see faults.test.ts",
+  getDocs: PAGE,
+  getProblems: PAGE,
+  getViewer: PAGE,
+};
+
+interface Example {
+  readonly method: "GET" | "POST";
+  readonly path: string;
+  readonly body?: unknown;
+}
+
+function read(operation: string, part: string): unknown {
+  return JSON.parse(readFileSync(new URL(`${operation}/${part}.json`, EXAMPLES), "utf8"));
+}
+
+test("every operation is reached or left out for a reason", () => {
+  const said = new Set([...Object.keys(REACHED), ...Object.keys(LEFT_OUT)]);
+  const unsaid = readdirSync(EXAMPLES).filter((operation) => !said.has(operation));
+  assert.deepEqual(unsaid, []);
+  assert.equal(said.size, Object.keys(REACHED).length + Object.keys(LEFT_OUT).length);
+});
+
+for (const [operation, ask] of Object.entries(REACHED)) {
+  test(`${operation}: the client asks as the example does, and reads the answer`, async () => {
+    const example = read(operation, "request") as Example;
+    // Whether a question travels as a link or as a body is its length's choice: here, the example's.
+    const { client, sent } = observed(undefined, {
+      longestLink: example.method === "GET" ? 2000 : 0,
+    });
+    const answer = await ask(client, modelOf(example.path), questionOf(example));
+    assert.equal(sent[0]?.method, example.method);
+    assert.deepEqual(parts(sent[0].path), parts(example.path));
+    assert.deepEqual(sent[0].body, example.body ?? null);
+    assert.deepEqual(new Set(sent.map((one) => one.status)), new Set([200]));
+    const { body } = read(operation, "response") as { body?: unknown };
+    if (isSame(operation)) assertContains(answer, body);
+  });
+}
+
+/** Whether the client's answer is the service's document. */
+function isSame(operation: string): boolean {
+  return /Why|SigmaJson|listModels|getModel|getReadiness/.test(operation);
+}
+
+function modelOf(path: string): string {
+  return /\/v1\/models\/([^/?]+)/.exec(path)?.[1] ?? "";
+}
+
+function parts(path: string): readonly [string, string[][]] {
+  const { pathname, searchParams } = new URL(path, "http://any");
+  return [pathname, [...searchParams].sort()];
+}
+
+const WORDS = /^(extrapolate|performer|names|root|unit|up|across|along|instancing)$/;
+const NUMBERS = /^(fps|start|end|level|nearest|columns|rows|margin|count|seconds|seed|motions)$/;
+
+/** The question that a link asks, or the body. */
+function questionOf(example: Example): unknown {
+  if (example.method === "POST") return example.body;
+  const found: Record<string, unknown> = {};
+  const controls: Record<string, number> = {};
+  const { searchParams } = new URL(example.path, "http://any");
+  for (const [name, value] of searchParams) {
+    if (WORDS.test(name)) found[name] = value;
+    else if (NUMBERS.test(name)) found[name] = Number(value);
+    else if (name === "loop") found[name] = value === "true";
+    else if (name === "camera") found[name] = value.split(",").map(Number);
+    else if (name === "time") found["times"] = searchParams.getAll("time").map(Number);
+    else controls[name] = Number(value);
+  }
+  return { ...found, controls };
+}
+
+/** That an answer has what an excerpt of it has. */
+function assertContains(whole: unknown, part: unknown): void {
+  if (typeof part !== "object" || part === null) {
+    assert.deepEqual(whole, part);
+  } else {
+    assert.ok(typeof whole === "object" && whole !== null, `found ${whole}`);
+    const found = whole as Record<string, unknown>;
+    for (const [key, value] of Object.entries(part)) assertContains(found[key], value);
+  }
+}
+
+test("an answer that differs from its example is noticed", () => {
+  assert.throws(() => assertContains({ a: [1, 2] }, { a: [1, 3] }));
+  assert.throws(() => assertContains({}, { a: 1 }));
+  assert.notDeepEqual(parts("/x?a=1&b=2"), parts("/x?a=1&b=3"));
+});

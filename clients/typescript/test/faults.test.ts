@@ -1,0 +1,338 @@
+/** What can go wrong, by servers that really do it: each is told by its class, and some pass. */
+
+import assert from "node:assert/strict";
+import type { ServerResponse } from "node:http";
+import { test } from "node:test";
+import { encode } from "@msgpack/msgpack";
+
+import {
+  Broken,
+  Client,
+  type ClientOptions,
+  CONTRACT,
+  PosefieldError,
+  Problem,
+  TimedOut,
+  Unexpected,
+  Unreachable,
+} from "../src/index.ts";
+import { type Handler, observed, serving } from "./service.ts";
+
+const QUICK: ClientOptions = { pause: 1, timeout: 5000 };
+const MODELS = JSON.stringify({ models: [] });
+const CLIP = { controls: { stature: 1.7 } };
+
+function json(answer: ServerResponse, content: string, status = 200): void {
+  answer.writeHead(status, { "Content-Type": "application/json" }).end(content);
+}
+
+function refuse(answer: ServerResponse, kind: string, status: number, more = {}): void {
+  const document = {
+    type: `urn:posefield:problem:${kind}`,
+    title: "No",
+    status,
+    detail: "found this, expected that",
+    instance: "id-1",
+    errors: [],
+  };
+  const headers = { "Content-Type": "application/problem+json", ...more };
+  answer.writeHead(status, headers).end(JSON.stringify(document));
+}
+
+/** Fails some requests in a way, and answers the others. */
+function failing(times: number, fail: (answer: ServerResponse) => void): Handler {
+  return (_, answer, count) => (count < times ? fail(answer) : json(answer, MODELS));
+}
+
+async function fault(asked: Promise<unknown>): Promise<unknown> {
+  return asked.then(
+    () => assert.fail("there was an answer"),
+    (found: unknown) => found,
+  );
+}
+
+async function faultOf<Kind extends PosefieldError>(
+  kind: new (...words: never[]) => Kind,
+  asked: Promise<unknown>,
+): Promise<Kind> {
+  const found = await fault(asked);
+  assert.ok(found instanceof kind, `found ${found}`);
+  assert.ok(found instanceof PosefieldError);
+  return found;
+}
+
+test("a service that is down is unreachable, after asking again", async () => {
+  let base = "";
+  await serving(failing(0, refuse503), async (own) => {
+    base = own;
+  });
+  let asked = 0;
+  const counting: typeof fetch = (...words) => {
+    asked++;
+    return fetch(...words);
+  };
+  const client = new Client(base, { ...QUICK, retries: 2, fetch: counting });
+  const found = await faultOf(Unreachable, client.models());
+  assert.equal(found.name, "Unreachable");
+  assert.match(found.message, /127\.0\.0\.1:\d+ does not answer/);
+  assert.equal(asked, 3);
+});
+
+function refuse503(answer: ServerResponse): void {
+  refuse(answer, "overloaded", 503);
+}
+
+const PASSING: Record<string, (answer: ServerResponse) => void> = {
+  "has too much to do": refuse503,
+  "restarts: connections end": (answer) => answer.destroy(),
+  "restarts behind a proxy": (answer) => answer.writeHead(502).end("<h1>Bad Gateway</h1>"),
+  "is behind a gate that counts": (answer) => answer.writeHead(429).end(),
+  "is cut in the middle": (answer) => {
+    answer.writeHead(200, { "Content-Length": "14" });
+    answer.write('{"mod', () => answer.destroy());
+  },
+};
+
+for (const [what, fail] of Object.entries(PASSING)) {
+  test(`a service that ${what}, then is well, is asked again`, async () => {
+    await serving(failing(2, fail), async (base, asked) => {
+      assert.deepEqual(await new Client(base, QUICK).models(), []);
+      assert.equal(asked.length, 3);
+    });
+  });
+
+  test(`a service that ${what}, and stays so, is given up`, async () => {
+    await serving(failing(9, fail), async (base, asked) => {
+      await faultOf(PosefieldError, new Client(base, { ...QUICK, retries: 1 }).models());
+      assert.equal(asked.length, 2);
+    });
+  });
+}
+
+test("nothing is asked again that will not change", async () => {
+  const fail = (answer: ServerResponse) => refuse(answer, "invalid-field", 422);
+  await serving(failing(1, fail), async (base, asked) => {
+    const found = await faultOf(Problem, new Client(base, QUICK).models());
+    assert.deepEqual([found.kind, found.status, found.requestId], ["invalid-field", 422, "id-1"]);
+    assert.equal(asked.length, 1);
+  });
+});
+
+test("the service says how long to wait", async () => {
+  const fail = (answer: ServerResponse) => refuse(answer, "late", 503, { "Retry-After": "1" });
+  await serving(failing(1, fail), async (base) => {
+    const began = performance.now();
+    await new Client(base, QUICK).models();
+    assert.ok(performance.now() - began >= 990);
+    const found = await faultOf(
+      Problem,
+      serving(failing(1, fail), (own) =>
+        new Client(own, { retries: 0 }).models().then(() => undefined),
+      ),
+    );
+    assert.deepEqual([found.kind, found.retryAfter], ["late", 1]);
+  });
+});
+
+test("nobody waits an hour, nor until tomorrow", async () => {
+  const tomorrow = new Date(Date.now() + 86_400_000).toUTCString();
+  for (const after of ["3600", tomorrow]) {
+    const fail = (answer: ServerResponse) => refuse(answer, "late", 503, { "Retry-After": after });
+    await serving(failing(1, fail), async (base, asked) => {
+      const found = await faultOf(Problem, new Client(base, QUICK).models());
+      assert.ok(found.retryAfter! > 3000);
+      assert.equal(asked.length, 1);
+    });
+  }
+});
+
+test("a service that says nothing has its time, once", async () => {
+  await serving(
+    () => {},
+    async (base, asked) => {
+      await faultOf(TimedOut, new Client(base, { ...QUICK, timeout: 50 }).models());
+      assert.equal(asked.length, 1);
+    },
+  );
+});
+
+test("a clip that stops coming has its time, once", async () => {
+  const begin: Handler = (_, answer) => answer.writeHead(200).write("BVH");
+  await serving(begin, async (base, asked) => {
+    const client = new Client(base, { ...QUICK, timeout: 50 });
+    const found = await faultOf(TimedOut, client.file("reach", "bvh", CLIP));
+    assert.match(found.message, /after 3 bytes/);
+    assert.equal(asked.length, 1);
+  });
+});
+
+test("a clip that comes slowly is waited for", async () => {
+  const trickle: Handler = (_, answer) => {
+    let left = 10;
+    const timer = setInterval(() => {
+      if (left-- > 0) return answer.write("x");
+      clearInterval(timer);
+      return answer.end();
+    }, 20);
+  };
+  await serving(trickle, async (base) => {
+    const client = new Client(base, { ...QUICK, timeout: 100 });
+    const { content } = await client.file("reach", "bvh", CLIP);
+    assert.equal(content.length, 10);
+  });
+});
+
+for (const framed of ["by its length", "in chunks"]) {
+  test(`a clip that is cut in the middle, sent ${framed}, is broken`, async () => {
+    const cut: Handler = (_, answer) => {
+      answer.writeHead(200, framed === "in chunks" ? {} : { "Content-Length": "1000" });
+      answer.write("x".repeat(100), () => answer.destroy());
+    };
+    await serving(cut, async (base, asked) => {
+      const client = new Client(base, { ...QUICK, retries: 1 });
+      const found = await faultOf(Broken, client.file("reach", "usdc", CLIP));
+      assert.match(found.message, /ended after \d+ bytes/);
+      assert.ok(found instanceof Unreachable);
+      assert.equal(asked.length, 2);
+    });
+  });
+}
+
+test("a model that disappears is told as such", async () => {
+  const gone = (answer: ServerResponse) => refuse(answer, "unknown-model", 404);
+  await serving(
+    (_, answer, count) => (count ? gone(answer) : json(answer, MODELS)),
+    async (base) => {
+      const client = new Client(base, QUICK);
+      await client.models();
+      const found = await faultOf(Problem, client.card("reach"));
+      assert.equal(found.kind, "unknown-model");
+    },
+  );
+});
+
+test("a newer service may say what this client has no word for", async () => {
+  const fail = (answer: ServerResponse) => refuse(answer, "full-moon", 409);
+  await serving(failing(9, fail), async (base) => {
+    const found = await faultOf(Problem, new Client(base, QUICK).models());
+    assert.deepEqual([found.kind, found.type], ["other", "urn:posefield:problem:full-moon"]);
+  });
+});
+
+/** A service of another version, which says so in one of two places. */
+function other(first: (answer: ServerResponse) => void, at: "/livez" | "/openapi.json"): Handler {
+  return ({ url }, answer) => {
+    if (url === "/livez" && at === url) return json(answer, '{"status":"live","contract":"9.1.0"}');
+    if (url === "/livez") return json(answer, '{"status":"live"}');
+    if (url === "/openapi.json") return json(answer, '{"info":{"version":"9.1.0"}}');
+    return first(answer);
+  };
+}
+
+const STRANGE: Record<string, (answer: ServerResponse) => void> = {
+  "a page": (answer) => answer.writeHead(200, { "Content-Type": "text/html" }).end("<html>"),
+  "another document": (answer) => json(answer, '{"modelle":[]}'),
+  "no path of the contract": (answer) => refuse(answer, "no-such-path", 404),
+  "a status without a word": (answer) => answer.writeHead(418).end(),
+};
+
+for (const [what, first] of Object.entries(STRANGE)) {
+  for (const at of ["/livez", "/openapi.json"] as const) {
+    test(`an answer that is ${what} is told with both versions, as ${at} says`, async () => {
+      await serving(other(first, at), async (base) => {
+        const found = await faultOf(Unexpected, new Client(base, QUICK).models());
+        assert.deepEqual([found.service, found.client], ["9.1.0", CONTRACT]);
+        assert.match(found.message, /speaks version 9\.1\.0 of the contract, this client /);
+      });
+    });
+  }
+}
+
+test("versions are not spoken of where they agree, or cannot be asked", async () => {
+  for (const said of [`{"status":"live","contract":"${CONTRACT}"}`, "no JSON"]) {
+    const handler: Handler = ({ url }, answer) => json(answer, url === "/livez" ? said : "[]");
+    await serving(handler, async (base) => {
+      const found = await faultOf(Unexpected, new Client(base, QUICK).models());
+      assert.doesNotMatch(found.message, /this client/);
+    });
+  }
+});
+
+function array(dtype: string, shape: number[], bytes: number): object {
+  return { dtype, shape, data: new Uint8Array(bytes) };
+}
+
+const POSES = {
+  trust: {},
+  times: array("<f8", [2], 16),
+  rotations: array("<f4", [2, 3, 4], 96),
+  root_position: array("<f4", [2, 3], 24),
+  bone_offsets: array("<f4", [3, 3], 36),
+};
+
+const MISMATCHED: Record<string, object> = {
+  "too few bytes": { rotations: array("<f4", [2, 3, 4], 92) },
+  "another shape": { root_position: array("<f4", [3, 2], 24) },
+  "another kind": { times: array("<f4", [2], 8) },
+  "no array": { bone_offsets: [1, 2, 3] },
+  nothing: { trust: null },
+};
+
+test("poses are looked at before they are believed", async () => {
+  const ask = async (answer: object) => {
+    let found: unknown;
+    const body = encode(answer);
+    await serving(
+      ({ url }, to) => (url === "/livez" ? to.destroy() : to.end(body)),
+      async (base) => {
+        const client = new Client(base, QUICK);
+        found = await client.pose("reach", { ...CLIP, times: [0] }).catch((error) => error);
+      },
+    );
+    return found;
+  };
+  assert.ok(!((await ask(POSES)) instanceof Error));
+  for (const [what, part] of Object.entries(MISMATCHED)) {
+    assert.ok((await ask({ ...POSES, ...part })) instanceof Unexpected, what);
+  }
+});
+
+test("who asks may end the question, and the service sees it", async () => {
+  let left = false;
+  const wait: Handler = (request) => request.on("close", () => (left = true));
+  await serving(wait, async (base) => {
+    const ending = new AbortController();
+    const asked = fault(new Client(base, QUICK).models(ending.signal));
+    setTimeout(() => ending.abort(new Error("enough")), 30);
+    assert.equal(((await asked) as Error).message, "enough");
+    while (!left) await new Promise((done) => setTimeout(done, 5));
+  });
+});
+
+test("a question that is ended while it waits to be asked again is not asked again", async () => {
+  const fail = (answer: ServerResponse) => refuse(answer, "late", 503, { "Retry-After": "20" });
+  await serving(failing(9, fail), async (base, asked) => {
+    const signal = AbortSignal.timeout(50);
+    const found = await fault(new Client(base, QUICK).models(signal));
+    assert.equal(found, signal.reason);
+    assert.equal(asked.length, 1);
+  });
+});
+
+test("a question that was ended before it began is not asked", async () => {
+  await serving(failing(0, refuse503), async (base, asked) => {
+    await assert.rejects(new Client(base, QUICK).models(AbortSignal.abort()));
+    assert.equal(asked.length, 0);
+  });
+});
+
+test("a key goes with every question", async () => {
+  await serving(failing(1, refuse503), async (base) => {
+    const { client, sent } = observed(base, { ...QUICK, key: "secret" });
+    await client.models();
+    assert.deepEqual(
+      sent.map(({ headers }) => headers.get("Authorization")),
+      ["Bearer secret", "Bearer secret"],
+    );
+  });
+});
