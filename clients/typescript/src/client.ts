@@ -162,7 +162,7 @@ export class Client {
   /** The link to a clip's file, to be sent on. */
   url(model: string, format: ClipFormat, question: ClipQuestion): string {
     const path = link(under(model, `/clip.${format}`), question);
-    return this.base ? this.base + path : new URL(path, globalThis.location?.href).href;
+    return (this.base || (globalThis.location?.origin ?? "")) + path;
   }
 
   /** What the service says before it is sent questions; a Problem of kind not-ready, if it is not. */

@@ -32,7 +32,8 @@ function has(value: unknown, key: string): boolean {
   return typeof value === "object" && value !== null && key in value;
 }
 
-function parsed(text: string): unknown {
+/** A text of JSON; Unexpected where it is none. */
+export function parsed(text: string): unknown {
   try {
     return JSON.parse(text);
   } catch (fault) {

@@ -1,5 +1,6 @@
 /** What the head of an answer says of the file in it. */
 
+import { parsed } from "./documents.ts";
 import type { Named } from "./types.ts";
 
 /** fallback: a name for where the service gives none. */
@@ -20,5 +21,5 @@ function number(text: string | null): number | null {
 
 /** Each is a JSON string in ASCII; lines of one header are joined by commas. */
 function warnings(joined: string | null): readonly string[] {
-  return joined === null ? [] : (JSON.parse(`[${joined}]`) as string[]);
+  return joined === null ? [] : (parsed(`[${joined}]`) as string[]);
 }

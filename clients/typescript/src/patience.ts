@@ -1,5 +1,8 @@
 /** How long an answer is waited for. */
 
+/** What a timer can wait for, ms: more is for ever. */
+const LONGEST = 2 ** 31 - 1;
+
 /** A signal that ends with the caller's own, or when nothing has come for some milliseconds. */
 export class Patience {
   /** Whether nothing came for too long. */
@@ -24,6 +27,7 @@ export class Patience {
   /** Something has come. */
   renew(): void {
     clearTimeout(this.#timer);
+    if (this.#milliseconds > LONGEST) return;
     this.#timer = setTimeout(this.#expire, this.#milliseconds);
   }
 

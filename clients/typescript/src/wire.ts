@@ -1,6 +1,6 @@
 /** Requests over HTTP: what comes back whole, or the error that says what happened. */
 
-import { read as documentOf } from "./documents.ts";
+import { read } from "./documents.ts";
 import {
   Broken,
   type PosefieldError,
@@ -18,7 +18,7 @@ import type { OnProgress, TransferOptions } from "./types.ts";
 export interface WireOptions extends Retries {
   /** Scheme, host and port; empty for where the page comes from. */
   readonly base: string;
-  readonly headers: Readonly<Record<string, string>>;
+  readonly headers: Lines;
   /** Milliseconds without a byte after which nobody waits on. */
   readonly timeout: number;
   /** Bytes of answers that are kept; see Memory. */
@@ -32,7 +32,7 @@ export interface Begun {
   readonly patience: Patience;
 }
 
-type Headers = Readonly<Record<string, string>>;
+type Lines = Readonly<Record<string, string>>;
 
 export class Wire {
   readonly #options: WireOptions;
@@ -72,7 +72,7 @@ export class Wire {
     return answer;
   }
 
-  async #begun(request: Request, headers: Headers, signal?: AbortSignal): Promise<Begun> {
+  async #begun(request: Request, headers: Lines, signal?: AbortSignal): Promise<Begun> {
     const patience = new Patience(this.#options.timeout, signal);
     const answer = await this.#fetched(request, headers, patience);
     patience.renew();
@@ -80,7 +80,7 @@ export class Wire {
     throw await refusal({ answer, patience });
   }
 
-  async #fetched(request: Request, headers: Headers, patience: Patience): Promise<Response> {
+  async #fetched(request: Request, headers: Lines, patience: Patience): Promise<Response> {
     const { base, fetch } = this.#options;
     try {
       return await fetch(base + request.path, this.#init(request, headers, patience.signal));
@@ -93,7 +93,7 @@ export class Wire {
     }
   }
 
-  #init({ method, body }: Request, more: Headers, signal: AbortSignal): RequestInit {
+  #init({ method, body }: Request, more: Lines, signal: AbortSignal): RequestInit {
     const own = { ...this.#options.headers, ...more };
     if (body === null) return { method, headers: own, signal };
     return { method, body, headers: { ...own, "Content-Type": "application/json" }, signal };
@@ -166,20 +166,28 @@ function ending(fault: unknown, patience: Patience, received: number): Posefield
   return new Broken(`the answer ended after ${received} bytes`, { cause: fault });
 }
 
-/** Statuses of those who stand before a service and do not reach it. */
+/** Statuses of those who stand before a service and do not reach it, or let it be reached. */
 const OF_PROXIES = new Set([429, 502, 503, 504]);
 
 async function refusal(begun: Begun): Promise<PosefieldError> {
   const { status, headers } = begun.answer;
   const { content } = await rest(begun);
   const retryAfter = secondsOf(headers.get("Retry-After"));
-  if (headers.get("Content-Type")?.startsWith("application/problem+json")) {
-    const problem = new Problem(documentOf("Problem", content), retryAfter);
-    // All paths that are asked for here are the contract's.
-    return problem.kind === "no-such-path" ? unknownPath(problem) : problem;
-  }
+  const problem = problemOf(headers, content, retryAfter);
+  // All paths that are asked for here are the contract's.
+  if (problem) return problem.kind === "no-such-path" ? unknownPath(problem) : problem;
   const what = `status ${status} without a problem's description`;
   return OF_PROXIES.has(status) ? new Unreachable(what, { retryAfter }) : new Unexpected(what);
+}
+
+/** What the service says is wrong; null where it is not the service that speaks. */
+function problemOf(headers: Headers, content: Uint8Array, after: number | null): Problem | null {
+  if (!headers.get("Content-Type")?.startsWith("application/problem+json")) return null;
+  try {
+    return new Problem(read("Problem", content), after);
+  } catch {
+    return null;
+  }
 }
 
 function unknownPath(problem: Problem): Unexpected {

@@ -86,6 +86,9 @@ const PASSING: Record<string, (answer: ServerResponse) => void> = {
   "has too much to do": refuse503,
   "restarts: connections end": (answer) => answer.destroy(),
   "restarts behind a proxy": (answer) => answer.writeHead(502).end("<h1>Bad Gateway</h1>"),
+  "is behind a gate that describes problems in its own way": (answer) => {
+    answer.writeHead(503, { "Content-Type": "application/problem+json" }).end('{"title":"Busy"}');
+  },
   "is behind a gate that counts": (answer) => answer.writeHead(429).end(),
   "is cut in the middle": (answer) => {
     answer.writeHead(200, { "Content-Length": "14" });
@@ -154,6 +157,13 @@ test("a service that says nothing has its time, once", async () => {
       assert.equal(asked.length, 1);
     },
   );
+});
+
+test("who wants to wait for ever may", async () => {
+  const late: Handler = (_, answer) => setTimeout(() => json(answer, MODELS), 30);
+  await serving(late, async (base) => {
+    assert.deepEqual(await new Client(base, { timeout: Infinity }).models(), []);
+  });
 });
 
 test("a clip that stops coming has its time, once", async () => {

@@ -18,7 +18,6 @@ CROWD = {"time": [0.0, 0.2, 0.4], "position": [[0, 0, 0], [3, 0, 1], [-2, 0, 5]]
 
 def test_its_own_tests_pass_against_a_real_service(url, kinematics, expect_success):
     said = expect_success("npm", "test", POSEFIELD_URL=url, POSEFIELD_KINEMATICS=str(kinematics))
-    print(said)
     assert "\nℹ fail 0\n" in said
     assert "\nℹ skipped 0\n" in said
 
