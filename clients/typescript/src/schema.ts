@@ -1232,6 +1232,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Play with the models
+         * @description As a page with sliders, a character, and what the answers are worth. It loads nothing from elsewhere.
+         */
+        get: operations["getViewer"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/docs": {
         parameters: {
             query?: never;
@@ -1699,6 +1719,15 @@ export interface components {
                 /** @description Distance between two performers. */
                 label: number;
             } | null;
+            /** @description How far each captured clip lies from what the others predict for it, as a root-mean-square over joints and frames, m; empty in models trained before this was kept. */
+            left_out?: number[];
+            /** @description What the motion is for; null where the recipe names nothing, and in models trained before this was kept. */
+            event?: {
+                /** @description The joint that counts. */
+                joint: number;
+                /** @description When, as a share of the duration, in the mean over the captured clips. */
+                share: number;
+            } | null;
         };
         /** @description A number for each character, or one for all. */
         Column: number | number[];
@@ -1877,6 +1906,8 @@ export interface components {
         Liveness: {
             /** @constant */
             status: "live";
+            /** @description `info.version` of this document, since 2.1.0. */
+            contract?: string;
         };
         Readiness: {
             /** @constant */
@@ -2989,7 +3020,7 @@ export interface components {
         CacheControl: string;
         /** @description To be kept by everybody, and to be asked for again. */
         PageCacheControl: "public, no-cache";
-        /** @description The page may load nothing; its own style is named by its digest. */
+        /** @description The page may load nothing from elsewhere; its own styles and scripts are named by their digests. */
         PagePolicy: string;
         /** @description What this problem means, on the page of problems. */
         Help: string;
@@ -5945,6 +5976,25 @@ export interface operations {
             500: components["responses"]["InternalError"];
         };
     };
+    getViewer: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Page"];
+            304: components["responses"]["PageNotModified"];
+            400: components["responses"]["BadRequest"];
+            405: components["responses"]["MethodNotAllowed"];
+            500: components["responses"]["InternalError"];
+        };
+    };
     getDocs: {
         parameters: {
             query?: never;
@@ -5985,7 +6035,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "2.0.0";
+export const CONTRACT = "2.1.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
