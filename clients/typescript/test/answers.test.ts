@@ -60,7 +60,10 @@ test("a crowd that walks comes as a file, with progress", async () => {
   const steps: number[] = [];
   const onProgress = ({ received }: { received: number }) => steps.push(received);
   const asked = { count: 3, seconds: 0.5, camera: [1e-7, 1.7, -60] as const };
+  const { client, sent } = observed();
   const found = await client.crowdFile("walk", "usdc", asked, { onProgress });
+  // The contract knows no exponents in a place.
+  assert.match(decodeURIComponent(sent[0]!.path), /camera=0\.0000001[0-9]*,1\.7,-60$/);
   assert.equal(found.name, "walk.usdc");
   assert.equal(steps.at(-1), found.content.length);
   assert.equal(new TextDecoder().decode(found.content.subarray(0, 8)), "PXR-USDC");

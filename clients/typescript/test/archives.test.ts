@@ -72,6 +72,21 @@ for (const as of FORMATS) {
     });
   });
 
+  test(`a ${as} whose manifest says otherwise is broken`, async () => {
+    const text = Buffer.from(whole[as]).toString("latin1");
+    const at = text.lastIndexOf('"bytes":') + '"bytes":'.length;
+    for (const [place, digit] of [
+      [at, "9"],
+      [text.lastIndexOf("manifest.jsonl"), "M"],
+    ] as const) {
+      const other = whole[as].slice();
+      other[place] = digit.charCodeAt(0);
+      await sent(other, async (own) => {
+        await assert.rejects(own.archive("reach", "bvh", clips, { as }), Broken, digit);
+      });
+    }
+  });
+
   test(`a ${as} comes as a stream of the same bytes`, async () => {
     const found = await client.stream("reach", "bvh", clips, { as });
     assert.equal(found.name, `reach.${as}`);
@@ -79,6 +94,14 @@ for (const as of FORMATS) {
     assert.deepEqual(await taken(found.body), whole[as]);
   });
 }
+
+test("a zip whose records are none is broken", () => {
+  for (const signature of ["PK\x01\x02", "PK\x03\x04", "PK\x05\x06"]) {
+    const other = whole.zip.slice();
+    other[Buffer.from(other).indexOf(signature, 0, "latin1") + 3] = 9;
+    assert.throws(() => [...members(other)], Broken);
+  }
+});
 
 test("a stream that is let go lets the service go", async () => {
   let left = false;

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import type { ServerResponse } from "node:http";
 import { test } from "node:test";
+import { gzipSync } from "node:zlib";
 import { encode } from "@msgpack/msgpack";
 
 import {
@@ -12,6 +13,7 @@ import {
   CONTRACT,
   PosefieldError,
   Problem,
+  type Progress,
   TimedOut,
   Unexpected,
   Unreachable,
@@ -312,11 +314,39 @@ test("who asks may end the question, and the service sees it", async () => {
   const wait: Handler = (request) => request.on("close", () => (left = true));
   await serving(wait, async (base) => {
     const ending = new AbortController();
-    const asked = fault(new Client(base, QUICK).models(ending.signal));
+    const asked = fault(new Client(base, { timeout: Infinity }).models(ending.signal));
     setTimeout(() => ending.abort(new Error("enough")), 30);
     assert.equal(((await asked) as Error).message, "enough");
     while (!left) await new Promise((done) => setTimeout(done, 5));
   });
+});
+
+test("who asks may end the question while its answer comes", async () => {
+  const begin: Handler = (_, answer) => answer.writeHead(200).write("BVH");
+  await serving(begin, async (base, asked) => {
+    const signal = AbortSignal.timeout(50);
+    const found = await fault(new Client(base, QUICK).file("reach", "bvh", CLIP, signal));
+    assert.equal(found, signal.reason);
+    assert.equal(asked.length, 1);
+  });
+});
+
+test("how much will come is said where it is known", async () => {
+  const content = Buffer.alloc(100_000, "x");
+  for (const packed of [false, true]) {
+    const sent = packed ? gzipSync(content) : content;
+    const coding = packed ? { "Content-Encoding": "gzip" } : {};
+    const headers = { ...coding, "Content-Length": sent.length };
+    await serving(
+      (_, answer) => answer.writeHead(200, headers).end(sent),
+      async (base) => {
+        const steps: Progress[] = [];
+        const onProgress = (step: Progress) => steps.push(step);
+        await new Client(base).crowdFile("walk", "usda", {}, { onProgress });
+        assert.deepEqual(steps.at(-1), { received: 100_000, total: packed ? null : 100_000 });
+      },
+    );
+  }
 });
 
 test("a question that is ended while it waits to be asked again is not asked again", async () => {

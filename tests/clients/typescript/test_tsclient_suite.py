@@ -13,7 +13,8 @@ from service.motion import skeleton
 PACKAGE = Path(__file__).parents[3] / "clients/typescript"
 REACH = "/v1/models/reach"
 TOOLS = "../node_modules/.bin"
-CROWD = {"time": [0.0, 0.2, 0.4], "position": [[0, 0, 0], [3, 0, 1], [-2, 0, 5]]}
+PLACES = [[0, 0, 0], [3, 0, 1], [-2, 0, 5]]
+CROWD = {"time": [0.0, 0.2, 0.4], "heading": [0.0, 1.0, -2.0], "position": PLACES}
 
 
 def test_its_own_tests_pass_against_a_real_service(url, kinematics, expect_success):
@@ -49,7 +50,7 @@ def kinematics(url, tmp_path):
         card = client.get(REACH).raise_for_status().json()
         controls = {control["name"]: control["default"] for control in card["controls"]}
         clip = {"controls": controls, "fps": 20}
-        crowd = {"controls": controls, **CROWD, "heading": [0.0, 1.0, -2.0]}
+        crowd = {"controls": {**controls, "stature": [1.6, 1.75, 1.9]}, **CROWD}
         found = {
             "clip": {"question": clip, "positions": positions(client, "/clip.npz", clip)},
             "crowd": {"question": crowd, "positions": positions(client, "/crowd.npz", crowd)},
