@@ -103,6 +103,22 @@ test("a zip whose records are none is broken", () => {
   }
 });
 
+for (const as of FORMATS) {
+  test(`a ${as} whose end comes in small pieces is whole`, async () => {
+    const at = whole[as].length - 10;
+    await serving(
+      (_, answer) => {
+        answer.write(whole[as].subarray(0, at));
+        setTimeout(() => answer.end(whole[as].subarray(at)), 20);
+      },
+      async (base) => {
+        const { body } = await new Client(base).stream("reach", "bvh", clips, { as });
+        assert.deepEqual(await taken(body), whole[as]);
+      },
+    );
+  });
+}
+
 test("a stream that is let go lets the service go", async () => {
   let left = false;
   await serving(
@@ -118,6 +134,19 @@ test("a stream that is let go lets the service go", async () => {
       await reader.read();
       await reader.cancel();
       while (!left) await new Promise((done) => setTimeout(done, 5));
+    },
+  );
+});
+
+test("a stream that its signal ends says the signal's reason", async () => {
+  await serving(
+    (_, answer) => {
+      answer.writeHead(200).write("x".repeat(1000));
+    },
+    async (base) => {
+      const signal = AbortSignal.timeout(50);
+      const { body } = await new Client(base).stream("reach", "bvh", clips, { signal });
+      await assert.rejects(taken(body), (fault: unknown) => fault === signal.reason);
     },
   );
 });
