@@ -2225,7 +2225,7 @@ export interface components {
                 "application/x-npz": string;
             };
         };
-        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest. Otherwise as CrowdPoses. */
+        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest; `levels` is int8, all else float32. Otherwise as CrowdPoses. */
         CrowdMsgpack: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2581,7 +2581,7 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
             };
         };
-        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest. Otherwise as ClipDocument, not rounded. */
+        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest. Otherwise as ClipDocument, not rounded, and without `frames`: there are as many as `times`. */
         ClipMsgpack: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
