@@ -6,7 +6,8 @@ from functools import cache
 from pathlib import Path
 
 from model_export import export, ingest, recipe, train
-from model_export.sample import write
+from model_export.recipe import Recipe
+from model_export.sample import stroll, write
 from service.motion.answer import ClipAnswer
 from service.synthesis import session
 from service.synthesis.question import ClipQuestion
@@ -24,7 +25,23 @@ def answers() -> list[tuple[str, ClipAnswer]]:
     if not DATA.exists():
         print(f"no motion capture in {DATA}: set POSEFIELD_DATA")
         return made
-    return made + [_middle(_trained(path, DATA)[0]) for path in RECIPES]
+    return made + [_middle(model) for model, _ in real().values()]
+
+
+def addon_models() -> dict[str, tuple[Synthesizer, bytes]]:
+    """Models by name: the procedural family, its walk, and where there is motion capture a real walk."""
+    with tempfile.TemporaryDirectory() as name:
+        stroll.write(Path(name))
+        walk = _of(stroll.recipe(), Path(name))
+    found = {"reaching": family(), "stroll": walk}
+    return found | ({"cmu_walk": real()["cmu_walk"]} if DATA.exists() else {})
+
+
+@cache
+def real() -> dict[str, tuple[Synthesizer, bytes]]:
+    """Models of the real recipes by name, and their files' contents."""
+    models = [_trained(path, DATA) for path in RECIPES]
+    return {model.name: (model, content) for model, content in models}
 
 
 @cache
@@ -45,7 +62,10 @@ def real(name: str) -> bytes | None:
 
 
 def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
-    own = recipe.read(path)
+    return _of(recipe.read(path), data)
+
+
+def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
     examples, notes = ingest.ingest(own, data)
     exported = export.export(own, train.train(own, examples, lambda _: None), notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))

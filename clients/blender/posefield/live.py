@@ -47,7 +47,7 @@ def ask(scene) -> None:
 
 
 def tick() -> float | None:
-    """Apply an answer, if there is one; seconds until the next look, None when nothing is to come."""
+    """Apply an answer, if there is one; seconds until the next look, None at the end."""
     if _asking is None:
         return None
     for found in _asking.take():

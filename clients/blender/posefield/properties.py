@@ -170,7 +170,7 @@ class PosefieldSettings(bpy.types.PropertyGroup):
     )
     set_scene: BoolProperty(
         name="Set scene rate and range",
-        description="The scene plays as fast as the clip was made, from its first frame to its last",
+        description="The scene plays the clip as fast as it is, and from end to end",
         default=True,
     )
     live: BoolProperty(

@@ -32,7 +32,7 @@ def conj(turns: Floats) -> Floats:
 def of_matrices(matrices: Floats) -> Floats:
     """Unit quaternions of rotation matrices (..., 3, 3), the eigenvector that fits them best.
 
-    Bones keep their matrices in float32, which are rotations to seven digits only (Bar-Itzhack 2000).
+    Bones keep theirs in float32, which are rotations to seven digits only (Bar-Itzhack 2000).
     """
     m = np.swapaxes(matrices, -1, -2)
     k = np.zeros((*m.shape[:-2], 4, 4))

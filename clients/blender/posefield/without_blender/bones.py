@@ -1,4 +1,4 @@
-"""Bones as numbers: where a new armature's lie, and what turns those of any armature as a clip says.
+"""Bones as numbers: where a new armature's lie, and what poses any armature as a clip says.
 
 A bone's own axes are its armature's choice: Y points along it. With the bone's rest matrix A, the
 joint's rotation q (in the axes of the armature, local to the parent) is the channel A^-1 q A: then
