@@ -92,7 +92,9 @@ def pose(armature, joints, frame):
         [TO_Y_UP @ np.array(armature.matrix_world @ armature.pose.bones[j].matrix) for j in joints]
     )
     # Bones have axes of their own, the same in every pose, and an object its scale.
-    rest = np.array([TO_Y_UP[:3, :3] @ np.array(armature.data.bones[j].matrix_local)[:3, :3] for j in joints])
+    rest = np.array(
+        [TO_Y_UP[:3, :3] @ np.array(armature.data.bones[j].matrix_local)[:3, :3] for j in joints]
+    )
     turns = found[:, :3, :3] / np.array(armature.matrix_world.to_scale())
     found[:, :3, :3] = turns @ np.swapaxes(rest, -1, -2)
     return found
@@ -102,7 +104,9 @@ def offsets(armature):
     """From parent to child at rest in the world, Y up."""
     found = []
     for bone in armature.data.bones:
-        own = np.array(bone.head_local) - np.array(bone.parent.head_local if bone.parent else (0, 0, 0))
+        own = np.array(bone.head_local) - np.array(
+            bone.parent.head_local if bone.parent else (0, 0, 0)
+        )
         found.append(TO_Y_UP[:3, :3] @ own * np.array(armature.matrix_world.to_scale()))
     return np.array(found)
 
@@ -147,7 +151,10 @@ def snapshot():
                 values = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
                 curve.keyframe_points.foreach_get("co", values)
                 keys[action.name, curve.data_path, curve.array_index] = values.tobytes()
-    things = tuple(sorted(o.name for o in bpy.data.objects)), tuple(sorted(bpy.data.armatures.keys()))
+    things = (
+        tuple(sorted(o.name for o in bpy.data.objects)),
+        tuple(sorted(bpy.data.armatures.keys())),
+    )
     render = scene.render
     return things, keys, render.fps, render.fps_base, scene.frame_start, scene.frame_end
 
@@ -344,7 +351,9 @@ def walking(model, performer, straight):
     afresh(model, loop=True, root="in_place")
     bpy.ops.posefield.import_clip()
     period = len(part("session").current.clip) - 1
-    facts[f"{model} range of a loop"] = bpy.context.scene.frame_end - bpy.context.scene.frame_start + 1 - period
+    facts[f"{model} range of a loop"] = (
+        bpy.context.scene.frame_end - bpy.context.scene.frame_start + 1 - period
+    )
     record(f"{model} loop twice", {"root": "travelling"}, 2 * period + 1, cycles=2)
     for curve in curves(settings().character):
         for modifier in list(curve.modifiers):
@@ -467,12 +476,16 @@ def panel():
     facts["drawn outside"] = drawn()
     rows = []
     part("preferences").PosefieldPreferences.draw(
-        SimpleNamespace(layout=Layout(rows), bl_rna=preferences().bl_rna, key="k", address=ELSEWHERE),
+        SimpleNamespace(
+            layout=Layout(rows), bl_rna=preferences().bl_rna, key="k", address=ELSEWHERE
+        ),
         bpy.context,
     )
     facts["drawn preferences"] = rows
     found = bpy.context.scene.posefield_controls.bl_rna.properties["stature"]
-    facts["slider"] = [round(getattr(found, name), 4) for name in ("soft_min", "soft_max", "hard_min", "hard_max")]
+    facts["slider"] = [
+        round(getattr(found, name), 4) for name in ("soft_min", "soft_max", "hard_min", "hard_max")
+    ]
     facts["slider words"] = [found.name, found.description]
 
 
@@ -512,7 +525,9 @@ def switched_off():
     facts["off: thread ended"] = thread.join(PATIENCE)
     facts["off: threads"] = [t.name for t in threading.enumerate() if t.name == "posefield"]
     facts["off: left"] = [n for n in dir(bpy.types.Scene) if "posefield" in n] + [
-        f.__name__ for f in (*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post) if "posefield" in f.__module__
+        f.__name__
+        for f in (*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post)
+        if "posefield" in f.__module__
     ]
     bpy.ops.preferences.addon_enable(module=PACKAGE)
     facts["on again"] = hasattr(bpy.types.Scene, "posefield")
