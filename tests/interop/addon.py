@@ -23,6 +23,7 @@ from compare import FURTHEST, TURNED
 from service.motion import clip as clips
 from service.motion import quat, skeleton
 from service.motion.clip import Clip
+from service.synthesis import session
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
@@ -30,6 +31,8 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 ADDON = ROOT / "clients/blender"
 TIMEOUT = 900.0
+
+WALK = "cmu_walk"
 
 Models = dict[str, tuple[Synthesizer, bytes]]
 
@@ -53,7 +56,7 @@ def faults() -> list[str]:
     """What is not as it should be, in both Blenders."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        models = trained.addon_models()
+        models = _models()
         (folder / "models").mkdir()
         for known, (_, content) in models.items():
             (folder / "models" / f"{known}.onnx").write_bytes(content)
@@ -63,6 +66,16 @@ def faults() -> list[str]:
             for version, python in environment.blenders().items()
             for fault in _of(version, _driven(python, archive, folder, models), models)
         ]
+
+
+def _models() -> Models:
+    """By name: the procedural family, the procedural walk, and a real one if there is any."""
+    found = {"reaching": trained.family()[1], "stroll": trained.walk(), WALK: trained.real(WALK)}
+    return {
+        name: (Synthesizer(name, session.open_bytes(content, name)), content)
+        for name, content in found.items()
+        if content is not None
+    }
 
 
 def _built(folder: Path) -> str:
@@ -118,15 +131,15 @@ def _rows(case: dict[str, Any], arrays: dict[str, Any], models: Models) -> list[
     name, wrong = case["name"], case["wrong"]
     made = _Expected(case, arrays[f"{name}/offsets"], models[case["model"]][0])
     found = arrays[f"{name}/matrices"]
-    on_purpose = name.endswith("on purpose") or case.get("body") == "armature" and wrong is None
-    rows = [_row(name, found, made.of({}), case, not on_purpose)]
+    alike = not name.endswith("on purpose") and not (case.get("body") == "armature" and not wrong)
+    rows = [_row(name, found, made.of({}), case, alike)]
     if wrong:
         rows.append(_row(f"{name}: other {next(iter(wrong))}", found, made.of(wrong), case, False))
     return rows
 
 
 def _row(name: str, found: Any, meant: Clip, case: dict[str, Any], right: bool) -> Row:
-    """Joints and matrices (F, J, 4, 4) against a clip's, which is as long where it is the right one."""
+    """Joints and matrices (F, J, 4, 4) against those of a clip, as long where it is the right one."""
     joints = [case["joints"].index(joint) for joint in meant.skeleton.names]
     if right and len(found) != len(meant):
         return Row(name, np.inf, np.inf, right)

@@ -25,23 +25,7 @@ def answers() -> list[tuple[str, ClipAnswer]]:
     if not DATA.exists():
         print(f"no motion capture in {DATA}: set POSEFIELD_DATA")
         return made
-    return made + [_middle(model) for model, _ in real().values()]
-
-
-def addon_models() -> dict[str, tuple[Synthesizer, bytes]]:
-    """Models by name: the procedural family, its walk, and where there is motion capture a real walk."""
-    with tempfile.TemporaryDirectory() as name:
-        stroll.write(Path(name))
-        walk = _of(stroll.recipe(), Path(name))
-    found = {"reaching": family(), "stroll": walk}
-    return found | ({"cmu_walk": real()["cmu_walk"]} if DATA.exists() else {})
-
-
-@cache
-def real() -> dict[str, tuple[Synthesizer, bytes]]:
-    """Models of the real recipes by name, and their files' contents."""
-    models = [_trained(path, DATA) for path in RECIPES]
-    return {model.name: (model, content) for model, content in models}
+    return made + [_middle(_trained(path, DATA)[0]) for path in RECIPES]
 
 
 @cache
@@ -61,6 +45,15 @@ def real(name: str) -> bytes | None:
     return _trained(ROOT / f"model_export/recipes/{name}.toml", DATA)[1]
 
 
+@cache
+def walk() -> bytes:
+    """File of the model of the procedural walk."""
+    with tempfile.TemporaryDirectory() as name:
+        stroll.write(Path(name))
+        return _of(stroll.recipe(), Path(name))[1]
+
+
+@cache
 def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
     return _of(recipe.read(path), data)
 
