@@ -56,7 +56,7 @@ run: $(MODEL) $(PAGE) ## the same, but the service stays up on port 8000
 
 .PHONY: addon
 addon: $(ENV) ## the Blender add-on as an archive to install, in build
-	$(BIN)/python clients/blender/build.py build
+	$(BIN)/python clients/blender/archive.py build
 
 .PHONY: test
 test: $(PAGE) ## lint, types, layers and all tests (no Blender, no browser)

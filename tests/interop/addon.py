@@ -79,7 +79,7 @@ def _models() -> Models:
 
 
 def _built(folder: Path) -> str:
-    done = _run(sys.executable, ADDON / "build.py", folder)
+    done = _run(sys.executable, ADDON / "archive.py", folder)
     return done.stdout.strip()
 
 
@@ -139,7 +139,7 @@ def _rows(case: dict[str, Any], arrays: dict[str, Any], models: Models) -> list[
 
 
 def _row(name: str, found: Any, meant: Clip, case: dict[str, Any], right: bool) -> Row:
-    """Joints and matrices (F, J, 4, 4) against those of a clip, as long where it is the right one."""
+    """Joints and matrices (F, J, 4, 4) against those of a clip, which where right is as long."""
     joints = [case["joints"].index(joint) for joint in meant.skeleton.names]
     if right and len(found) != len(meant):
         return Row(name, np.inf, np.inf, right)
@@ -210,6 +210,10 @@ FACTS: dict[str, Any] = {
     "other axes: armatures": _is(1),
     "other axes: same": _is(True),
     "longer bones said": _holds("bone lengths stay", "cm off", "set aside", "quaternions now"),
+    "disturbed": _holds("1 bones have constraints", "1 NLA tracks", "tilted by 20 degrees"),
+    "uneven scale": _holds("scaled by [1.0, 2.0, 1.0]"),
+    "no inheritance": _holds("1 bones", "Inherit Rotation"),
+    "being edited": _holds("leave edit mode first"),
     "other names": _holds("it lacks", "it has besides Bone3, Bone4", "33 bones"),
     "other names: unchanged": _is(True),
     "another tree": _holds("elsewhere in the tree", "expected"),

@@ -242,7 +242,14 @@ def onto_existing():
         facts[f"{name}: armatures"] = len(bpy.data.armatures)
         facts[f"{name}: same"] = settings().character == armature
         record(name, {"controls": {"turn": 17.0}})
-    existing(longer)
+    own = existing(longer)
+    own.pose.bones[3].constraints.new("LIMIT_ROTATION")
+    own.animation_data.nla_tracks.new()
+    own.rotation_euler = (0, np.radians(20), 0)
+    bpy.context.view_layer.update()
+    bpy.ops.posefield.import_clip(onto="ACTIVE")
+    facts["disturbed"] = list(part("session").current.said)
+    own = existing(longer)
     bpy.ops.posefield.import_clip(onto="ACTIVE")
     facts["longer bones said"] = list(part("session").current.said)
     record("longer bones, their own", {"body": "clip"}, body="armature")
@@ -293,9 +300,17 @@ def refused():
     facts["other names: unchanged"] = snapshot() == before
     afresh("reaching")
     bpy.ops.posefield.import_clip()
-    edit(settings().character, hung_elsewhere)
+    own = settings().character
+    own.scale = (1, 2, 1)
+    bpy.context.view_layer.update()
+    facts["uneven scale"] = said(bpy.ops.posefield.import_clip, onto="ACTIVE")
+    own.data.bones[7].use_inherit_rotation = False
+    facts["no inheritance"] = said(bpy.ops.posefield.import_clip, onto="ACTIVE")
+    edit(own, hung_elsewhere)
     facts["another tree"] = said(bpy.ops.posefield.import_clip, onto="ACTIVE")
-    settings().character.scale = (1, 2, 1)
+    bpy.ops.object.mode_set(mode="EDIT")
+    facts["being edited"] = said(bpy.ops.posefield.import_clip, onto="ACTIVE")
+    bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.objects.active = None
     facts["no armature"] = said(bpy.ops.posefield.import_clip, onto="ACTIVE")
     facts["no such control"] = said(bpy.ops.posefield.import_clip, controls='{"speed": 1}')

@@ -106,6 +106,8 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             raise faults.Mismatch(
                 f"the active object is {found.name if found else 'none'}, expected an armature"
             )
+        if found.mode == "EDIT":
+            raise faults.Mismatch(f"{found.name} is being edited: leave edit mode first")
         return found
 
     def _pick(self, context) -> None:

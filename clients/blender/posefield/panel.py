@@ -25,7 +25,8 @@ class VIEW3D_PT_posefield(bpy.types.Panel):
         draw_service(layout, context)
         try:
             card = questions.card_of(scene)
-        except faults.Fault:
+        except faults.Fault as fault:
+            draw_text(layout, str(fault), "INFO")
             return draw_said(layout)
         draw_controls(layout, scene, card)
         draw_choices(layout, scene.posefield, card)

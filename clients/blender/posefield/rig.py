@@ -8,6 +8,9 @@ from .without_blender.bones import Rest
 from .without_blender.cards import Card
 from .without_blender.clips import Clip
 
+EVEN = 1e-4
+"""How far the scales along two axes may differ, of the larger."""
+
 
 def make(context, card: Card, clip: Clip):
     """A new armature in the active collection, whose bones are as long as the clip's."""
@@ -43,6 +46,8 @@ def _bones(edited, clip: Clip, card: Card) -> None:
 
 def check(armature, clip: Clip) -> None:
     """Refuse an armature on which the clip has no place; Mismatch says why."""
+    if not armature.is_editable or not armature.data.is_editable:
+        raise faults.Mismatch(f"the armature {armature.name} is linked from another file")
     own = armature.data.bones
     bones.check(clip, {bone.name: bone.parent and bone.parent.name for bone in own})
     loose = [b.name for b in own if not (b.use_inherit_rotation and b.use_local_location)]
@@ -51,12 +56,7 @@ def check(armature, clip: Clip) -> None:
             f"{len(loose)} bones, {loose[0]} for one, inherit no rotation or move along other axes"
             " than their own; expected Inherit Rotation and Local Location everywhere"
         )
-    scale = _scale(armature)
-    if scale.min() <= 0 or np.ptp(scale) > 1e-4 * scale.max():
-        raise faults.Mismatch(
-            f"the armature is scaled by {scale.round(4).tolist()}, expected the same along all"
-            " axes: apply the scale"
-        )
+    _check_scale(_scale(armature))
 
 
 def rest(armature, clip: Clip) -> Rest:
@@ -68,22 +68,34 @@ def rest(armature, clip: Clip) -> Rest:
 
 def settle(armature) -> list[str]:
     """Turn all bones by quaternions, and take away what is not keyed; what is said of it."""
-    said = []
     posed = armature.pose.bones
     others = [bone for bone in posed if bone.rotation_mode != "QUATERNION"]
     for bone in others:
         bone.rotation_mode = "QUATERNION"
     for bone in posed:
         bone.location, bone.scale = (0, 0, 0), (1, 1, 1)
-    if others:
-        said.append(f"{len(others)} bones turn by quaternions now")
-    constrained = sum(bool(bone.constraints) for bone in posed)
-    if constrained:
-        said.append(f"{constrained} bones have constraints, which move them away from the clip")
+    return [f"{len(others)} bones turn by quaternions now"] * bool(others) + disturbed(armature)
+
+
+def disturbed(armature) -> list[str]:
+    """What keeps an armature from moving as its action says, in words."""
+    constrained = sum(bool(bone.constraints) for bone in armature.pose.bones)
+    tracks = len(armature.animation_data.nla_tracks) if armature.animation_data else 0
     tilt = np.degrees(np.arccos(np.clip(_upright(armature), -1, 1)))
-    if tilt > 1:
-        said.append(f"the armature is tilted by {tilt:.0f} degrees: apply its rotation")
-    return said
+    said = {
+        f"{constrained} bones have constraints, which move them away from the clip": constrained,
+        f"{tracks} NLA tracks play besides the clip": tracks,
+        f"the armature is tilted by {tilt:.0f} degrees: apply its rotation": tilt > 1,
+    }
+    return [sentence for sentence, so in said.items() if so]
+
+
+def _check_scale(scale) -> None:
+    if scale.min() <= 0 or np.ptp(scale) > EVEN * scale.max():
+        raise faults.Mismatch(
+            f"the armature is scaled by {scale.round(4).tolist()}, expected the same along all"
+            " axes: apply the scale"
+        )
 
 
 def _scale(armature):

@@ -183,10 +183,11 @@ def _turned(turns: Floats, vectors: Floats) -> Floats:
 def _onward(joint: int, parent: int, heads: Floats) -> Floats:
     """A short bone in the direction in which its parent leads to it; upward, if in none."""
     way = heads[joint] - heads[parent] if parent >= 0 else np.zeros(3)
-    length = np.linalg.norm(way)
+    length = float(np.linalg.norm(way))
     if length < SHORTEST:
         return np.array([0.0, 0.0, 5 * SHORTEST])
-    return way * max(SHORTEST, 0.3 * length) / length
+    onward: Floats = way * (max(SHORTEST, 0.3 * length) / length)
+    return onward
 
 
 def _listed(names: list[str]) -> str:

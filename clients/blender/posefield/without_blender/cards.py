@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from . import faults
-from .service import Service, fetch
+from .service import Service, fetch, path_of
 
 WIDTHS = 100.0
 """How many widths of its sampled range a control may lie beyond it: the service answers no more."""
@@ -87,7 +87,7 @@ class Card:
 
 def get(service: Service, name: str) -> Card:
     """The card of a model; Unintelligible says what it lacks."""
-    return decode(fetch(service, f"/v1/models/{name}"))
+    return decode(fetch(service, path_of(name)))
 
 
 def decode(content: bytes) -> Card:

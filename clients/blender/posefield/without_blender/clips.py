@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import axes, faults
 from .cards import parents_by_name
-from .service import Service, fetch
+from .service import Service, fetch, path_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class Clip:
 
 def ask(service: Service, question: Question) -> Clip:
     """The clip; faults of the service and of what it sends."""
-    content = fetch(service, f"/v1/models/{question.model}/clip.npz", question.body())
+    content = fetch(service, path_of(question.model) + "/clip.npz", question.body())
     return decode(content)
 
 

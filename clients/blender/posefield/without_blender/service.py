@@ -82,6 +82,11 @@ def models(service: Service) -> tuple[tuple[str, str], ...]:
         raise faults.Unintelligible(f"the list of models has no {fault}") from fault
 
 
+def path_of(model: str) -> str:
+    """Where a model is asked, whatever letters its name has."""
+    return "/v1/models/" + urllib.parse.quote(model, safe="@")
+
+
 def fetch(service: Service, path: str, body: Mapping[str, Any] | None = None) -> bytes:
     """A whole answer to a GET, or where there is a body to a POST of it as JSON.
 
@@ -89,7 +94,9 @@ def fetch(service: Service, path: str, body: Mapping[str, Any] | None = None) ->
     """
     until = time.monotonic() + service.seconds
     try:
-        with _OPENER.open(_request(service, path, body), timeout=service.seconds) as answer:
+        with _opener(service).open(
+            _request(service, path, body), timeout=service.seconds
+        ) as answer:
             return _whole(answer, until, service)
     except urllib.error.HTTPError as refusal:
         with refusal:
@@ -109,7 +116,10 @@ class _Stay(urllib.request.HTTPRedirectHandler):
         return None
 
 
-_OPENER = urllib.request.build_opener(_Stay)
+def _opener(service: Service) -> urllib.request.OpenerDirector:
+    """Whoever is told of a proxy by the environment need not except this machine from it."""
+    proxies = urllib.request.ProxyHandler({} if service.is_here else None)
+    return urllib.request.build_opener(_Stay, proxies)
 
 
 def _request(service: Service, path: str, body: Mapping[str, Any] | None) -> urllib.request.Request:

@@ -1,4 +1,4 @@
-"""Makes the add-on's archive, as Blender installs it: python clients/blender/build.py FOLDER.
+"""Makes the add-on's archive, as Blender installs it: python clients/blender/archive.py FOLDER.
 
 The same files always give the same bytes.
 """
