@@ -230,6 +230,28 @@ def in_place_of_sliders():
     facts["timer left"] = bpy.app.timers.is_registered(part("live").tick)
 
 
+def undone():
+    """An import is one step back, and what the sliders did since is none."""
+    afresh("reaching")
+    before = snapshot()
+    slide(stature=1.7)
+    facts["not live: unchanged"] = snapshot() == before
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.posefield.import_clip("EXEC_DEFAULT", True)
+    settings().live = True
+    for stature in (1.65, 1.75, 1.8):
+        slide(stature=stature)
+        wait()
+    bpy.ops.ed.undo()
+    facts["undone: as before"] = snapshot() == before
+    bpy.ops.ed.redo()
+    facts["redone: armatures"] = len(bpy.data.armatures)
+    settings().live = True
+    slide(stature=1.66)
+    wait()
+    record("live after undo and redo", {"controls": {"stature": 1.8}})
+
+
 def onto_existing():
     for name, more, lengths in (
         ("other axes", other_axes, "ARMATURE"),
@@ -530,20 +552,30 @@ def stopped():
     facts["stopped: unchanged"] = snapshot() == before
 
 
+def threads():
+    return [each.name for each in threading.enumerate() if each.name == "posefield"]
+
+
+def left():
+    """What of the add-on Blender knows."""
+    calls = (*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post)
+    known = [name for name in dir(bpy.types.Scene) if "posefield" in name]
+    return known + [call.__name__ for call in calls if "posefield" in call.__module__]
+
+
 def switched_off():
     live = part("live")
     slide(stature=1.75)
     thread = live._asking
     tick = live.tick
+    facts["on: timer"] = bpy.app.timers.is_registered(tick)
+    facts["on: threads"] = threads()
+    facts["on: left"] = left()
     bpy.ops.preferences.addon_disable(module=PACKAGE)
     facts["off: timer"] = bpy.app.timers.is_registered(tick)
     facts["off: thread ended"] = thread.join(PATIENCE)
-    facts["off: threads"] = [t.name for t in threading.enumerate() if t.name == "posefield"]
-    facts["off: left"] = [n for n in dir(bpy.types.Scene) if "posefield" in n] + [
-        f.__name__
-        for f in (*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post)
-        if "posefield" in f.__module__
-    ]
+    facts["off: threads"] = threads()
+    facts["off: left"] = left()
     bpy.ops.preferences.addon_enable(module=PACKAGE)
     facts["on again"] = hasattr(bpy.types.Scene, "posefield")
     bpy.ops.preferences.addon_disable(module=PACKAGE)
@@ -553,7 +585,7 @@ if __name__ == "__main__":
     archive, ADDRESS, pid, result, readme = sys.argv[1:6]
     PID, RESULT = int(pid), Path(result)
     PACKAGE = install(archive)
-    for each in (reaching, late, in_place_of_sliders, onto_existing, refused, rates):
+    for each in (reaching, late, in_place_of_sliders, undone, onto_existing, refused, rates):
         each()
     for given in json.loads(sys.argv[6]):
         walking(*given)

@@ -83,8 +83,8 @@ def disturbed(armature) -> list[str]:
     tracks = len(armature.animation_data.nla_tracks) if armature.animation_data else 0
     tilt = np.degrees(np.arccos(np.clip(_upright(armature), -1, 1)))
     said = {
-        f"{constrained} bones have constraints, which move them away from the clip": constrained,
-        f"{tracks} NLA tracks play besides the clip": tracks,
+        f"bones with constraints, which move them away from the clip: {constrained}": constrained,
+        f"NLA tracks that play beside the clip: {tracks}": tracks,
         f"the armature is tilted by {tilt:.0f} degrees: apply its rotation": tilt > 1,
     }
     return [sentence for sentence, so in said.items() if so]
