@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import addon_facts
 import environment
 import numpy as np
 import trained
@@ -124,7 +125,7 @@ def _of(version: str, driven: dict[str, Any], models: Models) -> list[str]:
     seconds = facts["seconds to the last of forty moves"]
     print(f"{version:<8}the last of forty moves of a slider shows after {seconds:.2f} s")
     wrong = [f"{row.name}: {row.metres:.1e} m" for row in rows if not row.good]
-    return wrong + [f"{name}: {facts[name]}" for name, right in expected(facts) if not right]
+    return wrong + addon_facts.faults(facts)
 
 
 def _rows(case: dict[str, Any], arrays: dict[str, Any], models: Models) -> list[Row]:
@@ -184,85 +185,6 @@ def _cycles(clip: Clip, times: int) -> Clip:
     rotations = [clip.rotations, *[clip.rotations[1:]] * (times - 1)]
     moved = [clip.translations, *(clip.translations[1:] + n * step for n in range(1, times))]
     return replace(clip, rotations=np.concatenate(rotations), translations=np.concatenate(moved))
-
-
-def expected(facts: dict[str, Any]) -> list[tuple[str, bool]]:
-    """Each fact, and whether it is as it should be."""
-    return [(name, bool(right(facts[name]))) for name, right in FACTS.items()]
-
-
-def _holds(*words: str) -> Any:
-    """Whether all words stand in what was said."""
-    return lambda said: all(word in str(said) for word in words)
-
-
-def _is(value: Any) -> Any:
-    return lambda found: found == value
-
-
-FACTS: dict[str, Any] = {
-    "installed": _is(["FINISHED"]),
-    "an import changes the scene": _is(True),
-    "fps": _is([30, 1.0]),
-    "actions": _is(["reaching"]),
-    "actions after live": _is(["reaching"]),
-    "timer left": _is(True),
-    "not live: unchanged": _is(True),
-    "undone: as before": _is(True),
-    "redone: armatures": _is(1),
-    "other axes: armatures": _is(1),
-    "other axes: same": _is(True),
-    "longer bones said": _holds("bone lengths stay", "cm off", "set aside", "quaternions now"),
-    "disturbed": _holds(
-        "bones with constraints, which move them away from the clip: 1",
-        "beside the clip: 1",
-        "tilted by 20 degrees",
-    ),
-    "uneven scale": _holds("scaled by [1.0, 2.0, 1.0]"),
-    "no inheritance": _holds("1 bones", "Inherit Rotation"),
-    "being edited": _holds("leave edit mode first"),
-    "other names": _holds("it lacks", "it has besides Bone3, Bone4", "33 bones"),
-    "other names: unchanged": _is(True),
-    "another tree": _holds("elsewhere in the tree", "expected"),
-    "no armature": _holds("the active object is none, expected an armature"),
-    "no such control": _holds("no control is named speed; there are stature"),
-    "no numbers": _holds("expected numbers by name"),
-    "no such model": _holds("404", "nobody"),
-    "elsewhere": _holds("stay offline"),
-    "no address": _holds("'somewhere'", "expected one like http://"),
-    "said at 24.0": lambda said: not any("scene rate" in each for each in said),
-    "said at 29.97": _holds("scene rate 24 -> 29.97 frames a second"),
-    "left rate": _is([24, 250]),
-    "stroll range of a loop": _is(0),
-    "stroll repeated": _is(True),
-    "armature deleted": _holds("import a clip first"),
-    "armature deleted: live": _is(False),
-    "armature deleted by hand": _holds("import a clip first"),
-    "reload: next look": _is(None),
-    "reload: live": _is(False),
-    "reload: unchanged": _is(True),
-    "reload: stature": _is(1.7),
-    "another action": _holds("(Own) is no imported clip"),
-    "another action: unchanged": _is(True),
-    "drawn before": lambda rows: "Model" in rows and "Import clip" not in rows,
-    "drawn after": lambda rows: "stature (m)" in rows and not _holds("Outside")(rows),
-    "drawn outside": _holds("Outside: stature is 2.5, sampled: "),
-    "drawn preferences": _holds("plain text", "Without https"),
-    "slider": lambda found: found[2] < found[0] < found[1] < found[3],
-    "slider words": _holds("stature (m)", "sampled: "),
-    "stopped": _holds("no service answers at"),
-    "stopped, live": _holds("no service answers at"),
-    "stopped: drawn": _holds("no service answers at"),
-    "stopped: unchanged": _is(True),
-    "on: timer": _is(True),
-    "on: threads": _is(["posefield"]),
-    "on: left": _holds("posefield_controls", "before_load", "after_load"),
-    "off: timer": _is(False),
-    "off: thread ended": _is(True),
-    "off: threads": _is([]),
-    "off: left": _is([]),
-    "on again": _is(True),
-}
 
 
 def _run(*command: str | Path, **told: str) -> subprocess.CompletedProcess[str]:

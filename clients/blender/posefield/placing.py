@@ -46,7 +46,8 @@ def unrepeated(clip: Clip, loop: bool) -> list[str]:
     turn = bones.heading_left(clip)
     if not loop or turn <= STRAIGHT:
         return []
-    return [f"the cycle turns by {math.degrees(turn):.1f} degrees, which no modifier can repeat"]
+    turned = f"{math.degrees(turn):.1f} degrees"
+    return [f"the cycle turns by {turned}, which no modifier can repeat: in place it could be"]
 
 
 def _placing(scene, clip: Clip, repeated: bool) -> Placing:
