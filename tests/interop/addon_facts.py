@@ -65,8 +65,13 @@ FACTS: dict[str, Any] = {
     "another action": _holds("(Own) is no imported clip"),
     "another action: unchanged": _is(True),
     "drawn before": lambda rows: "Model" in rows and "Import clip" not in rows,
-    "drawn after": lambda rows: "stature (m)" in rows and not _holds("Outside")(rows),
-    "drawn outside": _holds("Outside: stature is 2.5, sampled: "),
+    "drawn after": lambda rows: (
+        _holds("'stature (m)'", "A captured clip would lie")(rows) and "Outside" not in str(rows)
+    ),
+    "drawn outside": lambda rows: (
+        _holds("Outside: stature is 2.5, sampled: ")(rows) and "would lie" not in str(rows)
+    ),
+    "by hash": _is(""),
     "drawn preferences": _holds("plain text", "Without https"),
     "slider": lambda found: found[2] < found[0] < found[1] < found[3],
     "slider words": _holds("stature (m)", "sampled: "),

@@ -76,10 +76,15 @@ def refused():
     facts["no such control"] = said(bpy.ops.posefield.import_clip, controls='{"speed": 1}')
     facts["no numbers"] = said(bpy.ops.posefield.import_clip, controls="[1]")
     facts["no such model"] = said(bpy.ops.posefield.import_clip, model="nobody")
+    facts["by hash"] = said(bpy.ops.posefield.import_clip, model=card().identity)
     preferences().address = ELSEWHERE
     facts["elsewhere"] = said(bpy.ops.posefield.refresh)
     preferences().address = "somewhere"
     facts["no address"] = said(bpy.ops.posefield.refresh)
+
+
+def card():
+    return part("session").current.card
 
 
 def renamed(index, bone):

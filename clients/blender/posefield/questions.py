@@ -48,7 +48,8 @@ def card_of(scene) -> Card:
     card = session.current.card
     if card is None or scene.posefield.sliders_of != scene.posefield.model_name:
         raise faults.Fault("no model is picked: refresh, and pick one")
-    if not card.identity.startswith(scene.posefield.model_name + "@"):
+    name = scene.posefield.model_name
+    if name not in (card.identity, card.identity.partition("@")[0]):
         raise faults.Fault(f"the sliders are those of {card.identity}: refresh")
     return card
 

@@ -19,11 +19,6 @@ def make(context, card: Card, clip: Clip):
         bpy.ops.object.mode_set(mode="OBJECT")
     armature = bpy.data.objects.new(card.name, bpy.data.armatures.new(card.name))
     context.collection.objects.link(armature)
-    if not armature.visible_get():
-        bpy.data.armatures.remove(armature.data)
-        raise faults.Fault(
-            f"the active collection {context.collection.name} is hidden: bones cannot be made in it"
-        )
     for other in context.selected_objects:
         other.select_set(False)
     armature.select_set(True)
