@@ -46,6 +46,11 @@ def test_the_manifest_says_what_blender_must_know():
     assert not found["tagline"].endswith(".")
 
 
+def test_the_readme_names_the_archive_that_is_made():
+    text = (ADDON.parent / "README.md").read_text()
+    assert f"build/posefield-blender-{manifest()['version']}.zip" in text
+
+
 def imports(file):
     """Modules that a file imports from outside its package."""
     for node in ast.walk(ast.parse(file.read_text())):
