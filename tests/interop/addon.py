@@ -61,7 +61,7 @@ def faults() -> list[str]:
         (folder / "models").mkdir()
         for known, (_, content) in models.items():
             (folder / "models" / f"{known}.onnx").write_bytes(content)
-        archive = folder / _built(folder)
+        archive = _built(folder)
         return [
             f"{version}: {fault}"
             for version, python in environment.blenders().items()
@@ -79,9 +79,9 @@ def _models() -> Models:
     }
 
 
-def _built(folder: Path) -> str:
+def _built(folder: Path) -> Path:
     done = _run(sys.executable, ADDON / "archive.py", folder)
-    return done.stdout.strip()
+    return Path(done.stdout.strip())
 
 
 def _driven(python: Path, archive: Path, folder: Path, models: Models) -> dict[str, Any]:

@@ -59,6 +59,7 @@ FACTS: dict[str, Any] = {
     "armature deleted: live": _is(False),
     "armature deleted by hand": _holds("import a clip first"),
     "reload: next look": _is(None),
+    "reload: thread ended": _is(True),
     "reload: live": _is(False),
     "reload: unchanged": _is(True),
     "reload: stature": _is(1.7),

@@ -125,7 +125,9 @@ def reload(file):
     settings().live = True
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     slide(stature=1.8)
+    thread = part("live")._asking
     bpy.ops.wm.open_mainfile(filepath=str(file))
+    facts["reload: thread ended"] = thread.join(PATIENCE)
     facts["reload: next look"] = part("live").tick()
     facts["reload: live"] = settings().live
     before = snapshot()
