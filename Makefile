@@ -54,6 +54,10 @@ demo: $(MODEL) ## sample, train, serve, ask over HTTP: clips in build/demo
 run: $(MODEL) $(PAGE) ## the same, but the service stays up on port 8000
 	$(BIN)/posefield serve build/models
 
+.PHONY: addon
+addon: $(ENV) ## the Blender add-on as an archive to install, in build
+	$(BIN)/python clients/blender/archive.py build
+
 .PHONY: test
 test: $(PAGE) ## lint, types, layers and all tests (no Blender, no browser)
 	$(BIN)/ruff check .
@@ -79,4 +83,4 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist service/web/viewer clients/node_modules .venv .venv-blender .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist service/web/viewer clients/node_modules .venv .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis

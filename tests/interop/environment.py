@@ -14,8 +14,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 BLENDER = ROOT / ".venv-blender"
+BLENDER_5 = ROOT / ".venv-blender-5"
 THREE = ROOT / "build" / "three"
 PACKAGES = ("bpy==4.5.15", "numpy<2")
+PACKAGES_5 = ("bpy==5.0.1", "numpy<2")
 NODE_PACKAGES = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@redocly/cli@2.77.0")
 
 # What ldd names for bpy's own library beyond libc and libstdc++.
@@ -27,10 +29,15 @@ LIBRARIES = (
 
 def prepare() -> tuple[Path, Path]:
     """The Python that has Blender and the node beside three.js, installed when they are not."""
-    python = _blender()
+    python = _blender(BLENDER, PACKAGES)
     found = node()
     modules(THREE, NODE_PACKAGES, *found)
     return python, found[0]
+
+
+def blenders() -> dict[str, Path]:
+    """The Pythons that have the Blenders which the add-on is for, by version."""
+    return {"4.5": _blender(BLENDER, PACKAGES), "5.0": _blender(BLENDER_5, PACKAGES_5)}
 
 
 def packages(venv: Path, wanted: Sequence[str]) -> Path:
@@ -59,8 +66,8 @@ def node() -> tuple[Path, Path]:
     return folder / "node", folder / "npm"
 
 
-def _blender() -> Path:
-    python = packages(BLENDER, PACKAGES)
+def _blender(venv: Path, wanted: Sequence[str]) -> Path:
+    python = packages(venv, wanted)
     if not _imports(python):
         _libraries()
         if not _imports(python):

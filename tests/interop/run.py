@@ -6,7 +6,8 @@ Fails when a reader sees a joint elsewhere than our own kinematics, no animation
 of frames; and when a file passes that was damaged on purpose, or that the reader is known not to
 read. glTF files must also be without an error or a warning to the Khronos validator, and the
 contract to Redocly. Then builds the image and asks the service in it, puts a cache before the
-service, asks the model in other engines, and clicks through the page in a browser.
+service, asks the model in other engines, clicks through the page in a browser, and drives the
+Blender add-on.
 """
 
 import json
@@ -15,6 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import addon
 import cache
 import cases
 import container
@@ -84,7 +86,7 @@ def main() -> int:
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
     others = lint.faults(node) + container.faults() + cache.faults()
-    others += engines.faults(*environment.node()) + page.faults(node)
+    others += engines.faults(*environment.node()) + page.faults(node) + addon.faults()
     print("\n".join(others) or "no fault in what runs elsewhere")
     return wrong or bool(faults + others)
 

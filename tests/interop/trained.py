@@ -6,7 +6,8 @@ from functools import cache
 from pathlib import Path
 
 from model_export import export, ingest, recipe, train
-from model_export.sample import write
+from model_export.recipe import Recipe
+from model_export.sample import stroll, write
 from service.motion.answer import ClipAnswer
 from service.synthesis import session
 from service.synthesis.question import ClipQuestion
@@ -44,8 +45,20 @@ def real(name: str) -> bytes | None:
     return _trained(ROOT / f"model_export/recipes/{name}.toml", DATA)[1]
 
 
+@cache
+def walk() -> bytes:
+    """File of the model of the procedural walk."""
+    with tempfile.TemporaryDirectory() as name:
+        stroll.write(Path(name))
+        return _of(stroll.recipe(), Path(name))[1]
+
+
+@cache
 def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
-    own = recipe.read(path)
+    return _of(recipe.read(path), data)
+
+
+def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
     examples, notes = ingest.ingest(own, data)
     exported = export.export(own, train.train(own, examples, lambda _: None), notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))

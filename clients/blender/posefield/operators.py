@@ -1,0 +1,158 @@
+"""What the panel's buttons do, and scripts: `bpy.ops.posefield`."""
+
+import json
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from . import action, placing, preferences, questions, rig, session, sliders
+from .without_blender import bones, cards, clips, faults
+from .without_blender.cards import Card
+from .without_blender.clips import Clip
+
+FINISHED, CANCELLED = {"FINISHED"}, {"CANCELLED"}
+
+
+def _ended(operator, sentences, level="INFO"):
+    session.current.tell(*sentences, failed=level == "ERROR")
+    for sentence in sentences:
+        operator.report({level}, sentence)
+    return CANCELLED if level == "ERROR" else FINISHED
+
+
+class POSEFIELD_OT_refresh(bpy.types.Operator):
+    """Ask the service which models it has, and for the picked one's controls"""
+
+    bl_idname = "posefield.refresh"
+    bl_label = "Refresh"
+    bl_options = {"REGISTER"}  # noqa: RUF012
+
+    def execute(self, context):
+        """Models and card anew; nothing changes where the service does not answer."""
+        try:
+            questions.refresh(context, context.scene)
+        except faults.Fault as fault:
+            return _ended(self, [str(fault)], "ERROR")
+        return _ended(self, [])
+
+
+class POSEFIELD_OT_reset(bpy.types.Operator):
+    """Set all controls to the middle of what was sampled"""
+
+    bl_idname = "posefield.reset"
+    bl_label = "Reset controls"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def execute(self, context):
+        """Every slider to its default."""
+        try:
+            sliders.reset(context.scene, questions.card_of(context.scene))
+        except faults.Fault as fault:
+            return _ended(self, [str(fault)], "ERROR")
+        return FINISHED
+
+
+class POSEFIELD_OT_import_clip(bpy.types.Operator):
+    """Import the clip at these controls as an action"""
+
+    bl_idname = "posefield.import_clip"
+    bl_label = "Import clip"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    model: StringProperty(name="Model", description="Name of a model; the panel's, if empty")
+    controls: StringProperty(
+        name="Controls",
+        description="JSON object of values by control; the panel's for those it leaves out",
+    )
+    onto: EnumProperty(
+        name="Onto",
+        items=[
+            ("NEW", "A new armature", "Made for the clip, with its bone lengths"),
+            ("ACTIVE", "The active armature", "Whose bones have the names of the clip's joints"),
+        ],
+    )
+    lengths: EnumProperty(
+        name="Bone lengths",
+        items=[
+            ("ARMATURE", "The armature's", "Bones turn as in the clip and keep their lengths"),
+            ("CLIP", "The clip's", "Bones move to where the clip's joints are"),
+        ],
+    )
+    set_scene: BoolProperty(
+        name="Set scene rate and range",
+        description="The scene plays the clip as fast as it is, and from end to end",
+        default=True,
+    )
+
+    def execute(self, context):
+        """Ask first, then look whether the clip fits, and only then change anything."""
+        try:
+            armature = self._armature(context)
+            self._pick(context)
+            question = questions.question(context.scene, others := self._controls(context.scene))
+            clip = clips.ask(preferences.service(context), question)
+            said = self._put(context, armature, clip, question.loop)
+        except faults.Fault as fault:
+            return _ended(self, [str(fault)], "ERROR")
+        session.current.clip = clip
+        sliders.put(context.scene, questions.card_of(context.scene), others)
+        return _ended(self, said)
+
+    def _armature(self, context):
+        if self.onto == "NEW":
+            return None
+        found = context.view_layer.objects.active
+        if found is None or found.type != "ARMATURE":
+            raise faults.Mismatch(
+                f"the active object is {found.name if found else 'none'}, expected an armature"
+            )
+        if found.mode == "EDIT":
+            raise faults.Mismatch(f"{found.name} is being edited: leave edit mode first")
+        return found
+
+    def _pick(self, context) -> None:
+        scene = context.scene
+        if self.model and self.model != scene.posefield.model_name:
+            asked = preferences.service(context)
+            questions.take(scene, self.model, cards.get(asked, self.model))
+        elif session.current.card is None:
+            questions.refresh(context, scene)
+
+    def _controls(self, scene) -> dict[str, float]:
+        try:
+            given = {
+                name: float(value) for name, value in json.loads(self.controls or "{}").items()
+            }
+        except (ValueError, TypeError, AttributeError) as fault:
+            raise faults.Fault(
+                f"controls are {self.controls!r}, expected numbers by name"
+            ) from fault
+        known = [control.name for control in questions.card_of(scene).controls]
+        unknown = sorted(set(given) - set(known))
+        if unknown:
+            raise faults.Fault(f"no control is named {unknown[0]}; there are {', '.join(known)}")
+        return given
+
+    def _put(self, context, armature, clip: Clip, loop: bool) -> list[str]:
+        scene, card = context.scene, questions.card_of(context.scene)
+        said, keep_lengths = [], False
+        if armature is None:
+            armature = rig.make(context, card, clip)
+        else:
+            rig.check(armature, clip)
+            keep_lengths = self.lengths == "ARMATURE"
+            said = bones.differences(clip, rig.rest(armature, clip)) if keep_lengths else []
+            said += rig.settle(armature)
+        said += action.begin(armature, card.name)
+        if self.set_scene:
+            said += placing.set_scene(scene, armature, clip, loop)
+        placing.put(scene, armature, clip, keep_lengths, loop)
+        scene.posefield.character = armature
+        return [_summary(card, armature, clip), *said, *placing.unrepeated(clip, loop)]
+
+
+def _summary(card: Card, armature, clip: Clip) -> str:
+    return f"{card.name} on {armature.name}: {len(clip)} frames at {clip.rate:g} a second"
+
+
+CLASSES = (POSEFIELD_OT_refresh, POSEFIELD_OT_reset, POSEFIELD_OT_import_clip)

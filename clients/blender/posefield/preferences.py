@@ -1,0 +1,70 @@
+"""Where the service is and who asks it: kept in Blender's preferences, not in files of scenes."""
+
+import bpy
+from bpy.props import FloatProperty, StringProperty
+
+from .without_blender import faults
+from .without_blender.service import Service
+
+
+class PosefieldPreferences(bpy.types.AddonPreferences):
+    """Address, key and patience."""
+
+    bl_idname = __package__
+
+    address: StringProperty(
+        name="Service",
+        description="Address of the posefield service",
+        default="http://127.0.0.1:8000",
+    )
+    key: StringProperty(
+        name="API key",
+        description="Sent with every question, where the service asks for one",
+        subtype="PASSWORD",
+    )
+    seconds: FloatProperty(
+        name="Timeout",
+        description="How long an answer may take, s; Blender waits that long at most",
+        default=5.0,
+        min=0.1,
+        soft_max=60.0,
+    )
+
+    def draw(self, _context):
+        """Settings, and what becomes of the key."""
+        self.layout.prop(self, "address")
+        self.layout.prop(self, "key")
+        self.layout.prop(self, "seconds")
+        if self.key:
+            self.layout.label(
+                text="The key is kept as plain text in Blender's preferences", icon="INFO"
+            )
+        if self.key and not _is_secret(self.address):
+            self.layout.label(text="Without https others on the way can read the key", icon="ERROR")
+
+
+def of(context) -> PosefieldPreferences:
+    """The add-on's settings."""
+    return context.preferences.addons[__package__].preferences
+
+
+def service(context) -> Service:
+    """The service that is asked; BadAddress, or Offline where Blender may not ask it."""
+    own = of(context)
+    found = Service(own.address, own.key, own.seconds)
+    if not found.is_here and not bpy.app.online_access:
+        raise faults.Offline(
+            f"{own.address} is another machine, and Blender is set to stay offline:"
+            " Preferences, System, Allow Online Access"
+        )
+    return found
+
+
+def _is_secret(address: str) -> bool:
+    try:
+        return Service(address).is_secret
+    except faults.BadAddress:
+        return True
+
+
+CLASSES = (PosefieldPreferences,)

@@ -1,0 +1,126 @@
+"""The question for a clip, and the clip that comes back, already with Z up."""
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import axes, faults
+from .cards import parents_by_name
+from .service import Service, fetch, path_of
+
+Floats = npt.NDArray[np.float64]
+
+UNIT = 1e-3
+"""How far the length of a quaternion may be from one."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a model.
+
+    model: name, or name@hash. controls: in the units of its card. fps: frames a second. performer:
+    None for somebody who was never seen. level: of detail, 0 the finest.
+    """
+
+    model: str
+    controls: dict[str, float]
+    fps: float = 30.0
+    performer: str | None = None
+    level: int = 0
+    root: str = "travelling"
+    loop: bool = False
+
+    def body(self) -> dict[str, Any]:
+        """The same as the service reads it."""
+        return {
+            "controls": self.controls,
+            "fps": self.fps,
+            "performer": self.performer,
+            "level": self.level,
+            "root": self.root,
+            "loop": self.loop,
+            "unit": "m",
+            "up": "y",
+        }
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A motion with Z up, in metres.
+
+    parents: of each joint by name, None for the root. rotations (F, J, 4): unit quaternions w x y z
+    local to the parent, neighbours close. path (F, 3): of the root. offsets (J, 3): from the
+    parents; the root's is zero. rate: frames a second. trust: what the service says of it.
+    """
+
+    parents: dict[str, str | None]
+    rotations: Floats
+    path: Floats
+    offsets: Floats
+    rate: float
+    trust: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def names(self) -> list[str]:
+        """Joints, parents first."""
+        return list(self.parents)
+
+    @property
+    def sigma(self) -> float:
+        """How far a captured clip would lie from this one, m."""
+        return float(self.trust["sigma"])
+
+    def __len__(self) -> int:
+        return len(self.path)
+
+
+def ask(service: Service, question: Question) -> Clip:
+    """The clip; faults of the service and of what it sends."""
+    content = fetch(service, path_of(question.model) + "/clip.npz", question.body())
+    return decode(content)
+
+
+def decode(content: bytes) -> Clip:
+    """Clip of an npz file with Y up, in metres; Unintelligible says what is wrong with it."""
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as found:
+            return _clip(found)
+    except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as fault:
+        raise faults.Unintelligible(f"the clip cannot be read: {fault}") from fault
+
+
+def _clip(found: Any) -> Clip:
+    names = [str(name) for name in found["names"]]
+    rotations = np.asarray(found["rotations"], dtype=float)
+    path = np.asarray(found["root_position"], dtype=float)
+    offsets = np.asarray(found["bone_offsets"], dtype=float)
+    _check(json.loads(str(found["units"])), names, (rotations, path, offsets))
+    return Clip(
+        parents=parents_by_name(names, found["parents"].tolist()),
+        rotations=axes.unrolled(axes.z_up_turns(rotations)),
+        path=axes.z_up(path),
+        offsets=axes.z_up(offsets),
+        rate=float(found["rate"]),
+        trust=json.loads(str(found["trust"])),
+    )
+
+
+def _check(units: dict[str, str], names: list[str], arrays: tuple[Floats, Floats, Floats]) -> None:
+    if (units["length"], units["up"]) != ("metre", "Y"):
+        raise ValueError(f"lengths in {units['length']} with {units['up']} up, expected metre, Y")
+    rotations, path, offsets = arrays
+    frames, joints = len(path), len(names)
+    found = rotations.shape, path.shape, offsets.shape
+    expected = (frames, joints, 4), (frames, 3), (joints, 3)
+    if found != expected or not frames:
+        raise ValueError(f"arrays of shapes {found}, expected {expected}")
+    if not all(np.isfinite(values).all() for values in arrays):
+        raise ValueError("numbers that are not finite")
+    furthest = np.abs(np.linalg.norm(rotations, axis=-1) - 1).max()
+    if furthest > UNIT:
+        raise ValueError(f"a quaternion whose length is {furthest:.2g} off one")

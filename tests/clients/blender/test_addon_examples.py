@@ -1,0 +1,52 @@
+"""The examples beside the contract, of the operations that the add-on asks."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from without_blender import axes, cards, clips, service
+from without_blender.clips import Question
+from without_blender.service import Service
+
+EXAMPLES = Path(__file__).parents[3] / "api/examples"
+
+
+def read(name, part):
+    return json.loads((EXAMPLES / name / f"{part}.json").read_bytes())
+
+
+@pytest.mark.parametrize("name", ["getLiveness", "listModels", "getModel"])
+def test_what_is_asked_by_get(name, address):
+    found = json.loads(service.fetch(Service(address), read(name, "request")["path"]))
+    expected = read(name, "response")["body"]
+    if name == "listModels":
+        named = [each["name"] for each in expected["models"]]
+        assert [each for each, _ in service.models(Service(address))] == named
+    else:
+        assert {key: found[key] for key in expected} == expected
+
+
+def test_the_card_is_read(address):
+    card = cards.get(Service(address), read("getModel", "request")["path"].rpartition("/")[2])
+    assert list(card.performers) == read("getModel", "response")["body"]["performers"]
+    assert [control.name for control in card.controls] == list(
+        read("queryClipNpz", "request")["body"]["controls"]
+    )
+
+
+def test_the_clip_of_the_example_is_the_one_that_the_add_on_asks_for(address):
+    """The example asks with Z up in centimetres; the add-on turns what comes with Y up itself."""
+    example = read("queryClipNpz", "request")
+    content = service.fetch(Service(address), example["path"], example["body"])
+    with np.load(io.BytesIO(content), allow_pickle=False) as found:
+        path, offsets = found["root_position"] / 100, found["bone_offsets"] / 100
+        rotations = axes.unrolled(found["rotations"].astype(float))
+    body = example["body"]
+    clip = clips.ask(Service(address), Question("reach", body["controls"], fps=body["fps"]))
+    count = len(path)
+    np.testing.assert_allclose(clip.path[:count], path, atol=1e-6)
+    np.testing.assert_allclose(clip.offsets, offsets, atol=1e-6)
+    np.testing.assert_allclose(clip.rotations[:count], rotations, atol=1e-6)
+    assert np.abs(clip.path[:count, [0, 2, 1]] - path).max() > 0.1

@@ -1,0 +1,91 @@
+"""What the add-on must have said and done while it was driven."""
+
+from typing import Any
+
+OTHER = "something else"
+
+
+def faults(facts: dict[str, Any]) -> list[str]:
+    """Facts that are not as they should be, and those of which anything would do."""
+    wrong = [f"{name}: {facts[name]}" for name, right in FACTS.items() if not right(facts[name])]
+    return wrong + [f"{name}: not looked at" for name, right in FACTS.items() if right(OTHER)]
+
+
+def _holds(*words: str) -> Any:
+    """Whether all words stand in what was said."""
+    return lambda said: all(word in str(said) for word in words)
+
+
+def _is(value: Any) -> Any:
+    return lambda found: found == value
+
+
+FACTS: dict[str, Any] = {
+    "installed": _is(["FINISHED"]),
+    "an import changes the scene": _is(True),
+    "fps": _is([30, 1.0]),
+    "actions": _is(["reaching"]),
+    "actions after live": _is(["reaching"]),
+    "timer runs": _is(True),
+    "not live: unchanged": _is(True),
+    "undone: as before": _is(True),
+    "redone: armatures": _is(1),
+    "other axes: armatures": _is(1),
+    "other axes: same": _is(True),
+    "longer bones said": _holds("bone lengths stay", "cm off", "set aside", "quaternions now"),
+    "disturbed": _holds(
+        "bones with constraints, which move them away from the clip: 1",
+        "beside the clip: 1",
+        "tilted by 20 degrees",
+    ),
+    "uneven scale": _holds("scaled by [1.0, 2.0, 1.0]"),
+    "no inheritance": _holds("1 bones", "Inherit Rotation"),
+    "being edited": _holds("leave edit mode first"),
+    "other names": _holds("it lacks", "it has besides Bone3, Bone4", "33 bones"),
+    "other names: unchanged": _is(True),
+    "another tree": _holds("elsewhere in the tree", "expected"),
+    "no armature": _holds("the active object is none, expected an armature"),
+    "no such control": _holds("no control is named speed; there are stature"),
+    "no numbers": _holds("expected numbers by name"),
+    "no such model": _holds("404", "nobody"),
+    "elsewhere": _holds("stay offline"),
+    "no address": _holds("'somewhere'", "expected one like http://"),
+    "said at 24.0": lambda said: _holds("frames at 24")(said) and not _holds("scene rate")(said),
+    "said at 29.97": _holds("scene rate 24 -> 29.97 frames a second"),
+    "left rate": _is([24, 250]),
+    "stroll range of a loop": _is(0),
+    "stroll repeated": _is(True),
+    "armature deleted": _holds("import a clip first"),
+    "armature deleted: live": _is(False),
+    "armature deleted by hand": _holds("import a clip first"),
+    "reload: next look": _is(None),
+    "reload: thread ended": _is(True),
+    "reload: live": _is(False),
+    "reload: unchanged": _is(True),
+    "reload: stature": _is(1.7),
+    "another action": _holds("(Own) is no imported clip"),
+    "another action: unchanged": _is(True),
+    "drawn before": lambda rows: "Model" in rows and "Import clip" not in rows,
+    "drawn after": lambda rows: (
+        _holds("'stature (m)'", "A captured clip would lie")(rows) and "Outside" not in str(rows)
+    ),
+    "drawn outside": lambda rows: (
+        _holds("Outside: stature is 2.5, sampled: ")(rows) and "would lie" not in str(rows)
+    ),
+    "by hash": _is(""),
+    "drawn preferences": _holds("plain text", "Without https"),
+    "slider": lambda found: found[2] < found[0] < found[1] < found[3],
+    "slider words": _holds("stature (m)", "sampled: "),
+    "stopped": _holds("no service answers at"),
+    "stopped, live": _holds("no service answers at"),
+    "stopped: drawn": _holds("no service answers at"),
+    "stopped: unchanged": _is(True),
+    "on: timer": _is(True),
+    "on: threads": _is(["posefield"]),
+    "on: left": _holds("posefield_controls", "before_load", "after_load"),
+    "off: timer": _is(False),
+    "off: thread ended": _is(True),
+    "off: threads": _is([]),
+    "off: left": _is([]),
+    "on again": _is(True),
+}
