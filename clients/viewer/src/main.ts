@@ -3,13 +3,19 @@
 import { Client } from "@posefield/client";
 
 import "./style.css";
+import { mount as mountCrowd } from "./crowd.ts";
+import { mount as mountLevels } from "./levels.ts";
+import { mount as mountMap } from "./map.ts";
 import type { Page } from "./page.ts";
 import { Scene } from "./scene.ts";
-import { Store } from "./state.ts";
+import { Store, type View } from "./state.ts";
 
 async function start(): Promise<void> {
   const source = new Client("");
-  const [model] = await source.models();
+  const [name, rest] = location.hash.slice(1).split("?");
+  const hash = new URLSearchParams(rest);
+  const models = await source.models();
+  const model = models.find((each) => each.name === name) ?? models[0];
   const card = await source.card(model!.name);
   const controls = Object.fromEntries(
     card.controls.map((control) => [control.name, control.default]),
@@ -28,9 +34,11 @@ async function start(): Promise<void> {
     body: "mannequin",
     ghost: false,
     feet: false,
-    view: "one",
+    view: (hash.get("~view") ?? "one") as View,
     across,
     along,
+    crowd: 300,
+    pixels: 4,
   });
   const page: Page = {
     store,
@@ -40,6 +48,17 @@ async function start(): Promise<void> {
     notice: console.error,
     signal: new AbortController().signal,
   };
+  const [stage, side] = ["#stage", "#side"].map(
+    (where) => document.querySelector<HTMLElement>(where)!,
+  );
+  mountLevels(stage!, page);
+  mountCrowd(stage!, page);
+  mountMap(side!, page);
+  page.scene.add((seconds) => {
+    const { time, playing, speed } = store.state;
+    if (playing) store.set({ time: (time + seconds * speed) % card.durations[0]! });
+    return playing;
+  });
   page.scene.redraw();
 }
 

@@ -22,6 +22,9 @@ export interface State {
   /** The two controls of the map. */
   readonly across: string;
   readonly along: string;
+  /** Characters of the crowd, and the pixels that their errors may cover. */
+  readonly crowd: number;
+  readonly pixels: number;
 }
 
 export type Listener = (state: State, changed: ReadonlySet<keyof State>) => void;

@@ -1,0 +1,237 @@
+/** A map's drawing: sigma as colours, captured clips as dots, and where one is. */
+
+import type { ModelCard, SigmaGrid } from "@posefield/client";
+
+import { property, viridis } from "./colours.ts";
+import { figure } from "./markup.ts";
+
+export type Control = ModelCard["controls"][number];
+
+/** How far the map goes beyond what was sampled, as a share of it. */
+export const MARGIN = 0.25;
+const [LEFT, RIGHT, TOP, BOTTOM] = [46, 10, 10, 34];
+const [DOT, RING] = [2.5, 9];
+
+/** A captured clip on the map; `error` is the share of the largest, `near` 1 where one is. */
+export interface Dot {
+  readonly index: number;
+  readonly at: readonly [number, number];
+  readonly error: number;
+  readonly near: number;
+}
+
+/** Values of two controls as places on a canvas of a size in CSS pixels, and back. */
+export class Frame {
+  readonly left = LEFT;
+  readonly top = TOP;
+  readonly width: number;
+  readonly height: number;
+  readonly #controls: readonly [Control, Control];
+
+  constructor(across: Control, along: Control, width: number, height: number) {
+    this.#controls = [across, along];
+    this.width = Math.max(1, width - LEFT - RIGHT);
+    this.height = Math.max(1, height - TOP - BOTTOM);
+  }
+
+  x(value: number): number {
+    return this.left + this.width * share(this.#controls[0], value);
+  }
+
+  y(value: number): number {
+    return this.top + this.height * (1 - share(this.#controls[1], value));
+  }
+
+  /** The values at a place, within the map. */
+  values(x: number, y: number): [number, number] {
+    const [across, along] = this.#controls;
+    return [
+      valued(across, (x - this.left) / this.width),
+      valued(along, 1 - (y - this.top) / this.height),
+    ];
+  }
+
+  get range(): [number, number, number, number] {
+    const [a, b] = this.#controls;
+    const [x, y] = [this.x(a.minimum), this.y(b.maximum)];
+    return [x, y, this.x(a.maximum) - x, this.y(b.minimum) - y];
+  }
+}
+
+function share(control: Control, value: number): number {
+  const size = control.maximum - control.minimum;
+  return ((value - control.minimum) / size + MARGIN) / (1 + 2 * MARGIN);
+}
+
+function valued(control: Control, place: number): number {
+  const size = control.maximum - control.minimum;
+  const found =
+    control.minimum + size * (Math.min(1, Math.max(0, place)) * (1 + 2 * MARGIN) - MARGIN);
+  return rounded(found, size);
+}
+
+/** To a thousandth of the range, so that numbers stay short. */
+export function rounded(value: number, range: number): number {
+  const step = 10 ** Math.floor(Math.log10(range / 1000));
+  return Number((Math.round(value / step) * step).toPrecision(10));
+}
+
+/** Least and greatest sigma, m, within what was sampled; beyond, colours are the last one. */
+export function extent(grid: SigmaGrid): [number, number] {
+  const all = grid.sigma.flat();
+  const inside = grid.inside.flat();
+  const sampled = all.filter((_, i) => inside[i]);
+  const counted = sampled.length ? sampled : all;
+  return [Math.min(...counted), Math.max(...counted)];
+}
+
+/** A picture of one pixel a number, which the canvas stretches smoothly. */
+export function heat(grid: SigmaGrid): HTMLCanvasElement {
+  const [low, high] = extent(grid);
+  const [rows, columns] = [grid.sigma.length, grid.sigma[0]!.length];
+  const canvas = Object.assign(document.createElement("canvas"), { width: columns, height: rows });
+  const pen = canvas.getContext("2d")!;
+  const image = pen.createImageData(columns, rows);
+  for (let row = 0; row < rows; row++) {
+    for (let column = 0; column < columns; column++) {
+      // Rows go up, pictures down.
+      const at = 4 * ((rows - 1 - row) * columns + column);
+      viridis((grid.sigma[row]![column]! - low) / (high - low || 1), image.data, at);
+      image.data[at + 3] = 255;
+    }
+  }
+  pen.putImageData(image, 0, 0);
+  return canvas;
+}
+
+export interface Drawing {
+  readonly frame: Frame;
+  readonly controls: readonly [Control, Control];
+  readonly picture: HTMLCanvasElement | null;
+  /** Whether the controls that are no axes lie inside what was sampled. */
+  readonly inside: boolean;
+  readonly dots: readonly Dot[];
+  readonly point: readonly [number, number];
+  readonly chosen: number | null;
+}
+
+export function draw(pen: CanvasRenderingContext2D, it: Drawing): void {
+  const { frame } = it;
+  pen.save();
+  pen.beginPath();
+  pen.rect(frame.left, frame.top, frame.width, frame.height);
+  pen.fillStyle = property("--line", "#8884");
+  pen.fill();
+  pen.clip();
+  if (it.picture) stretch(pen, it.picture, frame);
+  hatch(pen, it);
+  for (const dot of it.dots) mark(pen, frame, dot, dot.index === it.chosen);
+  cross(pen, frame, it.point);
+  pen.restore();
+  axes(pen, it);
+}
+
+/** Numbers stand in the middle of their pixels, so the picture's border lies outside the map. */
+function stretch(pen: CanvasRenderingContext2D, picture: HTMLCanvasElement, frame: Frame): void {
+  const [w, h] = [frame.width / (picture.width - 1), frame.height / (picture.height - 1)];
+  pen.imageSmoothingEnabled = true;
+  pen.imageSmoothingQuality = "high";
+  const size = [frame.width + w, frame.height + h] as const;
+  pen.drawImage(picture, frame.left - w / 2, frame.top - h / 2, ...size);
+}
+
+/** Grey with stripes over all that was never sampled, and a border around what was. */
+function hatch(pen: CanvasRenderingContext2D, { frame, inside }: Drawing): void {
+  pen.save();
+  const range = frame.range;
+  pen.beginPath();
+  pen.rect(frame.left, frame.top, frame.width, frame.height);
+  if (inside) pen.rect(...range);
+  pen.clip("evenodd");
+  pen.fillStyle = "rgb(110 116 128 / 62%)";
+  pen.fillRect(frame.left, frame.top, frame.width, frame.height);
+  pen.strokeStyle = "rgb(255 255 255 / 34%)";
+  pen.lineWidth = 1;
+  pen.beginPath();
+  for (let x = frame.left - frame.height; x < frame.left + frame.width; x += 7) {
+    pen.moveTo(x, frame.top + frame.height);
+    pen.lineTo(x + frame.height, frame.top);
+  }
+  pen.stroke();
+  pen.restore();
+  pen.strokeStyle = "#fffc";
+  pen.lineWidth = 1;
+  pen.strokeRect(...range);
+}
+
+function mark(pen: CanvasRenderingContext2D, frame: Frame, dot: Dot, chosen: boolean): void {
+  const [x, y] = [frame.x(dot.at[0]), frame.y(dot.at[1])];
+  pen.globalAlpha = chosen ? 1 : 0.3 + 0.7 * dot.near;
+  circle(pen, x, y, DOT);
+  pen.fillStyle = chosen ? "#ff7a1a" : "#fff";
+  pen.fill();
+  pen.strokeStyle = "#111c";
+  pen.lineWidth = 1;
+  pen.stroke();
+  if (dot.error > 0) {
+    circle(pen, x, y, DOT + 1 + RING * dot.error);
+    pen.strokeStyle = chosen ? "#ff7a1a" : "#fffd";
+    pen.lineWidth = chosen ? 2 : 1;
+    pen.stroke();
+  }
+  pen.globalAlpha = 1;
+}
+
+function cross(
+  pen: CanvasRenderingContext2D,
+  frame: Frame,
+  point: readonly [number, number],
+): void {
+  const [x, y] = [frame.x(point[0]), frame.y(point[1])];
+  for (const [width, colour] of [
+    [3.5, "#000b"],
+    [1.5, "#fff"],
+  ] as const) {
+    pen.lineWidth = width;
+    pen.strokeStyle = colour;
+    pen.beginPath();
+    pen.moveTo(x, frame.top);
+    pen.lineTo(x, y - 7);
+    pen.moveTo(x, y + 7);
+    pen.lineTo(x, frame.top + frame.height);
+    pen.moveTo(frame.left, y);
+    pen.lineTo(x - 7, y);
+    pen.moveTo(x + 7, y);
+    pen.lineTo(frame.left + frame.width, y);
+    pen.moveTo(x + 7, y);
+    pen.arc(x, y, 7, 0, 2 * Math.PI);
+    pen.stroke();
+  }
+}
+
+function circle(pen: CanvasRenderingContext2D, x: number, y: number, radius: number): void {
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+}
+
+function axes(pen: CanvasRenderingContext2D, { frame, controls }: Drawing): void {
+  pen.fillStyle = property("--soft", "#667");
+  pen.font = "11px system-ui, sans-serif";
+  const [across, along] = controls;
+  const below = frame.top + frame.height + 14;
+  pen.textAlign = "center";
+  for (const value of [across.minimum, across.maximum])
+    pen.fillText(figure(value), frame.x(value), below);
+  pen.fillText(titled(across), frame.left + frame.width / 2, below + 14);
+  pen.textAlign = "right";
+  for (const value of [along.minimum, along.maximum])
+    pen.fillText(figure(value), frame.left - 5, frame.y(value) + 4);
+  pen.save();
+  pen.translate(12, frame.top + frame.height / 2);
+  pen.rotate(-Math.PI / 2);
+  pen.textAlign = "center";
+  pen.fillText(titled(along), 0, 0);
+  pen.restore();
+}
+
+const titled = (control: Control): string => `${control.name} (${control.unit})`;

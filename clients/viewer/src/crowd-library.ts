@@ -1,0 +1,167 @@
+/** The motions that a crowd shares: few are asked for, each at every level, and laid out once. */
+
+import type { CrowdPoses, CrowdQuestion, ModelCard } from "@posefield/client";
+
+import type { Source } from "./page.ts";
+import { Rig, SIZE } from "./rig.ts";
+import { place, placed } from "./skeleton.ts";
+
+/** Motions, and frames of each: what lies between two frames is mixed from them. */
+export const [MOTIONS, FRAMES] = [24, 24];
+/** Captured clips that are tried, and the fastest turn, rad/s, of who walks a gentle way. */
+const [TRIED, SHARPEST] = [120, 0.2];
+
+export interface Library {
+  readonly rig: Rig;
+  readonly levels: number;
+  readonly count: number;
+  /** Whether characters go somewhere; else they stay and repeat their clip there and back. */
+  readonly walks: boolean;
+  /** SIZE numbers for each level, motion, frame (FRAMES + 1) and bone. */
+  readonly laid: Float32Array;
+  /** For each motion: seconds, metres a second, rad to the left of the heading, rad a second. */
+  readonly seconds: Float32Array;
+  readonly speeds: Float32Array;
+  readonly drifts: Float32Array;
+  readonly turning: Float32Array;
+}
+
+interface Row {
+  readonly controls: readonly number[];
+  readonly performer: string | null;
+}
+
+/** Five questions for a model of four levels: what its clips do, and then their poses. */
+export async function library(
+  source: Source,
+  model: string,
+  card: ModelCard,
+  signal: AbortSignal,
+): Promise<Library> {
+  const walks = card.cyclic && card.root === "travelling";
+  const tried = rows(card);
+  const ask = async (
+    rows: readonly Row[],
+    rest: Partial<CrowdQuestion> & Pick<CrowdQuestion, "time">,
+  ) => source.crowd(model, { ...asked(card, rows), ...rest }, signal);
+  const ways = await journeys(tried, ask);
+  const gentle = tried.map((_, i) => i).filter((i) => Math.abs(ways.turning[i]!) <= SHARPEST);
+  const chosen = spread(walks && gentle.length >= 6 ? gentle : tried.map((_, i) => i), MOTIONS);
+  const rig = new Rig(card);
+  const size = chosen.length * (FRAMES + 1) * rig.bones.length * SIZE;
+  const laid = new Float32Array(card.levels.length * size);
+  const own = chosen.map((i) => tried[i]!);
+  await Promise.all(
+    card.levels.map(async (_, level) => {
+      const { duration } = await ask(own, { time: 0, level });
+      const repeated = own.flatMap((row) => Array<Row>(FRAMES + 1).fill(row));
+      const time = repeated.map(
+        (_, i) => (duration[Math.floor(i / (FRAMES + 1))]! * (i % (FRAMES + 1))) / FRAMES,
+      );
+      const poses = await ask(repeated, { time, level, root: walks ? "in_place" : "travelling" });
+      lay(laid.subarray(level * size, (level + 1) * size), rig, poses, walks);
+    }),
+  );
+  const pick = (all: Float32Array) => Float32Array.from(chosen, (i) => all[i]!);
+  const [seconds, speeds] = [pick(ways.seconds), pick(ways.speeds)];
+  const [drifts, turning] = [pick(ways.drifts), pick(ways.turning)];
+  return {
+    rig,
+    levels: card.levels.length,
+    count: chosen.length,
+    walks,
+    laid,
+    seconds,
+    speeds,
+    drifts,
+    turning,
+  };
+}
+
+function rows(card: ModelCard): Row[] {
+  const all = card.examples.map((controls, i) => {
+    const who = card.moved_by[i];
+    return { controls, performer: who === undefined ? null : (card.performers[who] ?? null) };
+  });
+  return spread(all, TRIED);
+}
+
+/** So many of a list, evenly. */
+function spread<Item>(all: readonly Item[], count: number): Item[] {
+  const taken = Math.min(count, all.length);
+  return Array.from({ length: taken }, (_, i) => all[Math.floor((i * all.length) / taken)]!);
+}
+
+function asked(
+  card: ModelCard,
+  rows: readonly Row[],
+): Pick<CrowdQuestion, "controls"> & Partial<CrowdQuestion> {
+  const controls = Object.fromEntries(
+    card.controls.map(({ name }, i) => [name, rows.map((row) => row.controls[i]!)]),
+  );
+  const performer = card.performers.length ? rows.map((row) => row.performer) : null;
+  return { controls, performer };
+}
+
+type Ask = (
+  rows: readonly Row[],
+  rest: Partial<CrowdQuestion> & Pick<CrowdQuestion, "time">,
+) => Promise<CrowdPoses>;
+
+type Journeys = Pick<Library, "seconds" | "speeds" | "drifts" | "turning">;
+
+/** How far clips lead: an arc, gone evenly (service/synthesis/walk/stride.py says the same). */
+async function journeys(rows: readonly Row[], ask: Ask): Promise<Journeys> {
+  const start = await ask(rows, { time: 0 });
+  const end = await ask(rows, { time: [...start.duration] });
+  const joints = start.names.length;
+  const found = rows.map((_, i) => {
+    const turn = turned(start.rotations, end.rotations, 4 * joints * i);
+    const gap = [0, 2].map(
+      (axis) => end.rootPosition[3 * i + axis]! - start.rootPosition[3 * i + axis]!,
+    );
+    const [x, z] = [gap[0]!, gap[1]!];
+    // An arc of a turn h leads as far as its way times sin(h/2) / (h/2), and h/2 to the left.
+    const bent = Math.abs(turn) < 1e-6 ? 1 : Math.sin(turn / 2) / (turn / 2);
+    return {
+      turn,
+      speed: Math.hypot(x, z) / bent / start.duration[i]!,
+      drift: Math.atan2(x, z) - turn / 2,
+    };
+  });
+  return {
+    seconds: start.duration,
+    speeds: Float32Array.from(found, ({ speed }) => speed),
+    drifts: Float32Array.from(found, ({ drift }) => drift),
+    turning: Float32Array.from(found, ({ turn }, i) => turn / start.duration[i]!),
+  };
+}
+
+/** Angle about +Y between two roots' rotations. */
+function turned(from: Float32Array, to: Float32Array, at: number): number {
+  const [a, b, c, d] = [from[at]!, from[at + 1]!, from[at + 2]!, from[at + 3]!];
+  const [e, f, g, h] = [to[at]!, to[at + 1]!, to[at + 2]!, to[at + 3]!];
+  const w = e * a + f * b + g * c + h * d;
+  const y = -e * c - f * d + g * a + h * b;
+  const angle = 2 * Math.atan2(y, w);
+  return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
+}
+
+/** Bones of all poses where they lie; a walker's way begins at the origin. */
+function lay(out: Float32Array, rig: Rig, poses: CrowdPoses, walks: boolean): void {
+  const joints = poses.names.length;
+  const frame = placed(joints);
+  const [turns, shifts] = [4 * joints, 3 * joints];
+  for (let row = 0; row < poses.levels.length; row++) {
+    const first = 3 * (row - (row % (FRAMES + 1)));
+    const root = poses.rootPosition.slice(3 * row, 3 * row + 3);
+    if (walks) {
+      root[0]! -= poses.rootPosition[first]!;
+      root[2]! -= poses.rootPosition[first + 2]!;
+    }
+    const offsets = poses.boneOffsets.subarray(shifts * row, shifts * (row + 1));
+    const rotations = poses.rotations.subarray(turns * row, turns * (row + 1));
+    place(frame, poses.parents, offsets, rotations, root, 0);
+    rig.lay(out, row * rig.bones.length * SIZE, rig.shape(offsets), frame);
+  }
+}

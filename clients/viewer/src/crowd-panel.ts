@@ -1,0 +1,115 @@
+/** What the crowd is asked to be, and what it costs: sliders, counts and times. */
+
+import { element, figure, labelled } from "./markup.ts";
+import type { Page } from "./page.ts";
+import type { State } from "./state.ts";
+
+const [FEWEST, MOST] = [50, 1000];
+/** Powers of two between which the limit in pixels lies. */
+const [SHARP, COARSE] = [-2, 4];
+
+export class Panel {
+  readonly #host = element("section", { className: "crowd", hidden: true, ariaLabel: "Crowd" });
+  readonly #said = element("p", { className: "crowd-said" });
+  readonly #time = element("p", { className: "crowd-time" });
+  readonly #seen = element("p", { className: "crowd-time" });
+  readonly #counts: readonly HTMLElement[];
+
+  constructor(host: HTMLElement, page: Page) {
+    this.#counts = page.card.levels.map(() => element("b", {}, "–"));
+    const levels = page.card.levels.map((_, level) =>
+      element(
+        "li",
+        { className: `crowd-${Math.min(level, 3)}` },
+        `level ${level}`,
+        this.#counts[level]!,
+      ),
+    );
+    const walks = page.card.cyclic && page.card.root === "travelling";
+    const what = walks
+      ? "Everybody walks a straight or gently bent way, and comes back at the field's other side."
+      : "This model does not walk: everybody stays, and goes through a captured clip's controls there and back.";
+    this.#host.append(
+      element("h2", {}, "Crowd"),
+      element("p", { className: "crowd-said" }, what),
+      people(page),
+      limit(page),
+      element("ul", {}, ...levels),
+      this.#seen,
+      this.#time,
+      this.#said,
+    );
+    host.append(this.#host);
+    page.signal.addEventListener("abort", () => this.#host.remove());
+  }
+
+  show(shown: boolean): void {
+    this.#host.hidden = !shown;
+  }
+
+  say(text: string): void {
+    this.#said.textContent = text;
+  }
+
+  count(counts: Int32Array, seen: number): void {
+    this.#counts.forEach((host, level) => {
+      host.textContent = String(counts[level]);
+    });
+    this.#seen.textContent = `${seen} in view`;
+  }
+
+  /** Milliseconds from a frame to the next, and those of them that this page's own work takes. */
+  time(frame: number, own: number): void {
+    this.#host.dataset["frame"] = frame.toFixed(2);
+    this.#host.dataset["own"] = own.toFixed(2);
+    this.#time.textContent = `${figure(frame)} ms a frame (${Math.round(1000 / frame)} a second); moving all: ${own.toFixed(1)} ms`;
+  }
+}
+
+function people(page: Page): HTMLElement {
+  const range = { min: FEWEST, max: MOST, step: 50 };
+  const said = (value: number) => `${value} characters`;
+  return slider(page, "crowd", range, said, Number, (count) => count);
+}
+
+function limit(page: Page): HTMLElement {
+  const range = { min: SHARP, max: COARSE, step: 0.25 };
+  const said = (value: number) => `errors up to ${figure(value)} px`;
+  return slider(
+    page,
+    "pixels",
+    range,
+    said,
+    (place) => Number((2 ** place).toPrecision(3)),
+    Math.log2,
+  );
+}
+
+/** A slider of one of the state's numbers, with its value in words. */
+function slider(
+  page: Page,
+  key: "crowd" | "pixels",
+  range: { min: number; max: number; step: number },
+  said: (value: number) => string,
+  valued: (place: number) => number,
+  placed: (value: number) => number,
+): HTMLElement {
+  const words = element("span", {}, "");
+  const input = element("input", { type: "range" });
+  Object.assign(input, {
+    min: String(range.min),
+    max: String(range.max),
+    step: String(range.step),
+  });
+  const show = (state: State) => {
+    input.value = String(placed(state[key]));
+    words.textContent = said(state[key]);
+    input.setAttribute("aria-valuetext", words.textContent);
+  };
+  input.addEventListener("input", () => page.store.set({ [key]: valued(Number(input.value)) }));
+  page.signal.addEventListener("abort", page.store.listen(show));
+  show(page.store.state);
+  const host = labelled("", input);
+  host.replaceChildren(words, input);
+  return host;
+}

@@ -1,0 +1,122 @@
+/** Characters of a crowd: where each is, what it does, and its bones; typed arrays, filled in place. */
+
+import type { Vector3 } from "three";
+
+import { FRAMES, type Library } from "./crowd-library.ts";
+import { choose, type Ladder, type Lens, pixels } from "./detail.ts";
+import { SIZE } from "./rig.ts";
+
+/** Square metres to a character. */
+const ROOM = 9;
+/** Radius, m, about which a character is looked for in the view: a body with arms out. */
+export const REACH = 1.3;
+
+export class Crowd {
+  readonly count: number;
+  /** Half of the field's side, m. */
+  readonly half: number;
+  readonly x: Float32Array;
+  readonly z: Float32Array;
+  readonly heading: Float32Array;
+  readonly level: Int8Array;
+  readonly counts: Int32Array;
+  readonly #phase: Float32Array;
+  readonly #motion: Uint16Array;
+  readonly #library: Library;
+
+  constructor(library: Library, count: number) {
+    this.#library = library;
+    this.count = count;
+    this.half = Math.sqrt(count * ROOM) / 2;
+    [this.x, this.z] = [new Float32Array(count), new Float32Array(count)];
+    [this.heading, this.#phase] = [new Float32Array(count), new Float32Array(count)];
+    this.#motion = new Uint16Array(count);
+    this.level = new Int8Array(count).fill(-1);
+    this.counts = new Int32Array(library.levels);
+    this.#scatter();
+  }
+
+  /** One to a cell of a grid, somewhere in it; the same every time. */
+  #scatter(): void {
+    const random = numbers(1);
+    const side = Math.ceil(Math.sqrt(this.count));
+    const cell = (2 * this.half) / side;
+    for (let i = 0; i < this.count; i++) {
+      this.x[i] = (Math.floor(i / side) + 0.2 + 0.6 * random()) * cell - this.half;
+      this.z[i] = ((i % side) + 0.2 + 0.6 * random()) * cell - this.half;
+      this.heading[i] = 2 * Math.PI * random();
+      this.#phase[i] = random();
+      this.#motion[i] = Math.floor(random() * this.#library.count);
+    }
+  }
+
+  /** Everybody goes on for so many seconds; who leaves the field comes back at its other side. */
+  step(seconds: number): void {
+    const { seconds: lasting, speeds, drifts, turning, walks } = this.#library;
+    const [half, side] = [this.half, 2 * this.half];
+    for (let i = 0; i < this.count; i++) {
+      const motion = this.#motion[i]!;
+      const phase = this.#phase[i]! + seconds / lasting[motion]!;
+      // There and back takes two.
+      this.#phase[i] = phase % (walks ? 1 : 2);
+      if (!walks) continue;
+      const heading = this.heading[i]! + turning[motion]! * seconds;
+      const way = heading + drifts[motion]!;
+      const far = speeds[motion]! * seconds;
+      this.heading[i] = heading;
+      const x = this.x[i]! + far * Math.sin(way);
+      const z = this.z[i]! + far * Math.cos(way);
+      this.x[i] = x > half ? x - side : x < -half ? x + side : x;
+      this.z[i] = z > half ? z - side : z < -half ? z + side : z;
+    }
+  }
+
+  /** Levels by what shows; who has the camera inside is at the finest. */
+  detail(ladder: Ladder, lens: Lens, camera: Vector3, limit: number): void {
+    const wide = pixels(lens);
+    const [mx, my, mz] = [ladder.middle[0]!, ladder.middle[1]!, ladder.middle[2]!];
+    this.counts.fill(0);
+    for (let i = 0; i < this.count; i++) {
+      const [x, z] = [this.x[i]! + mx - camera.x, this.z[i]! + mz - camera.z];
+      const y = my - camera.y;
+      const far = Math.sqrt(x * x + y * y + z * z) - ladder.radius;
+      const level = far > 0 ? choose(ladder.errors, wide / far, limit, this.level[i]!) : 0;
+      this.level[i] = level;
+      this.counts[level]!++;
+    }
+  }
+
+  /** Matrices (16 numbers each) of character `i`'s bones, written into `out` from a bone on. */
+  fill(out: ArrayLike<number> & { [index: number]: number }, from: number, i: number): void {
+    const { laid, rig, count } = this.#library;
+    const bones = rig.bones.length;
+    const [cos, sin] = [Math.cos(this.heading[i]!), Math.sin(this.heading[i]!)];
+    const phase = this.#phase[i]! > 1 ? 2 - this.#phase[i]! : this.#phase[i]!;
+    const frame = Math.min(FRAMES - 1, Math.floor(phase * FRAMES));
+    const share = phase * FRAMES - frame;
+    const size = bones * SIZE;
+    let at = ((this.level[i]! * count + this.#motion[i]!) * (FRAMES + 1) + frame) * size;
+    let to = 16 * from;
+    for (let part = 0; part < 4 * bones; part++, at += 3, to += 4) {
+      const x = laid[at]! + share * (laid[at + size]! - laid[at]!);
+      const y = laid[at + 1]! + share * (laid[at + size + 1]! - laid[at + 1]!);
+      const z = laid[at + 2]! + share * (laid[at + size + 2]! - laid[at + 2]!);
+      const origin = (part & 3) === 3;
+      out[to] = cos * x + sin * z + (origin ? this.x[i]! : 0);
+      out[to + 1] = y;
+      out[to + 2] = cos * z - sin * x + (origin ? this.z[i]! : 0);
+      out[to + 3] = origin ? 1 : 0;
+    }
+  }
+}
+
+/** Even numbers from 0 to 1 of a seed (mulberry32). */
+function numbers(seed: number): () => number {
+  let state = seed;
+  return () => {
+    state = (state + 0x6d2b79f5) | 0;
+    let mixed = Math.imul(state ^ (state >>> 15), 1 | state);
+    mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
+    return ((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32;
+  };
+}

@@ -1,0 +1,236 @@
+/** A crowd coloured by level of detail, each character at the coarsest that does not show. */
+
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DynamicDrawUsage,
+  Frustum,
+  Group,
+  InstancedBufferAttribute,
+  InstancedMesh,
+  LineBasicMaterial,
+  LineSegments,
+  Matrix4,
+  MeshLambertMaterial,
+  Sphere,
+  Vector3,
+} from "three";
+
+import "./crowd.css";
+import { levelColour, onTheme, property } from "./colours.ts";
+import { type Library, library } from "./crowd-library.ts";
+import { Panel } from "./crowd-panel.ts";
+import { Crowd, REACH } from "./crowd-walk.ts";
+import { type Ladder, ladder } from "./detail.ts";
+import type { Mount, Page } from "./page.ts";
+import { boneShape } from "./rig.ts";
+import type { State } from "./state.ts";
+
+export const MOST = 1000;
+/** Metres between lines of the ground, and seconds between two readings of numbers. */
+const [GROUND, READING] = [5, 0.25];
+
+export const mount: Mount = (host, page) => new CrowdView(host, page).begin();
+
+class CrowdView {
+  readonly #page: Page;
+  readonly #panel: Panel;
+  readonly #group = new Group();
+  readonly #ladder: Ladder;
+  readonly #colours: Float32Array;
+  readonly #frustum = new Frustum();
+  readonly #sphere = new Sphere(new Vector3(), REACH);
+  #library: Library | null = null;
+  #loading = false;
+  #crowd: Crowd | null = null;
+  #mesh: InstancedMesh | null = null;
+  #ground: LineSegments<BufferGeometry, LineBasicMaterial> | null = null;
+  #before: { position: Vector3; target: Vector3 } | null = null;
+  #since = 0;
+  #frames = 0;
+  #spent = 0;
+  #begun = 0;
+
+  constructor(host: HTMLElement, page: Page) {
+    this.#page = page;
+    this.#ladder = ladder(page.card);
+    this.#colours = new Float32Array(3 * page.card.levels.length);
+    this.#panel = new Panel(host, page);
+    this.#group.visible = false;
+    page.scene.root.add(this.#group);
+  }
+
+  begin(): void {
+    const { store, scene, signal } = this.#page;
+    const ends = [
+      store.listen((state, changed) => this.#changed(state, changed)),
+      scene.add((seconds) => this.#step(seconds)),
+    ];
+    signal.addEventListener("abort", () => {
+      for (const end of ends) end();
+      this.#leave();
+      this.#group.removeFromParent();
+      this.#mesh?.dispose();
+    });
+    onTheme(() => this.#paint(), signal);
+    this.#paint();
+    this.#changed(store.state, new Set(["view"]));
+  }
+
+  #changed(state: State, changed: ReadonlySet<keyof State>): void {
+    if (changed.has("view")) {
+      if (state.view === "crowd") this.#enter();
+      else this.#leave();
+    }
+    if (changed.has("crowd") && this.#library) this.#people();
+    if (this.#group.visible) this.#page.scene.redraw();
+  }
+
+  #enter(): void {
+    const { camera, orbit } = this.#page.scene;
+    this.#before = { position: camera.position.clone(), target: orbit.target.clone() };
+    this.#group.visible = true;
+    this.#panel.show(true);
+    this.#look();
+    if (!this.#library && !this.#loading) void this.#load();
+  }
+
+  #leave(): void {
+    this.#group.visible = false;
+    this.#panel.show(false);
+    if (!this.#before) return;
+    const { camera, orbit } = this.#page.scene;
+    camera.position.copy(this.#before.position);
+    orbit.target.copy(this.#before.target);
+    orbit.update();
+    this.#before = null;
+  }
+
+  /** From a corner, so that near and far are both in view. */
+  #look(): void {
+    const half = this.#crowd?.half ?? 25;
+    const { camera, orbit } = this.#page.scene;
+    camera.position.set(half * 0.35, 4.5, half * 1.02);
+    orbit.target.set(-half * 0.05, 0.5, half * 0.1);
+    orbit.update();
+  }
+
+  async #load(): Promise<void> {
+    const { source, store, card, signal, notice } = this.#page;
+    this.#loading = true;
+    try {
+      this.#panel.say("The motions are being made …");
+      this.#library = await library(source, store.state.model, card, signal);
+      this.#panel.say("");
+      this.#people();
+      this.#look();
+    } catch (fault) {
+      if (signal.aborted) return;
+      this.#panel.say("The motions could not be had; choose the view again to try again.");
+      notice(fault);
+    } finally {
+      this.#loading = false;
+    }
+  }
+
+  #people(): void {
+    const own = this.#library!;
+    const bones = own.rig.bones.length;
+    this.#crowd = new Crowd(own, Math.min(MOST, this.#page.store.state.crowd));
+    if (!this.#mesh) {
+      this.#mesh = new InstancedMesh(boneShape(5), new MeshLambertMaterial(), MOST * bones);
+      this.#mesh.instanceColor = new InstancedBufferAttribute(
+        new Float32Array(3 * MOST * bones),
+        3,
+      );
+      this.#mesh.instanceMatrix.setUsage(DynamicDrawUsage);
+      this.#mesh.instanceColor.setUsage(DynamicDrawUsage);
+      this.#mesh.frustumCulled = false;
+      this.#group.add(this.#mesh);
+    }
+    this.#ground?.geometry.dispose();
+    this.#ground?.removeFromParent();
+    this.#ground = ground(this.#crowd.half);
+    this.#group.add(this.#ground);
+    this.#paint();
+  }
+
+  #paint(): void {
+    this.#page.card.levels.forEach((_, level) => {
+      new Color(levelColour(level)).toArray(this.#colours, 3 * level);
+    });
+    this.#ground?.material.color.set(property("--line", "#c5c9d2"));
+    this.#page.scene.redraw();
+  }
+
+  #step(seconds: number): boolean {
+    if (!this.#group.visible || !this.#crowd) return false;
+    const begun = performance.now();
+    const { playing, speed, pixels } = this.#page.store.state;
+    const { camera, renderer } = this.#page.scene;
+    if (playing) this.#crowd.step(seconds * speed);
+    camera.updateMatrixWorld();
+    const lens = { fov: (camera.fov * Math.PI) / 180, height: renderer.domElement.height };
+    this.#crowd.detail(this.#ladder, lens, camera.position, pixels);
+    const seen = this.#fill();
+    this.#read(begun, seen);
+    return playing;
+  }
+
+  /** Writes the bones of all who may be seen; gives how many they are. */
+  #fill(): number {
+    const [crowd, mesh, bones] = [this.#crowd!, this.#mesh!, this.#library!.rig.bones.length];
+    const { camera } = this.#page.scene;
+    this.#frustum.setFromProjectionMatrix(
+      VIEW.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
+    );
+    const colours = mesh.instanceColor!;
+    let seen = 0;
+    for (let i = 0; i < crowd.count; i++) {
+      this.#sphere.center.set(crowd.x[i]!, 0.9, crowd.z[i]!);
+      if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
+      crowd.fill(mesh.instanceMatrix.array, bones * seen, i);
+      this.#tint(colours.array, 3 * bones * seen, 3 * crowd.level[i]!, bones);
+      seen++;
+    }
+    mesh.count = bones * seen;
+    sent(mesh.instanceMatrix, 16 * mesh.count);
+    sent(colours as InstancedBufferAttribute, 3 * mesh.count);
+    return seen;
+  }
+
+  #tint(out: BufferAttribute["array"], at: number, from: number, bones: number): void {
+    for (let i = 0; i < 3 * bones; i++) out[at + i] = this.#colours[from + (i % 3)]!;
+  }
+
+  #read(begun: number, seen: number): void {
+    this.#frames++;
+    this.#spent += performance.now() - begun;
+    if (begun - this.#begun < 1000 * READING && this.#since) return;
+    const frame = (begun - this.#begun) / this.#frames;
+    this.#panel.count(this.#crowd!.counts, seen);
+    if (this.#page.store.state.playing) this.#panel.time(frame, this.#spent / this.#frames);
+    [this.#frames, this.#spent, this.#begun, this.#since] = [0, 0, begun, 1];
+  }
+}
+
+const VIEW = new Matrix4();
+
+/** Only what changed goes to the graphics card. */
+function sent(attribute: BufferAttribute, numbers: number): void {
+  attribute.clearUpdateRanges();
+  attribute.addUpdateRange(0, numbers);
+  attribute.needsUpdate = true;
+}
+
+function ground(half: number): LineSegments<BufferGeometry, LineBasicMaterial> {
+  const ends: number[] = [];
+  const side = Math.ceil(half / GROUND) * GROUND;
+  for (let at = -side; at <= side; at += GROUND) {
+    ends.push(at, 0, -side, at, 0, side, -side, 0, at, side, 0, at);
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(new Float32Array(ends), 3));
+  return new LineSegments(geometry, new LineBasicMaterial());
+}

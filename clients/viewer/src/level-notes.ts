@@ -1,0 +1,47 @@
+/** What is said of each level of detail below its character. */
+
+import type { ModelCard } from "@posefield/client";
+
+import { farEnough, type Ladder, type Lens } from "./detail.ts";
+import { centimetres, element, figure, whole } from "./markup.ts";
+
+/** Pixels between joints of two poses: the greatest, and the root mean square. */
+export interface Apart {
+  readonly most: number;
+  readonly rms: number;
+}
+
+export class Note {
+  readonly host: HTMLElement;
+  readonly #level: number;
+  readonly #now = element("dd", { className: "levels-now" });
+  readonly #from = element("dd");
+
+  constructor(level: number, card: ModelCard) {
+    this.#level = level;
+    const { bytes, operations, rms, pose, ranks } = card.levels[level]!;
+    const rows: [string, HTMLElement][] = [
+      ["size", element("dd", {}, `${figure(bytes / 1000)} kB`)],
+      ["cost", element("dd", {}, `${whole(operations)} multiply-adds`)],
+      ["off by", element("dd", {}, `${centimetres(rms)}, worst pose ${centimetres(pose)}`)],
+      ["here, now", this.#now],
+      ["below a pixel", this.#from],
+    ];
+    const title = element("h3", {}, `Level ${level}`, element("small", {}, ranks.join(" × ")));
+    const list = rows.flatMap(([term, value]) => [element("dt", {}, term), value]);
+    this.host = element(
+      "article",
+      { className: `level-${Math.min(level, 3)}` },
+      title,
+      element("dl", {}, ...list),
+    );
+  }
+
+  show(now: Apart, ladder: Ladder, lens: Lens): void {
+    const own = `${pixels(now.rms)} px, worst joint ${pixels(now.most)}`;
+    this.#now.textContent = this.#level ? own : "what the others are measured by";
+    this.#from.textContent = `from ${whole(Math.ceil(farEnough(ladder, this.#level, lens)))} m on`;
+  }
+}
+
+const pixels = (value: number): string => value.toFixed(value < 10 ? 1 : 0);

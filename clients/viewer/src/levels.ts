@@ -1,0 +1,229 @@
+/** All levels of detail side by side: the same moment, and how far each is off as seen from here. */
+
+import type { ClipQuestion, Motion } from "@posefield/client";
+import {
+  Color,
+  Group,
+  InstancedMesh,
+  MeshStandardMaterial,
+  type PerspectiveCamera,
+  Vector3,
+} from "three";
+
+import "./levels.css";
+import { levelColour, onTheme } from "./colours.ts";
+import { type Ladder, ladder } from "./detail.ts";
+import { Ghost } from "./ghost-lines.ts";
+import { Latest } from "./latest.ts";
+import { type Apart, Note } from "./level-notes.ts";
+import { element } from "./markup.ts";
+import type { Mount, Page } from "./page.ts";
+import { boneShape, Rig, SIZE } from "./rig.ts";
+import { type Placed, place, placed } from "./skeleton.ts";
+import type { State } from "./state.ts";
+
+/** Frames a second of the clips: what a screen shows. */
+const RATE = 60;
+/** Seconds between two changes of the numbers that are read. */
+const READING = 0.15;
+
+export const mount: Mount = (host, page) => new Levels(host, page).begin();
+
+/** One level's character, and where its joints are now. */
+interface Figure {
+  readonly mesh: InstancedMesh;
+  readonly ghost: Ghost;
+  readonly joints: Placed;
+  readonly note: Note;
+  motion: Motion | null;
+  shape: Float32Array;
+}
+
+class Levels {
+  readonly #page: Page;
+  readonly #host = element("section", {
+    className: "levels",
+    hidden: true,
+    ariaLabel: "Levels of detail",
+  });
+  readonly #group = new Group();
+  readonly #rig: Rig;
+  readonly #ladder: Ladder;
+  readonly #figures: Figure[];
+  readonly #asking: Latest<ClipQuestion>;
+  readonly #laid: Float32Array;
+  #since = 0;
+
+  constructor(host: HTMLElement, page: Page) {
+    this.#page = page;
+    this.#rig = new Rig(page.card);
+    this.#ladder = ladder(page.card);
+    this.#laid = new Float32Array(SIZE * this.#rig.bones.length);
+    this.#figures = page.card.levels.map((_, level) => this.#figure(level));
+    this.#group.visible = false;
+    this.#host.append(...this.#figures.map(({ note }) => note.host));
+    this.#asking = new Latest((question) => this.#ask(question));
+    page.scene.root.add(this.#group);
+    host.append(this.#host);
+  }
+
+  begin(): void {
+    const { store, scene, signal } = this.#page;
+    const ends = [
+      store.listen((state, changed) => this.#changed(state, changed)),
+      scene.add((seconds) => this.#step(seconds)),
+    ];
+    signal.addEventListener("abort", () => {
+      for (const end of ends) end();
+      this.#host.remove();
+      this.#group.removeFromParent();
+      for (const { mesh } of this.#figures) mesh.dispose();
+    });
+    onTheme(() => this.#paint(), signal);
+    this.#paint();
+    this.#show(store.state);
+  }
+
+  #figure(level: number): Figure {
+    const material = new MeshStandardMaterial({ roughness: 0.75 });
+    const mesh = new InstancedMesh(boneShape(10), material, this.#rig.bones.length);
+    mesh.frustumCulled = false;
+    const ghost = new Ghost(this.#page.card, level > 0);
+    this.#group.add(mesh, ghost.lines);
+    const joints = placed(this.#page.card.skeleton.parents.length);
+    const note = new Note(level, this.#page.card);
+    return { mesh, ghost, joints, note, motion: null, shape: new Float32Array() };
+  }
+
+  #paint(): void {
+    this.#figures.forEach(({ mesh, ghost }, level) => {
+      (mesh.material as MeshStandardMaterial).color = new Color(levelColour(level));
+      ghost.paint();
+    });
+    this.#page.scene.redraw();
+  }
+
+  #changed(state: State, changed: ReadonlySet<keyof State>): void {
+    const asked = ["controls", "performer", "root", "view"] as const;
+    if (asked.some((key) => changed.has(key))) this.#show(state);
+    if (changed.has("time") && this.#group.visible) this.#page.scene.redraw();
+  }
+
+  #show(state: State): void {
+    this.#group.visible = state.view === "levels";
+    this.#host.hidden = !this.#group.visible;
+    this.#page.scene.redraw();
+    if (!this.#group.visible) return;
+    const { card } = this.#page;
+    // Who walks away would not stay side by side.
+    const root = card.cyclic ? "in_place" : state.root;
+    const { controls, performer } = state;
+    this.#asking.ask({ controls, performer, root, fps: RATE });
+  }
+
+  async #ask(question: ClipQuestion): Promise<void> {
+    const { source, store, signal, notice } = this.#page;
+    try {
+      const asked = this.#figures.map((_, level) =>
+        source.clip(store.state.model, { ...question, level }, signal),
+      );
+      (await Promise.all(asked)).forEach((motion, level) => {
+        const figure = this.#figures[level]!;
+        figure.motion = motion;
+        figure.shape = this.#rig.shape(motion.boneOffsets);
+      });
+      this.#page.scene.redraw();
+    } catch (fault) {
+      if (!signal.aborted) notice(fault);
+    }
+  }
+
+  #step(seconds: number): boolean {
+    if (!this.#group.visible || !this.#figures.every(({ motion }) => motion)) return false;
+    const { store, scene } = this.#page;
+    const aside = beside(scene.camera, scene.orbit.target, this.#figures.length);
+    for (const [level, figure] of this.#figures.entries()) {
+      this.#place(figure, level, store.state.time, aside);
+    }
+    this.#since += seconds;
+    if (this.#since > READING || !store.state.playing) {
+      this.#since = 0;
+      this.#tell();
+    }
+    return store.state.playing;
+  }
+
+  #place(figure: Figure, level: number, time: number, aside: Vector3): void {
+    const motion = figure.motion!;
+    const frame = Math.min(motion.frames - 1, Math.max(0, Math.round(time * motion.rate)));
+    const { rotations, rootPosition, boneOffsets, parents } = motion;
+    place(figure.joints, parents, boneOffsets, rotations, rootPosition, frame);
+    this.#rig.lay(this.#laid, 0, figure.shape, figure.joints);
+    const shift = aside.clone().multiplyScalar(level - (this.#figures.length - 1) / 2);
+    figure.mesh.position.copy(shift);
+    fill(figure.mesh, this.#laid);
+    figure.ghost.place(this.#figures[0]!.joints, shift);
+  }
+
+  #tell(): void {
+    const { camera, renderer } = this.#page.scene;
+    camera.updateMatrixWorld();
+    const { width, height } = renderer.domElement;
+    const lens = { fov: (camera.fov * Math.PI) / 180, height };
+    for (const { joints, note, mesh } of this.#figures) {
+      note.show(
+        apart(camera, [width, height], this.#figures[0]!.joints, joints, mesh.position),
+        this.#ladder,
+        lens,
+      );
+    }
+  }
+}
+
+/** From one character to the next: along the image, so that each stands above its column. */
+function beside(camera: PerspectiveCamera, target: Vector3, count: number): Vector3 {
+  const away = camera.position.distanceTo(target);
+  const width = 2 * away * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect;
+  const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+  return right
+    .setY(0)
+    .normalize()
+    .multiplyScalar(width / count);
+}
+
+function fill(mesh: InstancedMesh, laid: Float32Array): void {
+  const out = mesh.instanceMatrix.array;
+  for (let bone = 0; bone < mesh.count; bone++) {
+    for (let axis = 0; axis < 4; axis++) {
+      for (let i = 0; i < 3; i++) out[16 * bone + 4 * axis + i] = laid[SIZE * bone + 3 * axis + i]!;
+    }
+    out[16 * bone + 15] = 1;
+  }
+  mesh.instanceMatrix.needsUpdate = true;
+}
+
+const [ONE, OTHER] = [new Vector3(), new Vector3()];
+
+/** How far joints lie from those of another pose, in pixels of the image, both standing there. */
+export function apart(
+  camera: PerspectiveCamera,
+  [width, height]: readonly [number, number],
+  right: Placed,
+  found: Placed,
+  shift: Vector3,
+): Apart {
+  let [most, sum] = [0, 0];
+  const joints = found.positions.length / 3;
+  for (let joint = 0; joint < joints; joint++) {
+    ONE.fromArray(right.positions, 3 * joint)
+      .add(shift)
+      .project(camera);
+    OTHER.fromArray(found.positions, 3 * joint)
+      .add(shift)
+      .project(camera);
+    const [x, y] = [((ONE.x - OTHER.x) * width) / 2, ((ONE.y - OTHER.y) * height) / 2];
+    most = Math.max(most, Math.hypot(x, y));
+    sum += x * x + y * y;
+  }
+  return { most, rms: Math.sqrt(sum / joints) };
+}

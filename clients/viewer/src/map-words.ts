@@ -1,0 +1,112 @@
+/** What the map shows in words, numbers and a legend, for those who do not see it. */
+
+import type { ModelCard, SigmaGrid } from "@posefield/client";
+
+import { type Control, extent } from "./chart.ts";
+import { viridis } from "./colours.ts";
+import { leftOut } from "./examples.ts";
+import { centimetres, element, figure } from "./markup.ts";
+
+interface Legend {
+  readonly host: HTMLElement;
+  show(grid: SigmaGrid, card: ModelCard): void;
+}
+
+/** The scale of colours in centimetres, and what a ring means. */
+export function legend(): Legend {
+  const bar = element("canvas", { width: 256, height: 1, className: "map-scale" });
+  bar.setAttribute("aria-hidden", "true");
+  const pen = bar.getContext("2d")!;
+  const image = pen.createImageData(256, 1);
+  for (let i = 0; i < 256; i++) {
+    viridis(i / 255, image.data, 4 * i);
+    image.data[4 * i + 3] = 255;
+  }
+  pen.putImageData(image, 0, 0);
+  const numbers = element("div", { className: "map-numbers" });
+  const rings = element("div", { className: "map-rings" });
+  const host = element("div", { className: "map-legend" }, bar, numbers, rings);
+  return { host, show: (grid, card) => fill(numbers, rings, grid, card) };
+}
+
+function fill(numbers: HTMLElement, rings: HTMLElement, grid: SigmaGrid, card: ModelCard): void {
+  const [low, high] = extent(grid);
+  const [least, middle, most] = [low, (low + high) / 2, high].map((value) => figure(100 * value));
+  numbers.replaceChildren(
+    element("span", {}, `${least} cm`),
+    element("span", {}, `sigma ${middle}`),
+    element("span", {}, `${most} cm and more`),
+  );
+  const worst = Math.max(0, ...leftOut(card));
+  const ring = worst
+    ? `, a ring as wide as its error when left out, up to ${centimetres(worst)}`
+    : "";
+  rings.textContent = `A dot is a captured clip${ring}; faint where other controls differ. Hatched: never sampled.`;
+}
+
+/** A sentence on where sigma is least and greatest within what was sampled. */
+export function said(grid: SigmaGrid, [across, along]: readonly [Control, Control]): string {
+  const found = [...cells(grid)].filter(({ inside }) => inside);
+  if (!found.length) return "All of this map lies outside what was sampled: another control does.";
+  const [first] = found;
+  let [least, most] = [first!, first!];
+  for (const cell of found) {
+    if (cell.sigma < least.sigma) least = cell;
+    if (cell.sigma > most.sigma) most = cell;
+  }
+  const at = ({ x, y }: Cell) =>
+    `at ${across.name} ${figure(x)} ${across.unit}, ${along.name} ${figure(y)} ${along.unit}`;
+  return (
+    `Within what was sampled sigma is least, ${centimetres(least.sigma)}, ${at(least)}, ` +
+    `and greatest, ${centimetres(most.sigma)}, ${at(most)}.`
+  );
+}
+
+interface Cell {
+  readonly x: number;
+  readonly y: number;
+  readonly sigma: number;
+  readonly inside: boolean;
+}
+
+function* cells(grid: SigmaGrid): Generator<Cell> {
+  for (const [row, y] of grid.along_values.entries()) {
+    for (const [column, x] of grid.across_values.entries()) {
+      const [sigma, inside] = [grid.sigma[row]![column]!, grid.inside[row]![column]!];
+      yield { x, y, sigma, inside };
+    }
+  }
+}
+
+const STEPS = 6;
+
+/** Some of the grid's rows and columns: sigma in centimetres, a star outside what was sampled. */
+export function table(
+  grid: SigmaGrid,
+  [across, along]: readonly [Control, Control],
+): HTMLElement[] {
+  const pick = (count: number) =>
+    Array.from({ length: STEPS }, (_, i) => Math.round((i * (count - 1)) / (STEPS - 1)));
+  const columns = pick(grid.across_values.length);
+  const rows = pick(grid.along_values.length).reverse();
+  const heading = (value: number, scope: string) => element("th", { scope }, figure(value));
+  const title = `Sigma in cm; * lies outside what was sampled. Columns: ${across.name}, rows: ${along.name}.`;
+  const head = element(
+    "tr",
+    {},
+    element("td"),
+    ...columns.map((column) => heading(grid.across_values[column]!, "col")),
+  );
+  const body = rows.map((row) =>
+    element(
+      "tr",
+      {},
+      heading(grid.along_values[row]!, "row"),
+      ...columns.map((column) => {
+        const star = grid.inside[row]![column] ? "" : " *";
+        return element("td", {}, figure(100 * grid.sigma[row]![column]!) + star);
+      }),
+    ),
+  );
+  return [element("caption", {}, title), element("thead", {}, head), element("tbody", {}, ...body)];
+}
