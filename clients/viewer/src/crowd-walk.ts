@@ -86,8 +86,8 @@ export class Crowd {
     }
   }
 
-  /** Matrices (16 numbers each) of character `i`'s bones, written into `out` from a bone on. */
-  fill(out: ArrayLike<number> & { [index: number]: number }, from: number, i: number): void {
+  /** Where character `i`'s bones lie in the world, SIZE numbers each, written into `out`. */
+  lay(out: Float32Array, i: number): void {
     const { laid, rig, count } = this.#library;
     const bones = rig.bones.length;
     const [cos, sin] = [Math.cos(this.heading[i]!), Math.sin(this.heading[i]!)];
@@ -95,17 +95,17 @@ export class Crowd {
     const frame = Math.min(FRAMES - 1, Math.floor(phase * FRAMES));
     const share = phase * FRAMES - frame;
     const size = bones * SIZE;
-    let at = ((this.level[i]! * count + this.#motion[i]!) * (FRAMES + 1) + frame) * size;
-    let to = 16 * from;
-    for (let part = 0; part < 4 * bones; part++, at += 3, to += 4) {
-      const x = laid[at]! + share * (laid[at + size]! - laid[at]!);
-      const y = laid[at + 1]! + share * (laid[at + size + 1]! - laid[at + 1]!);
-      const z = laid[at + 2]! + share * (laid[at + size + 2]! - laid[at + 2]!);
-      const origin = (part & 3) === 3;
-      out[to] = cos * x + sin * z + (origin ? this.x[i]! : 0);
-      out[to + 1] = y;
-      out[to + 2] = cos * z - sin * x + (origin ? this.z[i]! : 0);
-      out[to + 3] = origin ? 1 : 0;
+    const at = ((this.level[i]! * count + this.#motion[i]!) * (FRAMES + 1) + frame) * size;
+    for (let part = 0; part < size; part += 3) {
+      const from = at + part;
+      const x = laid[from]! + share * (laid[from + size]! - laid[from]!);
+      const y = laid[from + 1]! + share * (laid[from + size + 1]! - laid[from + 1]!);
+      const z = laid[from + 2]! + share * (laid[from + size + 2]! - laid[from + 2]!);
+      // The fourth of each bone's four is its origin.
+      const origin = part % SIZE === SIZE - 3;
+      out[part] = cos * x + sin * z + (origin ? this.x[i]! : 0);
+      out[part + 1] = y;
+      out[part + 2] = cos * z - sin * x + (origin ? this.z[i]! : 0);
     }
   }
 }

@@ -3,16 +3,11 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  Color,
-  DynamicDrawUsage,
   Frustum,
   Group,
-  InstancedBufferAttribute,
-  InstancedMesh,
   LineBasicMaterial,
   LineSegments,
   Matrix4,
-  MeshLambertMaterial,
   Sphere,
   Vector3,
 } from "three";
@@ -20,11 +15,12 @@ import {
 import "./crowd.css";
 import { levelColour, onTheme, property } from "./colours.ts";
 import { type Library, library } from "./crowd-library.ts";
+import { CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
 import { Crowd, REACH } from "./crowd-walk.ts";
 import { type Ladder, ladder } from "./detail.ts";
 import type { Mount, Page } from "./page.ts";
-import { boneShape } from "./rig.ts";
+import { SIZE } from "./rig.ts";
 import type { State } from "./state.ts";
 
 export const MOST = 1000;
@@ -38,13 +34,13 @@ class CrowdView {
   readonly #panel: Panel;
   readonly #group = new Group();
   readonly #ladder: Ladder;
-  readonly #colours: Float32Array;
   readonly #frustum = new Frustum();
   readonly #sphere = new Sphere(new Vector3(), REACH);
   #library: Library | null = null;
   #loading = false;
   #crowd: Crowd | null = null;
-  #mesh: InstancedMesh | null = null;
+  #mesh: CrowdMesh | null = null;
+  #laid = new Float32Array();
   #ground: LineSegments<BufferGeometry, LineBasicMaterial> | null = null;
   #before: { position: Vector3; target: Vector3 } | null = null;
   #since = 0;
@@ -55,7 +51,6 @@ class CrowdView {
   constructor(host: HTMLElement, page: Page) {
     this.#page = page;
     this.#ladder = ladder(page.card);
-    this.#colours = new Float32Array(3 * page.card.levels.length);
     this.#panel = new Panel(host, page);
     this.#group.visible = false;
     page.scene.root.add(this.#group);
@@ -139,15 +134,9 @@ class CrowdView {
     const bones = own.rig.bones.length;
     this.#crowd = new Crowd(own, Math.min(MOST, this.#page.store.state.crowd));
     if (!this.#mesh) {
-      this.#mesh = new InstancedMesh(boneShape(5), new MeshLambertMaterial(), MOST * bones);
-      this.#mesh.instanceColor = new InstancedBufferAttribute(
-        new Float32Array(3 * MOST * bones),
-        3,
-      );
-      this.#mesh.instanceMatrix.setUsage(DynamicDrawUsage);
-      this.#mesh.instanceColor.setUsage(DynamicDrawUsage);
-      this.#mesh.frustumCulled = false;
-      this.#group.add(this.#mesh);
+      this.#mesh = new CrowdMesh(MOST * bones);
+      this.#laid = new Float32Array(SIZE * bones);
+      this.#group.add(this.#mesh.mesh);
     }
     this.#ground?.geometry.dispose();
     this.#ground?.removeFromParent();
@@ -157,9 +146,7 @@ class CrowdView {
   }
 
   #paint(): void {
-    this.#page.card.levels.forEach((_, level) => {
-      new Color(levelColour(level)).toArray(this.#colours, 3 * level);
-    });
+    this.#mesh?.paint(this.#page.card.levels.map((_, level) => levelColour(level)));
     this.#ground?.material.color.set(property("--line", "#c5c9d2"));
     this.#page.scene.redraw();
   }
@@ -180,28 +167,26 @@ class CrowdView {
 
   /** Writes the bones of all who may be seen; gives how many they are. */
   #fill(): number {
-    const [crowd, mesh, bones] = [this.#crowd!, this.#mesh!, this.#library!.rig.bones.length];
+    const [crowd, mesh] = [this.#crowd!, this.#mesh!];
+    const { bones } = this.#library!.rig;
     const { camera } = this.#page.scene;
     this.#frustum.setFromProjectionMatrix(
       VIEW.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
     );
-    const colours = mesh.instanceColor!;
     let seen = 0;
+    mesh.begin();
     for (let i = 0; i < crowd.count; i++) {
       this.#sphere.center.set(crowd.x[i]!, 0.9, crowd.z[i]!);
       if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
-      crowd.fill(mesh.instanceMatrix.array, bones * seen, i);
-      this.#tint(colours.array, 3 * bones * seen, 3 * crowd.level[i]!, bones);
+      crowd.lay(this.#laid, i);
+      const level = crowd.level[i]!;
+      for (let bone = 0; bone < bones.length; bone++) {
+        mesh.add(this.#laid, SIZE * bone, level, bones[bone]!.taper);
+      }
       seen++;
     }
-    mesh.count = bones * seen;
-    sent(mesh.instanceMatrix, 16 * mesh.count);
-    sent(colours as InstancedBufferAttribute, 3 * mesh.count);
+    mesh.end();
     return seen;
-  }
-
-  #tint(out: BufferAttribute["array"], at: number, from: number, bones: number): void {
-    for (let i = 0; i < 3 * bones; i++) out[at + i] = this.#colours[from + (i % 3)]!;
   }
 
   #read(begun: number, seen: number): void {
@@ -216,13 +201,6 @@ class CrowdView {
 }
 
 const VIEW = new Matrix4();
-
-/** Only what changed goes to the graphics card. */
-function sent(attribute: BufferAttribute, numbers: number): void {
-  attribute.clearUpdateRanges();
-  attribute.addUpdateRange(0, numbers);
-  attribute.needsUpdate = true;
-}
 
 function ground(half: number): LineSegments<BufferGeometry, LineBasicMaterial> {
   const ends: number[] = [];

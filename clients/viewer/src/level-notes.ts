@@ -24,8 +24,8 @@ export class Note {
       ["size", element("dd", {}, `${figure(bytes / 1000)} kB`)],
       ["cost", element("dd", {}, `${whole(operations)} multiply-adds`)],
       ["off by", element("dd", {}, `${centimetres(rms)}, worst pose ${centimetres(pose)}`)],
-      ["here, now", this.#now],
-      ["below a pixel", this.#from],
+      ["now", this.#now],
+      ["≤ 1 px", this.#from],
     ];
     const title = element("h3", {}, `Level ${level}`, element("small", {}, ranks.join(" × ")));
     const list = rows.flatMap(([term, value]) => [element("dt", {}, term), value]);
@@ -38,8 +38,8 @@ export class Note {
   }
 
   show(now: Apart, ladder: Ladder, lens: Lens): void {
-    const own = `${pixels(now.rms)} px, worst joint ${pixels(now.most)}`;
-    this.#now.textContent = this.#level ? own : "what the others are measured by";
+    const own = `${pixels(now.rms)} px, worst ${pixels(now.most)}`;
+    this.#now.textContent = this.#level ? own : "the measure of the others";
     this.#from.textContent = `from ${whole(Math.ceil(farEnough(ladder, this.#level, lens)))} m on`;
   }
 }

@@ -18,6 +18,8 @@ interface Bone {
   readonly child: number;
   readonly offset: readonly number[];
   readonly radius: number;
+  /** How wide it ends, as a share of how wide it begins. */
+  readonly taper: number;
 }
 
 export class Rig {
@@ -33,7 +35,7 @@ export class Rig {
       .filter(({ joint, offset }) => joint >= 0 && Math.hypot(...offset) >= SHORTEST)
       .map((bone) => ({
         ...bone,
-        radius: radius(bone, bone.child < 0 ? 0 : below[bone.child]!, top),
+        ...thickness(bone, bone.child < 0 ? 0 : below[bone.child]!, top),
       }));
   }
 
@@ -61,14 +63,16 @@ export class Rig {
   }
 }
 
-/** A bone from the origin to (0, 1, 0), thickest at a fifth of it. */
+/** A bone from the origin to (0, 1, 0), thickest at a third of it. */
 export function boneShape(sides: number): LatheGeometry {
   const outline = [
-    [0, -0.02],
-    [0.8, 0.02],
-    [1, 0.2],
-    [0.62, 0.96],
-    [0, 1.02],
+    [0, -0.06],
+    [0.6, -0.04],
+    [0.95, 0.1],
+    [1, 0.3],
+    [0.82, 0.85],
+    [0.6, 1],
+    [0, 1.04],
   ].map(([x, y]) => new Vector2(x, y));
   return new LatheGeometry(outline, sides);
 }
@@ -100,10 +104,15 @@ function highest({ skeleton }: ModelCard): number {
   return found;
 }
 
-function radius(bone: Omit<Bone, "radius">, below: number, top: number): number {
-  if (bone.child < 0 && bone.joint === top) return 0.085;
-  if (below > TORSO) return 0.1;
-  return Math.min(0.06, Math.max(0.02, 0.17 * Math.hypot(...bone.offset)));
+function thickness(
+  bone: Pick<Bone, "joint" | "child" | "offset">,
+  below: number,
+  top: number,
+): Pick<Bone, "radius" | "taper"> {
+  if (bone.child < 0 && bone.joint === top) return { radius: 0.09, taper: 0.85 };
+  if (below > TORSO) return { radius: 0.12, taper: 1 };
+  const length = Math.hypot(...bone.offset);
+  return { radius: Math.min(0.07, Math.max(0.025, 0.19 * length)), taper: 0.7 };
 }
 
 function axes(out: Float32Array, at: number, along: ArrayLike<number>, radius: number): void {
