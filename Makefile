@@ -32,9 +32,10 @@ $(NODE): clients/package.json clients/package-lock.json clients/typescript/packa
 .PHONY: node
 node: $(NODE) ## install into clients/node_modules what its lock file names
 
-# What the service answers `/` with: one file, made of the page's sources and of nothing else.
+# What the service answers `/` with: one file, made of the page's sources and of nothing else; and what
+# `posefield page` lays beside it for hosts without a service.
 PAGE := service/web/viewer/index.html
-$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts
+$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.offline.ts
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
 .PHONY: page
@@ -83,4 +84,4 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist service/web/viewer clients/node_modules .venv .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist service/web/viewer service/web/offline clients/node_modules .venv .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis

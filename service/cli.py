@@ -16,7 +16,7 @@ import numpy as np
 import orjson
 import typer
 
-from service import __version__, exports
+from service import __version__, exports, page
 from service.encode import ENCODERS, Encoder, poses, reasons
 from service.encode.convention import Unit, Up
 from service.motion import card as cards
@@ -258,6 +258,7 @@ def why(
 
 
 app.command()(exports.export)
+app.command()(page.page)
 
 
 @app.command()

@@ -6,12 +6,13 @@ import "./style.css";
 import { mount as mountCrowd } from "./crowd.ts";
 import { mount as mountLevels } from "./levels.ts";
 import { mount as mountMap } from "./map.ts";
-import type { Page } from "./page.ts";
+import { offline } from "./offline.ts";
+import type { Page, Source } from "./page.ts";
 import { Scene } from "./scene.ts";
 import { Store, type View } from "./state.ts";
 
 async function start(): Promise<void> {
-  const source = new Client("");
+  const source: Source = (await offline()) ?? new Client("");
   const [name, rest] = location.hash.slice(1).split("?");
   const hash = new URLSearchParams(rest);
   const models = await source.models();

@@ -1,0 +1,88 @@
+/** The model's graph in onnxruntime-web: a session for each level, opened when it is first wanted. */
+
+import type { ModelCard } from "@posefield/client";
+import type * as Runtime from "onnxruntime-web/wasm";
+
+import { atLevel } from "./protobuf.ts";
+
+export type Ort = typeof Runtime;
+
+/** Rows a call: more would leave a core's cache. */
+const BATCH = 1024;
+const SIZES = { rotations: 4, root_position: 3, bone_offsets: 3, duration: 1, sigma: 1, travel: 3 };
+
+export type Output = keyof typeof SIZES;
+
+/** B rows for the graph: controls B × d, times B × S, and whose each is, -1 for nobody's. */
+export interface Rows {
+  readonly count: number;
+  readonly controls: Float32Array;
+  readonly times: Float32Array;
+  readonly who: Int32Array;
+}
+
+/** Outputs, row by row. */
+export type Answers = Readonly<Record<Output, Float32Array>>;
+
+export class Graph {
+  readonly #ort: Ort;
+  readonly #model: Uint8Array;
+  readonly #card: ModelCard;
+  readonly #sessions: (Promise<Runtime.InferenceSession> | undefined)[] = [];
+
+  constructor(ort: Ort, model: Uint8Array, card: ModelCard) {
+    this.#ort = ort;
+    this.#model = model;
+    this.#card = card;
+  }
+
+  async run(rows: Rows, level: number): Promise<Answers> {
+    const steps = rows.times.length / rows.count;
+    const joints = this.#card.skeleton.parents.length;
+    const shared = { rotations: steps * joints, root_position: steps, bone_offsets: joints };
+    const widths = { ...shared, duration: 1, sigma: 1, travel: steps };
+    const sizes = Object.entries(SIZES) as [Output, number][];
+    const whole = Object.fromEntries(
+      sizes.map(([name, size]) => [name, new Float32Array(rows.count * widths[name] * size)]),
+    ) as Record<Output, Float32Array>;
+    for (let first = 0; first < rows.count; first += BATCH) {
+      const found = await this.#batch(rows, first, Math.min(BATCH, rows.count - first), level);
+      for (const [name, size] of sizes) {
+        whole[name].set(found[name]!.data as Float32Array, first * widths[name] * size);
+      }
+    }
+    return whole;
+  }
+
+  async #batch(rows: Rows, first: number, count: number, level: number) {
+    const { controls, performers } = this.#card;
+    const [width, steps] = [controls.length, rows.times.length / rows.count];
+    const part = (all: Float32Array, size: number) =>
+      new this.#ort.Tensor("float32", all.slice(size * first, size * (first + count)), [
+        count,
+        size,
+      ]);
+    const feeds: Record<string, Runtime.Tensor> = {
+      controls: part(rows.controls, width),
+      time: part(rows.times, steps),
+    };
+    if (performers.length) {
+      const labels = new Float32Array(count * performers.length);
+      for (let row = 0; row < count; row++) {
+        const who = rows.who[first + row]!;
+        if (who >= 0) labels[row * performers.length + who] = 1;
+      }
+      feeds["performer"] = new this.#ort.Tensor("float32", labels, [count, performers.length]);
+    }
+    const session = await this.#session(level);
+    return session.run(feeds);
+  }
+
+  #session(level: number): Promise<Runtime.InferenceSession> {
+    this.#sessions[level] ??= this.#ort.InferenceSession.create(atLevel(this.#model, level), {
+      executionProviders: ["wasm"],
+      logSeverityLevel: 3,
+    });
+    return this.#sessions[level];
+  }
+}

@@ -1,0 +1,159 @@
+/** The model in the browser itself, which answers as a service does, to the rounding of float32. */
+
+import type {
+  ClipQuestion,
+  CrowdPoses,
+  CrowdQuestion,
+  ModelCard,
+  ModelSummary,
+  Motion,
+  PoseQuestion,
+  Poses,
+  SigmaGrid,
+  SigmaQuestion,
+  Trust,
+} from "@posefield/client";
+
+import type { Source } from "../page.ts";
+import { card as read } from "./card.ts";
+import { type Course, closed, inPlace, times, type Way } from "./course.ts";
+import { crowd } from "./crowd.ts";
+import * as door from "./door.ts";
+import { type Answers, Graph, type Ort } from "./graph.ts";
+import { sigma } from "./grid.ts";
+import { straightened } from "./plane.ts";
+
+/** The graph takes a time after the end for the end, s. */
+const AFTER = 1e9;
+
+/** A question about one character that has passed the door. */
+interface Asked {
+  readonly controls: Readonly<Record<string, number>>;
+  readonly point: Float32Array;
+  readonly who: Int32Array;
+  readonly performer: string | null;
+  readonly level: number;
+  readonly warnings: string[];
+}
+
+export class Offline implements Source {
+  readonly #card: ModelCard;
+  readonly #graph: Graph;
+
+  constructor(ort: Ort, model: Uint8Array, identity: string) {
+    this.#card = read(model, identity);
+    this.#graph = new Graph(ort, model, this.#card);
+  }
+
+  async models(): Promise<readonly ModelSummary[]> {
+    const { identity, description } = this.#card;
+    return [{ name: identity.split("@")[0]!, identity, versions: [identity], description }];
+  }
+
+  async card(): Promise<ModelCard> {
+    return this.#card;
+  }
+
+  async pose(_: string, question: PoseQuestion): Promise<Poses> {
+    const asked = this.#asked(question);
+    const when = Float64Array.from(question.times);
+    const found = await this.#run(asked, when);
+    const duration = door.sensible(this.#card, found.duration[0]!);
+    for (const time of when) door.within("times", time, 0, duration);
+    return {
+      trust: this.#trust(asked, found),
+      times: when,
+      rotations: found.rotations,
+      rootPosition: found.root_position,
+      boneOffsets: found.bone_offsets,
+    };
+  }
+
+  async clip(_: string, question: ClipQuestion): Promise<Motion> {
+    if (question.loop && !this.#card.cyclic) {
+      throw new door.Refused("loop: this model's last pose does not lead into its first");
+    }
+    if (question.unit || question.up || (question.names ?? "own") !== "own") {
+      throw new door.NeedsService("another unit, up axis or naming");
+    }
+    const asked = this.#asked(question);
+    const ends = await this.#run(asked, Float64Array.of(0, AFTER));
+    const duration = door.sensible(this.#card, ends.duration[0]!);
+    const when = times(question, duration);
+    const found = await this.#run(asked, when);
+    const poses = { times: when, rotations: found.rotations, rootPosition: found.root_position };
+    const { names, parents } = this.#card.skeleton;
+    const routed = this.#routed(poses, question, ends, duration);
+    return {
+      trust: this.#trust(asked, found),
+      ...routed,
+      boneOffsets: found.bone_offsets,
+      names,
+      parents,
+      rate: question.fps ?? 30,
+      frames: routed.times.length,
+      units: {},
+    } as Motion;
+  }
+
+  crowd(_: string, question: CrowdQuestion): Promise<CrowdPoses> {
+    return crowd(this.#graph, this.#card, question);
+  }
+
+  sigma(_: string, question: SigmaQuestion): Promise<SigmaGrid> {
+    return sigma(this.#graph, this.#card, question);
+  }
+
+  async why(): Promise<never> {
+    throw new door.NeedsService("what an answer is made of");
+  }
+
+  /** The poses in place, or closed, as asked for. */
+  #routed(poses: Course, asked: ClipQuestion, ends: Answers, duration: number): Course {
+    const way = this.#card.cyclic ? stride(ends) : straight(ends);
+    const stays = asked.root === "in_place" && this.#card.root === "travelling";
+    const placed = stays ? inPlace(poses, way, duration) : poses;
+    return asked.loop ? closed(placed, stays ? null : way, duration) : placed;
+  }
+
+  #asked(question: Pick<ClipQuestion, "controls" | "performer" | "level" | "extrapolate">): Asked {
+    const values = door.point(this.#card, question.controls);
+    const warnings = door.warnings(this.#card, values);
+    if (question.extrapolate === "refuse" && warnings.length)
+      throw new door.Refused(warnings.join("; "));
+    return {
+      controls: question.controls,
+      point: Float32Array.from(values),
+      who: Int32Array.of(door.performer(this.#card, question.performer)),
+      performer: question.performer ?? null,
+      level: door.level(this.#card, question.level ?? 0),
+      warnings,
+    };
+  }
+
+  #run(asked: Asked, when: Float64Array): Promise<Answers> {
+    const times = Float32Array.from(when);
+    return this.#graph.run({ count: 1, controls: asked.point, times, who: asked.who }, asked.level);
+  }
+
+  #trust({ controls, performer, level, warnings }: Asked, found: Answers): Trust {
+    const [duration, sigma] = [found.duration[0]!, found.sigma[0]!];
+    const model = this.#card.identity;
+    return { model, controls, performer, level, duration, sigma, warnings } as Trust;
+  }
+}
+
+/** What one cycle does, as its end says (service/synthesis/walk/stride.py). */
+function stride(ends: Answers): Way {
+  const { travel, root_position: roots } = ends;
+  const gap = { x: travel[3]!, z: travel[4]! };
+  const turn = travel[5]!;
+  const start = { x: roots[3]! - gap.x, z: roots[5]! - gap.z };
+  return { way: straightened(gap, turn), turn, start };
+}
+
+/** The straight way from the first pose to the last. */
+function straight({ root_position: roots }: Answers): Way {
+  const start = { x: roots[0]!, z: roots[2]! };
+  return { way: { x: roots[3]! - start.x, z: roots[5]! - start.z }, turn: 0, start };
+}
