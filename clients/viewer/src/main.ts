@@ -4,6 +4,7 @@ import { Client } from "@posefield/client";
 
 import "./style.css";
 import { mount as mountCrowd } from "./crowd.ts";
+import { mount as mountFiles } from "./files.ts";
 import { mount as mountLevels } from "./levels.ts";
 import { mount as mountMap } from "./map.ts";
 import { offline } from "./offline.ts";
@@ -55,6 +56,7 @@ async function start(): Promise<void> {
   mountLevels(stage!, page);
   mountCrowd(stage!, page);
   mountMap(side!, page);
+  mountFiles(side!, page);
   page.scene.add((seconds) => {
     const { time, playing, speed } = store.state;
     if (playing) store.set({ time: (time + seconds * speed) % card.durations[0]! });

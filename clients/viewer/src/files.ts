@@ -1,0 +1,298 @@
+/** The clip that is shown as a file, or as text that asks for it. */
+
+import { Client, type ClipFormat, type ClipQuestion, PosefieldError } from "@posefield/client";
+
+import "./files.css";
+import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
+import { chooser, element, figure, labelled } from "./markup.ts";
+import type { Mount, Page } from "./page.ts";
+import type { State } from "./state.ts";
+
+const FORMATS = [
+  ["usdc", "USD, binary (.usdc)"],
+  ["usda", "USD, text (.usda)"],
+  ["usdz", "USD package (.usdz)"],
+  ["glb", "glTF (.glb)"],
+  ["bvh", "BVH (.bvh)"],
+  ["npz", "NumPy (.npz)"],
+  ["json", "JSON (.json)"],
+] as const;
+const NAMES = [
+  ["own", "as captured"],
+  ["mixamo", "Mixamo"],
+  ["ue5", "Unreal 5"],
+  ["vrm", "VRM"],
+  ["humanik", "HumanIK"],
+] as const;
+const USUAL = ["", "as usual"] as const;
+const TEXTS = { curl, python, link } as const;
+
+type Text = keyof typeof TEXTS;
+type Names = (typeof NAMES)[number][0];
+
+/** What this part alone decides; the rest is as it is shown. */
+interface Choice {
+  format: ClipFormat;
+  fps: number;
+  loop: boolean;
+  names: Names;
+  unit: "" | "m" | "cm";
+  up: "" | "y" | "z";
+  text: Text;
+}
+
+export const mount: Mount = (host, page) => new Files(host, page).begin();
+
+class Files {
+  readonly #page: Page;
+  readonly #choice: Choice;
+  readonly #fields = element("div", { className: "files-fields" });
+  readonly #get = element("button", { type: "button", className: "files-get" });
+  readonly #said = element("p", { className: "files-said" });
+  readonly #code = element("pre", { tabIndex: 0 });
+  #asked: AbortController | null = null;
+
+  constructor(host: HTMLElement, page: Page) {
+    this.#page = page;
+    const fps = page.card.rate >= 1 && page.card.rate <= 60 ? page.card.rate : 30;
+    this.#choice = {
+      format: "usdc",
+      fps,
+      loop: false,
+      names: "own",
+      unit: "",
+      up: "",
+      text: "curl",
+    };
+    this.#said.setAttribute("role", "status");
+    this.#code.setAttribute("aria-label", "Text to copy");
+    const texts = (["curl", "python", "link"] as const).map((text) => this.#tab(text));
+    const copy = element("button", { type: "button" }, "Copy");
+    copy.addEventListener("click", () => void this.#copy());
+    const kinds = element("div", { className: "files-kinds", role: "group" }, ...texts, copy);
+    kinds.setAttribute("aria-label", "Ask for it by");
+    host.append(
+      element(
+        "section",
+        { className: "files", ariaLabel: "Files" },
+        element("h2", {}, "Take it away"),
+        this.#fields,
+        this.#get,
+        this.#said,
+        kinds,
+        this.#code,
+      ),
+    );
+  }
+
+  begin(): void {
+    const { store, signal } = this.#page;
+    this.#get.addEventListener("click", () => {
+      if (this.#asked) this.#asked.abort();
+      else void this.#download();
+    });
+    const stop = store.listen((_, changed) => this.#changed(changed));
+    signal.addEventListener("abort", () => {
+      stop();
+      this.#asked?.abort();
+    });
+    this.#draw();
+  }
+
+  get #wanted(): Wanted {
+    const { store, source } = this.#page;
+    const base = source instanceof Client ? source.base : "";
+    const { format } = this.#choice;
+    return {
+      base: base || location.origin,
+      model: store.state.model,
+      format,
+      question: this.#question,
+    };
+  }
+
+  /** What differs from what is usual, so that texts stay short. */
+  get #question(): ClipQuestion {
+    const { controls, performer, level, root } = this.#page.store.state;
+    const { fps, loop, names, unit, up, format } = this.#choice;
+    const measured = format === "glb" ? {} : { ...(unit && { unit }), ...(up && { up }) };
+    return {
+      controls,
+      fps,
+      ...(performer !== null && { performer }),
+      ...(level && { level }),
+      ...(root === "in_place" && { root }),
+      ...(loop && { loop }),
+      ...(names !== "own" && { names }),
+      ...measured,
+    };
+  }
+
+  #changed(changed: ReadonlySet<keyof State>): void {
+    if (changed.has("root") || changed.has("level")) this.#draw();
+    else if (changed.has("controls") || changed.has("performer")) this.#tell();
+  }
+
+  #take(part: Partial<Choice>): void {
+    Object.assign(this.#choice, part);
+    this.#draw();
+  }
+
+  #draw(): void {
+    this.#fields.replaceChildren(...this.#rows());
+    for (const button of this.#host("[data-text]")) {
+      button.setAttribute("aria-pressed", String(button.dataset["text"] === this.#choice.text));
+    }
+    this.#tell();
+  }
+
+  #host(what: string): HTMLElement[] {
+    return [...(this.#code.parentElement?.querySelectorAll<HTMLElement>(what) ?? [])];
+  }
+
+  #rows(): HTMLLabelElement[] {
+    const { card, store } = this.#page;
+    const { format, fps, loop, names, unit, up } = this.#choice;
+    const { root, level } = store.state;
+    const levels = card.levels.map((_, i) => [String(i), `${i}`] as const);
+    const ways = [
+      ["travelling", "travels"],
+      ["in_place", "stays in place"],
+    ] as const;
+    const rows = [
+      labelled(
+        "format",
+        chooser(FORMATS, format, (value) => this.#take({ format: value as ClipFormat })),
+      ),
+      labelled("frames a second", this.#rate(fps)),
+      labelled(
+        "root",
+        chooser(ways, root, (value) => store.set({ root: value as State["root"] })),
+      ),
+      labelled(
+        "level",
+        chooser(levels, String(level), (value) => store.set({ level: Number(value) })),
+      ),
+    ];
+    if (Object.keys(card.roles).length) {
+      rows.push(
+        labelled(
+          "joint names",
+          chooser(NAMES, names, (value) => this.#take({ names: value as Names })),
+        ),
+      );
+    }
+    if (format !== "glb") {
+      const units = [USUAL, ["m", "metres"], ["cm", "centimetres"]] as const;
+      const ups = [USUAL, ["y", "Y"], ["z", "Z"]] as const;
+      rows.push(
+        labelled(
+          "unit",
+          chooser(units, unit, (value) => this.#take({ unit: value as Choice["unit"] })),
+        ),
+        labelled(
+          "up",
+          chooser(ups, up, (value) => this.#take({ up: value as Choice["up"] })),
+        ),
+      );
+    }
+    if (card.cyclic) rows.push(this.#cycle(loop));
+    return rows;
+  }
+
+  #rate(fps: number): HTMLInputElement {
+    const field = element("input", {
+      type: "number",
+      min: "1",
+      max: "1000",
+      step: "any",
+      value: String(fps),
+    });
+    field.addEventListener("change", () => {
+      const value = Number(field.value);
+      if (value >= 1 && value <= 1000) this.#take({ fps: value });
+      else field.value = String(this.#choice.fps);
+    });
+    return field;
+  }
+
+  #cycle(loop: boolean): HTMLLabelElement {
+    const box = element("input", { type: "checkbox", checked: loop });
+    box.addEventListener("change", () => this.#take({ loop: box.checked }));
+    return labelled("closed loop", box);
+  }
+
+  #tab(text: Text): HTMLButtonElement {
+    const name = { curl: "curl", python: "Python", link: "Link" }[text];
+    const button = element("button", { type: "button" }, name);
+    button.dataset["text"] = text;
+    button.addEventListener("click", () => this.#take({ text }));
+    return button;
+  }
+
+  #tell(): void {
+    this.#get.textContent = this.#asked ? "Stop" : `Download ${fileName(this.#wanted)}`;
+    this.#code.textContent = TEXTS[this.#choice.text](this.#wanted);
+  }
+
+  async #copy(): Promise<void> {
+    try {
+      await navigator.clipboard.writeText(this.#code.textContent);
+      this.#say("Copied.");
+    } catch {
+      getSelection()?.selectAllChildren(this.#code);
+      this.#say(
+        "This browser keeps its clipboard to itself; the text is selected, copy it by hand.",
+      );
+    }
+  }
+
+  /** Asks for the whole file and only then hands it to the browser. */
+  async #download(): Promise<void> {
+    const { source, signal } = this.#page;
+    const wanted = this.#wanted;
+    if (!(source instanceof Client)) {
+      this.#say("Files need a service: this page runs without one, on the model file alone.");
+      return;
+    }
+    this.#asked = new AbortController();
+    this.#say(`Asking for ${fileName(wanted)} …`);
+    this.#tell();
+    try {
+      const both = AbortSignal.any([signal, this.#asked.signal]);
+      const { content, mediaType } = await source.file(
+        wanted.model,
+        wanted.format,
+        wanted.question,
+        both,
+      );
+      save(fileName(wanted), new Blob([content], { type: mediaType }));
+      this.#say(`${fileName(wanted)}: ${size(content.length)}, whole.`);
+    } catch (fault) {
+      this.#say(this.#asked.signal.aborted ? "Stopped; nothing was saved." : failed(fault));
+    } finally {
+      this.#asked = null;
+      this.#tell();
+    }
+  }
+
+  #say(text: string): void {
+    this.#said.textContent = text;
+  }
+}
+
+function failed(fault: unknown): string {
+  const said = fault instanceof PosefieldError ? fault.message : String(fault);
+  return `Nothing was saved: ${said}`;
+}
+
+const size = (bytes: number): string =>
+  bytes < 1e6 ? `${figure(bytes / 1e3)} kB` : `${figure(bytes / 1e6)} MB`;
+
+function save(name: string, content: Blob): void {
+  const address = URL.createObjectURL(content);
+  const anchor = element("a", { href: address, download: name });
+  anchor.click();
+  // The browser has read it by then.
+  setTimeout(() => URL.revokeObjectURL(address), 60_000);
+}
