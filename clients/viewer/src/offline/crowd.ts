@@ -10,6 +10,9 @@ import { turned, turnRoot } from "./plane.ts";
 /** Levels differ in how long a clip takes; so does float32. */
 const SLACK = 0.1;
 
+/** Headings are taken within a turn, where float32 still tells small angles apart. */
+const TURN = 2 * Math.PI;
+
 interface Block {
   readonly rotations: Float32Array;
   readonly roots: Float32Array;
@@ -173,7 +176,7 @@ function stay({ rotations, roots, travel }: Block, count: number): void {
 function place({ rotations, roots }: Block, asked: CrowdQuestion, count: number): void {
   const headings = column(asked.heading ?? 0, count);
   for (let row = 0; row < count; row++) {
-    const angle = headings[row]!;
+    const angle = headings[row]! - TURN * Math.floor(headings[row]! / TURN);
     turnRoot(rotations, (rotations.length / count) * row, angle);
     const at = asked.position?.[row] ?? [0, 0, 0];
     const { x, z } = turned({ x: roots[3 * row]!, z: roots[3 * row + 2]! }, angle);

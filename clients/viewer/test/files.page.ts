@@ -1,0 +1,119 @@
+/** The clip as a file: what is saved is what the service sends, and what curl and Python get. */
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdtempSync, readFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { after, before, describe, it } from "node:test";
+import { fileURLToPath } from "node:url";
+
+import type { Browser, Page } from "playwright-core";
+
+import { browser, opened } from "./harness.ts";
+import { COMMAND } from "./static.ts";
+
+const CLIENT = fileURLToPath(new URL("../../python", import.meta.url));
+const FORMATS = ["usdc", "usda", "usdz", "glb", "bvh", "npz", "json"];
+
+describe("files", () => {
+  let from: Browser;
+  let page: Page;
+  let faults: string[];
+  const folder = mkdtempSync(join(tmpdir(), "posefield-files-"));
+
+  before(async () => {
+    from = await browser();
+    ({ page, faults } = await opened(from, "/#cmu_walk"));
+    await page.locator(".files pre", { hasText: "curl" }).waitFor();
+  });
+  after(() => from.close());
+
+  const choose = (name: string, value: string) =>
+    page.locator(".files").getByLabel(name, { exact: true }).selectOption(value);
+  const said = (text: RegExp) => page.locator(".files-said", { hasText: text }).waitFor();
+  const text = async (kind: string) => {
+    await page.locator(".files").getByRole("button", { name: kind, exact: true }).click();
+    return page.locator(".files pre").innerText();
+  };
+  const download = async (): Promise<Buffer> => {
+    const [got] = await Promise.all([
+      page.waitForEvent("download"),
+      page.locator(".files-get").click(),
+    ]);
+    await said(/whole/);
+    return readFileSync(await got.path());
+  };
+
+  it("of every format are saved whole, as the link gives them", async () => {
+    const sizes = new Set<number>();
+    for (const format of FORMATS) {
+      await choose("format", format);
+      const found = await download();
+      const answer = await fetch(await text("Link"));
+      assert.deepEqual(found, Buffer.from(await answer.arrayBuffer()), format);
+      sizes.add(found.length);
+    }
+    assert.equal(sizes.size, FORMATS.length);
+  });
+
+  it("say what was chosen, and curl and Python get the same", async () => {
+    await choose("format", "usda");
+    await choose("up", "z");
+    await choose("unit", "cm");
+    await choose("root", "in_place");
+    await choose("level", "1");
+    await choose("joint names", "mixamo");
+    await page.locator(".files").getByLabel("closed loop").check();
+    await page.locator(".files").getByLabel("frames a second").fill("24");
+    await page.locator(".files").getByLabel("frames a second").press("Tab");
+    const found = await download();
+    const usda = found.toString();
+    for (const word of [
+      /upAxis = "Z"/,
+      /metersPerUnit = 0.01/,
+      /mixamorig/,
+      /timeCodesPerSecond = 24/,
+    ]) {
+      assert.match(usda, word);
+    }
+    execFileSync("sh", ["-c", await text("curl")], { cwd: folder, stdio: "pipe" });
+    assert.deepEqual(readFileSync(join(folder, "cmu_walk.usda")), found);
+  });
+
+  it("Python's client saves the same", {
+    skip: !existsSync(join(CLIENT, "posefield_client")),
+  }, async () => {
+    const found = await download();
+    const own = mkdtempSync(join(tmpdir(), "posefield-python-"));
+    const python = join(dirname(COMMAND), "python");
+    const env = { ...process.env, PYTHONPATH: CLIENT };
+    execFileSync(python, ["-c", await text("Python")], { cwd: own, env, stdio: "pipe" });
+    assert.deepEqual(readFileSync(join(own, "cmu_walk.usda")), found);
+  });
+
+  it("are not saved where the service is lost or one says stop", async () => {
+    let saved = 0;
+    page.on("download", () => saved++);
+    await page.route(/clip\.usda/, (route) => route.abort());
+    await page.locator(".files-get").click();
+    await said(/Nothing was saved/);
+    await page.unroute(/clip\.usda/);
+    await page.route(/clip\.usda/, () => undefined);
+    await page.locator(".files-get").click();
+    await said(/Asking/);
+    await page.locator(".files-get", { hasText: "Stop" }).click();
+    await said(/Stopped; nothing was saved/);
+    await page.unroute(/clip\.usda/);
+    assert.equal(saved, 0);
+    await download();
+    assert.equal(saved, 1);
+  });
+
+  it("and nothing else went wrong unnoticed", () => {
+    assert.deepEqual(
+      faults.filter((line) => !/ERR_FAILED|ERR_ABORTED/.test(line)),
+      [],
+    );
+  });
+});

@@ -1,0 +1,155 @@
+/** Levels side by side and the crowd: what they say is what the service says. */
+
+import assert from "node:assert/strict";
+import { after, before, describe, it } from "node:test";
+
+import { Client, type ModelCard } from "@posefield/client";
+import type { Browser, Page } from "playwright-core";
+
+import { choose, ladder, pixels } from "../src/detail.ts";
+import { browser, opened, SERVICE } from "./harness.ts";
+
+const client = new Client(SERVICE);
+
+describe("levels side by side", () => {
+  let from: Browser;
+  let page: Page;
+  let card: ModelCard;
+  let faults: string[];
+
+  before(async () => {
+    from = await browser();
+    card = await client.card("cmu_walk");
+    ({ page, faults } = await opened(from, "/#cmu_walk?~view=levels"));
+    await page.locator(".levels-now", { hasText: "px" }).first().waitFor();
+  });
+  after(() => from.close());
+
+  const texts = () => page.locator(".levels article").allInnerTexts();
+  const worst = async () =>
+    (await page.locator(".levels-now").allInnerTexts())
+      .slice(1)
+      .map((text) => Number(text.match(/worst ([\d.]+)/)![1]));
+
+  it("say what each level is and costs", async () => {
+    const said = await texts();
+    assert.equal(said.length, card.levels.length);
+    for (const [level, { operations, bytes }] of card.levels.entries()) {
+      assert.ok(said[level]!.includes(operations.toLocaleString("en")), said[level]);
+      assert.ok(said[level]!.includes(`${Number((bytes / 1000).toPrecision(3))} kB`), said[level]);
+    }
+    assert.notEqual(said[0], said[1]);
+  });
+
+  it("say how far off each is as it is seen, more the nearer one looks", async () => {
+    const far = await worst();
+    assert.ok(far.every((value) => value > 0) && far[2]! > far[0]!, String(far));
+    const { x, y, width, height } = (await page.locator("#stage canvas").boundingBox())!;
+    await page.mouse.move(x + width / 2, y + height / 3);
+    for (let i = 0; i < 6; i++) await page.mouse.wheel(0, -240);
+    await page.waitForFunction(
+      (before) => {
+        const all = [...document.querySelectorAll(".levels-now")].slice(1);
+        const now = all.map(({ textContent }) => Number(textContent.match(/worst ([\d.]+)/)![1]));
+        return now.every((value, i) => value > before[i]!);
+      },
+      far,
+      { timeout: 10_000 },
+    );
+  });
+
+  it("say from where on nothing shows", async () => {
+    const said = (await texts()).map((text) =>
+      Number(text.match(/from ([\d,]+) m/)![1]!.replace(",", "")),
+    );
+    const { errors, radius } = ladder(card);
+    const scale = (said[3]! - radius) / errors[3]!;
+    for (const level of [1, 2]) {
+      assert.ok(Math.abs(said[level]! - (errors[level]! * scale + radius)) <= 1.5, String(said));
+    }
+    assert.ok(said[3]! - said[1]! > 1.5);
+  });
+
+  it("and nothing went wrong unnoticed", () => assert.deepEqual(faults, []));
+});
+
+describe("the crowd", () => {
+  let from: Browser;
+  let page: Page;
+  let faults: string[];
+
+  before(async () => {
+    from = await browser();
+    ({ page, faults } = await opened(from, "/#cmu_walk?~view=crowd"));
+    await page.locator(".crowd[data-frame]").waitFor({ timeout: 60_000 });
+  });
+  after(() => from.close());
+
+  const counts = async () => (await page.locator(".crowd li b").allInnerTexts()).map(Number);
+  const slide = async (which: number, value: string) => {
+    await page.locator(".crowd input").nth(which).fill(value);
+    await page.waitForTimeout(1500);
+  };
+  const sum = (all: readonly number[]) => all.reduce((total, value) => total + value, 0);
+
+  it("counts everybody by level", async () => {
+    assert.equal(sum(await counts()), 300);
+  });
+
+  it("is coarser where more pixels may be off, and finer where fewer", async () => {
+    await slide(1, "4");
+    const coarse = await counts();
+    await slide(1, "-2");
+    const fine = await counts();
+    assert.ok(coarse[0]! < fine[0]!, `${coarse} ${fine}`);
+    assert.equal(sum(fine), 300);
+  });
+
+  it("is as many as one says", async () => {
+    await slide(0, "50");
+    assert.equal(sum(await counts()), 50);
+    await slide(0, "1000");
+    assert.equal(sum(await counts()), 1000);
+    await slide(0, "300");
+  });
+
+  it("takes the levels that the service takes", async () => {
+    const card = await client.card("cmu_walk");
+    const own = ladder(card);
+    const camera = { position: [1, 1.7, -4], fov: 0.8, height: 720 };
+    const position = Array.from({ length: 200 }, (_, i) => [(13 * i) % 70, 0, (29 * i) % 90]);
+    const previous = position.map((_, i) => i % card.levels.length);
+    const controls = Object.fromEntries(card.controls.map((each) => [each.name, each.default]));
+    const asked = { controls, time: 0, position, camera, level: "auto" as const, pixels: 2 };
+    const levels = (limit: number, held: readonly number[] | null) =>
+      position.map((at, i) => {
+        const far = Math.hypot(
+          ...at.map((x, axis) => x + own.middle[axis]! - camera.position[axis]!),
+        );
+        return choose(own.errors, pixels(camera) / (far - own.radius), limit, held?.[i] ?? -1);
+      });
+    const { levels: theirs } = await client.crowd("cmu_walk", asked);
+    assert.deepEqual(levels(2, null), [...theirs]);
+    assert.notDeepEqual(levels(2.2, null), [...theirs]);
+    const { levels: held } = await client.crowd("cmu_walk", { ...asked, previous_level: previous });
+    assert.deepEqual(levels(2, previous), [...held]);
+    assert.notDeepEqual([...held], [...theirs]);
+  });
+
+  it("moves", async () => {
+    const shot = () => page.locator("#stage canvas").screenshot();
+    const before = await shot();
+    await page.waitForTimeout(500);
+    assert.notDeepEqual(await shot(), before);
+  });
+
+  it("of a model that does not walk stays and says so", async () => {
+    const other = await opened(from, "/#reaching?~view=crowd");
+    await other.page.locator(".crowd[data-frame]").waitFor({ timeout: 60_000 });
+    assert.match(await other.page.locator(".crowd").innerText(), /does not walk/);
+    assert.deepEqual(other.faults, []);
+    await other.page.close();
+  });
+
+  it("and nothing went wrong unnoticed", () => assert.deepEqual(faults, []));
+});
