@@ -94,22 +94,20 @@ function slider(
   valued: (place: number) => number,
   placed: (value: number) => number,
 ): HTMLElement {
-  const words = element("span", {}, "");
   const input = element("input", { type: "range" });
   Object.assign(input, {
     min: String(range.min),
     max: String(range.max),
     step: String(range.step),
   });
+  const host = labelled("", input);
   const show = (state: State) => {
     input.value = String(placed(state[key]));
-    words.textContent = said(state[key]);
-    input.setAttribute("aria-valuetext", words.textContent);
+    host.firstElementChild!.textContent = said(state[key]);
+    input.setAttribute("aria-valuetext", said(state[key]));
   };
   input.addEventListener("input", () => page.store.set({ [key]: valued(Number(input.value)) }));
   page.signal.addEventListener("abort", page.store.listen(show));
   show(page.store.state);
-  const host = labelled("", input);
-  host.replaceChildren(words, input);
   return host;
 }

@@ -150,7 +150,7 @@ class Files {
     return [...(this.#code.parentElement?.querySelectorAll<HTMLElement>(what) ?? [])];
   }
 
-  #rows(): HTMLLabelElement[] {
+  #rows(): HTMLElement[] {
     const { card, store } = this.#page;
     const { format, fps, loop, names, unit, up } = this.#choice;
     const { root, level } = store.state;
@@ -159,7 +159,7 @@ class Files {
       ["travelling", "travels"],
       ["in_place", "stays in place"],
     ] as const;
-    const rows = [
+    const rows: HTMLElement[] = [
       labelled(
         "format",
         chooser(FORMATS, format, (value) => this.#take({ format: value as ClipFormat })),
@@ -216,7 +216,7 @@ class Files {
     return field;
   }
 
-  #cycle(loop: boolean): HTMLLabelElement {
+  #cycle(loop: boolean): HTMLElement {
     const box = element("input", { type: "checkbox", checked: loop });
     box.addEventListener("change", () => this.#take({ loop: box.checked }));
     return labelled("closed loop", box);

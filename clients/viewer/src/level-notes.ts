@@ -3,7 +3,7 @@
 import type { ModelCard } from "@posefield/client";
 
 import { farEnough, type Ladder, type Lens } from "./detail.ts";
-import { centimetres, element, figure, whole } from "./markup.ts";
+import { element, figure, whole } from "./markup.ts";
 
 /** Pixels between joints of two poses: the greatest, and the root mean square. */
 export interface Apart {
@@ -23,7 +23,7 @@ export class Note {
     const rows: [string, HTMLElement][] = [
       ["size", element("dd", {}, `${figure(bytes / 1000)} kB`)],
       ["cost", element("dd", {}, `${whole(operations)} multiply-adds`)],
-      ["off by", element("dd", {}, `${centimetres(rms)}, worst pose ${centimetres(pose)}`)],
+      ["off by", element("dd", {}, `${short(rms)} cm, worst pose ${short(pose)}`)],
       ["now", this.#now],
       ["≤ 1 px", this.#from],
     ];
@@ -44,4 +44,5 @@ export class Note {
   }
 }
 
+const short = (metres: number): string => String(Number((100 * metres).toPrecision(2)));
 const pixels = (value: number): string => value.toFixed(value < 10 ? 1 : 0);

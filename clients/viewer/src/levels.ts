@@ -52,7 +52,7 @@ class Levels {
   readonly #figures: Figure[];
   readonly #asking: Latest<ClipQuestion>;
   readonly #laid: Float32Array;
-  #since = 0;
+  #since = READING;
 
   constructor(host: HTMLElement, page: Page) {
     this.#page = page;

@@ -114,6 +114,7 @@ class Map2 {
     const asked = ["across", "along", "controls", "performer"] as const;
     if (!asked.some((key) => changed.has(key))) return;
     this.#chosen = null;
+    this.#tell();
     this.#redraw();
     this.#renew(REST);
   }

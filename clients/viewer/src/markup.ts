@@ -16,9 +16,17 @@ export function element<Tag extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-/** A word and the field that it names, which reads as one to everybody. */
-export function labelled(text: string, field: HTMLElement): HTMLLabelElement {
-  return element("label", {}, element("span", {}, text), field);
+let fields = 0;
+
+/** A word and the field that it names, for everybody; the word may change. */
+export function labelled(word: string, field: HTMLElement): HTMLDivElement {
+  field.id ||= `field-${fields++}`;
+  return element(
+    "div",
+    { className: "field" },
+    element("label", { htmlFor: field.id }, word),
+    field,
+  );
 }
 
 /** A list to choose from; values and what they are called. */

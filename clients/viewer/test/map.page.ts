@@ -22,8 +22,8 @@ describe("the map", () => {
     from = await browser();
     ({ page, faults } = await opened(from, "/#reaching"));
     card = await client.card("reaching");
-    await page.getByLabel("across").selectOption("turn");
-    await page.getByLabel("up", { exact: true }).first().selectOption("target_height");
+    await page.locator(".map").getByLabel("across", { exact: true }).selectOption("turn");
+    await page.locator(".map").getByLabel("up", { exact: true }).selectOption("target_height");
     await page.locator(".map-words", { hasText: "Within" }).waitFor();
     await settled(page, "turn");
   });
@@ -120,9 +120,9 @@ describe("the map", () => {
   it("has a table for who does not see it, and exchanges its axes", async () => {
     await page.getByText("Sigma as a table").click();
     assert.equal(await page.locator(".map tbody tr").count(), 6);
-    await page.getByLabel("across").selectOption("target_height");
+    await page.locator(".map").getByLabel("across", { exact: true }).selectOption("target_height");
     await settled(page, "target_height");
-    assert.equal(await page.getByLabel("up", { exact: true }).first().inputValue(), "turn");
+    assert.equal(await page.locator(".map").getByLabel("up", { exact: true }).inputValue(), "turn");
     assert.match(
       await page.locator(".map caption").innerText(),
       /Columns: target_height, rows: turn/,
