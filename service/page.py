@@ -38,12 +38,14 @@ def page(
         typer.echo(orjson.dumps(plain, option=orjson.OPT_INDENT_2).decode())
         return
     size = sum(written.values()) / 1e6
-    typer.echo(f"{output}: {identity}, {len(written)} files, {size:.1f} MB; any web server shows it:")
+    typer.echo(
+        f"{output}: {identity}, {len(written)} files, {size:.1f} MB; any web server shows it:"
+    )
     typer.echo(f"  python3 -m http.server --directory {output}")
 
 
 def write(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]:
-    """Write files by their names, each whole, and give their sizes; FileError where one cannot be."""
+    """Write files by their names, each whole, and give their sizes; FileError where it fails."""
     sizes = {}
     for name, content in contents:
         files.write(content, folder / name)
