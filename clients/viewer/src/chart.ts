@@ -10,7 +10,7 @@ export type Control = ModelCard["controls"][number];
 /** How far the map goes beyond what was sampled, as a share of it. */
 export const MARGIN = 0.25;
 const [LEFT, RIGHT, TOP, BOTTOM] = [46, 10, 10, 34];
-const [DOT, RING] = [2.5, 9];
+const [DOT, RING] = [2.5, 7];
 
 /** A captured clip on the map; `error` is the share of the largest, `near` 1 where one is. */
 export interface Dot {
@@ -175,7 +175,7 @@ function mark(pen: CanvasRenderingContext2D, frame: Frame, dot: Dot, chosen: boo
   pen.stroke();
   if (dot.error > 0) {
     circle(pen, x, y, DOT + 1 + RING * dot.error);
-    pen.strokeStyle = chosen ? "#ff7a1a" : "#fffd";
+    pen.strokeStyle = chosen ? "#ff7a1a" : "#fff9";
     pen.lineWidth = chosen ? 2 : 1;
     pen.stroke();
   }

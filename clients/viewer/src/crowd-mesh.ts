@@ -22,8 +22,8 @@ const CORNERS = 8;
 const SHADES = 32;
 const SUN = [0.42, 0.78, 0.46] as const;
 const SIDES = [0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7];
-const CAPS = [0, 3, 2, 0, 2, 1, 4, 5, 6, 4, 6, 7];
-const FACES = [...SIDES, ...CAPS];
+// A bone begins within the one before it: only its end is seen.
+const FACES = [...SIDES, 4, 5, 6, 4, 6, 7];
 
 export class CrowdMesh {
   readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;

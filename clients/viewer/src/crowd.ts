@@ -26,6 +26,8 @@ import type { State } from "./state.ts";
 export const MOST = 1000;
 /** Metres between lines of the ground, and seconds between two readings of numbers. */
 const [GROUND, READING] = [5, 0.25];
+/** Metres from which on small bones are left out. */
+const FAR = 12;
 
 export const mount: Mount = (host, page) => new CrowdView(host, page).begin();
 
@@ -180,7 +182,10 @@ class CrowdView {
       if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
       crowd.lay(this.#laid, i);
       const level = crowd.level[i]!;
+      const [x, z] = [crowd.x[i]! - camera.position.x, crowd.z[i]! - camera.position.z];
+      const far = x * x + z * z > FAR * FAR;
       for (let bone = 0; bone < bones.length; bone++) {
+        if (far && bones[bone]!.minor) continue;
         mesh.add(this.#laid, SIZE * bone, level, bones[bone]!.taper);
       }
       seen++;

@@ -9,7 +9,7 @@ import type { Placed } from "./skeleton.ts";
 export const SIZE = 12;
 /** Bones shorter than this, m, are nobody's to see. */
 const SHORTEST = 0.03;
-const TORSO = 1.0;
+const [TORSO, MINOR] = [1.0, 0.1];
 
 interface Bone {
   /** The joint that turns it. */
@@ -20,6 +20,8 @@ interface Bone {
   readonly radius: number;
   /** How wide it ends, as a share of how wide it begins. */
   readonly taper: number;
+  /** Nobody's to see from afar: a finger, a toe. */
+  readonly minor: boolean;
 }
 
 export class Rig {
@@ -108,11 +110,15 @@ function thickness(
   bone: Pick<Bone, "joint" | "child" | "offset">,
   below: number,
   top: number,
-): Pick<Bone, "radius" | "taper"> {
-  if (bone.child < 0 && bone.joint === top) return { radius: 0.09, taper: 0.85 };
-  if (below > TORSO) return { radius: 0.12, taper: 1 };
+): Pick<Bone, "radius" | "taper" | "minor"> {
+  if (bone.child < 0 && bone.joint === top) return { radius: 0.09, taper: 0.85, minor: false };
+  if (below > TORSO) return { radius: 0.12, taper: 1, minor: false };
   const length = Math.hypot(...bone.offset);
-  return { radius: Math.min(0.07, Math.max(0.025, 0.19 * length)), taper: 0.7 };
+  return {
+    radius: Math.min(0.07, Math.max(0.025, 0.19 * length)),
+    taper: 0.7,
+    minor: length < MINOR,
+  };
 }
 
 function axes(out: Float32Array, at: number, along: ArrayLike<number>, radius: number): void {

@@ -70,7 +70,10 @@ describe("the map", () => {
     const beyond = minimum - 0.15 * (maximum - minimum);
     await page.mouse.click(...(await at(beyond, 1.2)));
     const [turn, height] = await here();
-    assert.ok(Math.abs(turn! - beyond) < 1.5 && Math.abs(height! - 1.2) < 0.03, `${turn} ${height}`);
+    assert.ok(
+      Math.abs(turn! - beyond) < 1.5 && Math.abs(height! - 1.2) < 0.03,
+      `${turn} ${height}`,
+    );
     await page.mouse.move(...(await at(0, 1.4)));
     await page.mouse.down();
     await page.mouse.move(...(await at(60, 0.5)), { steps: 4 });
