@@ -1,11 +1,11 @@
 /** The clip that is shown as a file, or as text that asks for it. */
 
-import { Client, type ClipFormat, type ClipQuestion, PosefieldError } from "@posefield/client";
+import { type Client, type ClipFormat, type ClipQuestion, PosefieldError } from "@posefield/client";
 
 import "./files.css";
 import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
 import { chooser, element, figure, labelled } from "./markup.ts";
-import type { Mount, Page } from "./page.ts";
+import type { Mount, Page, Source } from "./page.ts";
 import type { State } from "./state.ts";
 
 const FORMATS = [
@@ -100,15 +100,10 @@ class Files {
   }
 
   get #wanted(): Wanted {
-    const { store, source } = this.#page;
-    const base = source instanceof Client ? source.base : "";
+    const { model } = this.#page.store.state;
     const { format } = this.#choice;
-    return {
-      base: base || location.origin,
-      model: store.state.model,
-      format,
-      question: this.#question,
-    };
+    // Who serves the page serves the files.
+    return { base: location.origin, model, format, question: this.#question };
   }
 
   /** What differs from what is usual, so that texts stay short. */
@@ -251,7 +246,7 @@ class Files {
   async #download(): Promise<void> {
     const { source, signal } = this.#page;
     const wanted = this.#wanted;
-    if (!(source instanceof Client)) {
+    if (!gives(source)) {
       this.#say("Files need a service: this page runs without one, on the model file alone.");
       return;
     }
@@ -279,6 +274,11 @@ class Files {
   #say(text: string): void {
     this.#said.textContent = text;
   }
+}
+
+/** A service gives files too; a model in the browser does not. */
+function gives(source: Source): source is Source & Pick<Client, "file"> {
+  return "file" in source;
 }
 
 function failed(fault: unknown): string {
