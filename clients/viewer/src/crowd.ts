@@ -18,7 +18,7 @@ import { type Library, library } from "./crowd-library.ts";
 import { CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
 import { Crowd, REACH } from "./crowd-walk.ts";
-import { type Ladder, ladder } from "./detail.ts";
+import { type Ladder, ladder, lens } from "./detail.ts";
 import type { Mount, Page } from "./page.ts";
 import { SIZE } from "./rig.ts";
 import type { State } from "./state.ts";
@@ -160,10 +160,9 @@ class CrowdView {
     const { camera, renderer } = this.#page.scene;
     if (playing) this.#crowd.step(seconds * speed);
     camera.updateMatrixWorld();
-    const lens = { fov: (camera.fov * Math.PI) / 180, height: renderer.domElement.height };
-    this.#crowd.detail(this.#ladder, lens, camera.position, pixels);
-    const seen = this.#fill();
-    this.#read(begun, seen);
+    const seen = lens(camera.fov, renderer.domElement);
+    this.#crowd.detail(this.#ladder, seen, camera.position, pixels);
+    this.#read(begun, this.#fill());
     return playing;
   }
 

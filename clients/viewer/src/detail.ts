@@ -11,6 +11,11 @@ export interface Lens {
   readonly height: number;
 }
 
+/** The lens that a canvas is seen through, at the screen's own pixels, however coarsely it is drawn. */
+export function lens(fov: number, canvas: HTMLCanvasElement): Lens {
+  return { fov: (fov * Math.PI) / 180, height: canvas.clientHeight * devicePixelRatio };
+}
+
 /** What the rule knows of a model. */
 export interface Ladder {
   /** Error of each level's worst pose, m; none is below that of a finer one. */

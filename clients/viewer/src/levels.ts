@@ -12,7 +12,7 @@ import {
 
 import "./levels.css";
 import { levelColour, onTheme } from "./colours.ts";
-import { type Ladder, ladder } from "./detail.ts";
+import { type Ladder, ladder, lens } from "./detail.ts";
 import { Ghost } from "./ghost-lines.ts";
 import { Latest } from "./latest.ts";
 import { type Apart, Note } from "./level-notes.ts";
@@ -26,6 +26,8 @@ import type { State } from "./state.ts";
 const RATE = 60;
 /** Seconds between two changes of the numbers that are read. */
 const READING = 0.15;
+/** How far the picture moves up, as a share of its height. */
+const RAISED = 0.12;
 
 export const mount: Mount = (host, page) => new Levels(host, page).begin();
 
@@ -75,6 +77,7 @@ class Levels {
     ];
     signal.addEventListener("abort", () => {
       for (const end of ends) end();
+      if (this.#group.visible) scene.camera.clearViewOffset();
       this.#host.remove();
       this.#group.removeFromParent();
       for (const { mesh } of this.#figures) mesh.dispose();
@@ -110,6 +113,7 @@ class Levels {
   }
 
   #show(state: State): void {
+    if (this.#group.visible && state.view !== "levels") this.#page.scene.camera.clearViewOffset();
     this.#group.visible = state.view === "levels";
     this.#host.hidden = !this.#group.visible;
     this.#page.scene.redraw();
@@ -141,6 +145,7 @@ class Levels {
   #step(seconds: number): boolean {
     if (!this.#group.visible || !this.#figures.every(({ motion }) => motion)) return false;
     const { store, scene } = this.#page;
+    raise(scene.camera, scene.renderer.domElement);
     const aside = beside(scene.camera, scene.orbit.target, this.#figures.length);
     for (const [level, figure] of this.#figures.entries()) {
       this.#place(figure, level, store.state.time, aside);
@@ -168,16 +173,22 @@ class Levels {
   #tell(): void {
     const { camera, renderer } = this.#page.scene;
     camera.updateMatrixWorld();
-    const { width, height } = renderer.domElement;
-    const lens = { fov: (camera.fov * Math.PI) / 180, height };
+    const seen = lens(camera.fov, renderer.domElement);
+    const size = [seen.height * camera.aspect, seen.height] as const;
     for (const { joints, note, mesh } of this.#figures) {
       note.show(
-        apart(camera, [width, height], this.#figures[0]!.joints, joints, mesh.position),
+        apart(camera, size, this.#figures[0]!.joints, joints, mesh.position),
         this.#ladder,
-        lens,
+        seen,
       );
     }
   }
+}
+
+/** Moves the picture up, so that notes hide nobody's feet. */
+function raise(camera: PerspectiveCamera, { clientWidth, clientHeight }: HTMLCanvasElement): void {
+  const up = RAISED * clientHeight;
+  camera.setViewOffset(clientWidth, clientHeight, 0, up, clientWidth, clientHeight);
 }
 
 /** From one character to the next: along the image, so that each stands above its column. */

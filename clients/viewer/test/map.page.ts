@@ -35,7 +35,10 @@ describe("the map", () => {
       Number(text!.replace("−", "-")),
     );
   };
-  const box = async () => (await page.locator(".map-canvas").boundingBox())!;
+  const box = async () => {
+    await page.locator(".map-canvas").scrollIntoViewIfNeeded();
+    return (await page.locator(".map-canvas").boundingBox())!;
+  };
   const control = (name: string) => card.controls.find((each) => each.name === name)!;
   const frame = async () => {
     const { width, height } = await box();
