@@ -143,6 +143,12 @@ for (const model of ["reaching", "cmu_walk"]) {
       assert.deepEqual(own.inside, theirs.inside);
     });
 
+    it("shows its page, which says what needs a service", async () => {
+      await page.locator(".map-words", { hasText: "Within" }).waitFor();
+      await page.locator(".files-get").click();
+      await page.locator(".files-said", { hasText: "need a service" }).waitFor();
+    });
+
     it("refuses in words what it cannot answer", async () => {
       const [controls] = points(card, 1);
       const refused = (operation: string, question: object) =>
