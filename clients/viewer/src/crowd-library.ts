@@ -31,7 +31,7 @@ interface Row {
   readonly performer: string | null;
 }
 
-/** Five questions for a model of four levels: what its clips do, and then their poses. */
+/** Ten questions for a model of four levels: what its clips do, and then their poses. */
 export async function library(
   source: Source,
   model: string,
