@@ -1,6 +1,12 @@
 /** Questions about the body that is shown. */
 
-import { type ModelCard, type Motion, type Poses, Problem, type CrowdPoses } from "@posefield/client";
+import {
+  type CrowdPoses,
+  type ModelCard,
+  type Motion,
+  type Poses,
+  Problem,
+} from "@posefield/client";
 
 import type { Source } from "./page.ts";
 import type { State } from "./state.ts";

@@ -1,7 +1,7 @@
 /** The body that is asked for, on the stage; the camera goes along with it. */
 
-import type { Session } from "./session.ts";
 import { Figure } from "./figure.ts";
+import type { Session } from "./session.ts";
 import * as theme from "./theme.ts";
 
 export function mount({ card, player, scene, signal, store }: Session): void {

@@ -24,12 +24,12 @@ export interface Shape {
 /** Bones are drawn from this length on, m. */
 const SHORTEST = 0.008;
 
-const shape = (
-  radii: Shape["radii"],
-  wide = 1,
-  deep = 1,
-  caps: Shape["caps"] = [1, 1],
-): Shape => ({ radii, wide, deep, caps });
+const shape = (radii: Shape["radii"], wide = 1, deep = 1, caps: Shape["caps"] = [1, 1]): Shape => ({
+  radii,
+  wide,
+  deep,
+  caps,
+});
 
 /** Of somebody 1.75 m tall, by role of the joint that turns the bone. */
 const SHAPES: Readonly<Record<string, Shape>> = {
@@ -104,7 +104,8 @@ function formed(roles: readonly string[], by: number, to: number, long: number):
   const part = roles[by]!;
   const next = to < 0 ? "" : roles[to]!;
   if (part === "hips" && /UpperLeg$/.test(next)) return HIP;
-  if (part === "finger" || next === "finger") return next && part !== "finger" ? hand(long) : FINGER;
+  if (part === "finger" || next === "finger")
+    return next && part !== "finger" ? hand(long) : FINGER;
   if (/hest$|spine/.test(part) && /Shoulder$|UpperArm$/.test(next)) return SHAPES["Shoulder"]!;
   const found = SHAPES[part] ?? SHAPES[part.replace(/^left|^right/, "")];
   return found ?? slender(long);

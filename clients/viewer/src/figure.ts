@@ -1,7 +1,7 @@
 /** A body on the stage, as sticks or as a mannequin, solid or as a ghost. */
 
 import type { ModelCard } from "@posefield/client";
-import { Group, type Material, MeshStandardMaterial } from "three";
+import { Group, type Material, MeshLambertMaterial } from "three";
 
 import { Mannequin } from "./mannequin.ts";
 import type { Shown } from "./player.ts";
@@ -18,7 +18,7 @@ const GHOST = { skin: "--ghost", stick: "--ghost", joint: "--ghost" } as const;
 export class Figure {
   readonly group = new Group();
   readonly #card: ModelCard;
-  readonly #materials: Readonly<Record<keyof typeof SOLID, MeshStandardMaterial>>;
+  readonly #materials: Readonly<Record<keyof typeof SOLID, MeshLambertMaterial>>;
   readonly #colours: typeof SOLID | typeof GHOST;
   readonly #before: readonly Material[];
   #body: Stick | Mannequin | null = null;
@@ -28,7 +28,7 @@ export class Figure {
   constructor(card: ModelCard, ghost: boolean) {
     this.#card = card;
     this.#colours = ghost ? GHOST : SOLID;
-    const made = () => (ghost ? pale() : new MeshStandardMaterial({ roughness: 0.62 }));
+    const made = () => (ghost ? pale() : new MeshLambertMaterial());
     this.#materials = { skin: made(), stick: made(), joint: made() };
     this.#before = ghost ? [hollow()] : [];
     this.tint();
@@ -73,11 +73,11 @@ export class Figure {
   }
 }
 
-function pale(): MeshStandardMaterial {
-  return new MeshStandardMaterial({ roughness: 1, transparent: true, opacity: 0.32 });
+function pale(): MeshLambertMaterial {
+  return new MeshLambertMaterial({ transparent: true, opacity: 0.32 });
 }
 
 /** Fills the depth alone, so that what is pale shows its outside once and not its inside. */
 function hollow(): Material {
-  return new MeshStandardMaterial({ colorWrite: false });
+  return new MeshLambertMaterial({ colorWrite: false });
 }

@@ -38,7 +38,8 @@ void main() {
   float fade = 1.0 - smoothstep(0.1, 1.0, length(local) / 12.0);
   float line = max(0.55 * lines(1.0), 0.2 * lines(0.25));
   vec3 colour = mix(paper, ink, line * fade * 0.5);
-  colour = mix(colour, colour * dim, (1.0 - getShadowMask()) * fade);
+  // Shadows fall near the middle, and cost where they are looked for.
+  if (length(local) < 2.6) colour = mix(colour, colour * dim, 1.0 - getShadowMask());
   gl_FragColor = vec4(colour, 1.0);
   #include <colorspace_fragment>
 }`;

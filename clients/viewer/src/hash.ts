@@ -74,7 +74,7 @@ export function restored(
       : steer(controls, key, text);
     if (fault) faults.push(fault);
   }
-  return { state: { ...start, ...rest, controls }, faults };
+  return { state: { ...start, ...(rest as Partial<Rest>), controls }, faults };
 }
 
 export function written(state: State, card: ModelCard): string {

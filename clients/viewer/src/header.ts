@@ -69,12 +69,19 @@ export class Header {
 }
 
 function helped(): HTMLElement {
-  const rows = KEYS.flatMap(([key, what]) => [el("dt", {}, el("kbd", {}, key)), el("dd", {}, what)]);
+  const rows = KEYS.flatMap(([key, what]) => [
+    el("dt", {}, el("kbd", {}, key)),
+    el("dd", {}, what),
+  ]);
   return el(
     "div",
     { popover: "auto", id: id(), class: "help", role: "dialog", "aria-label": "Keys" },
     el("h2", {}, "Keys"),
     el("dl", {}, ...rows),
-    el("p", { class: "about" }, "Drag turns the view, the wheel or two fingers bring it nearer, the right button or two fingers move it."),
+    el(
+      "p",
+      { class: "about" },
+      "Drag turns the view, the wheel or two fingers bring it nearer, the right button or two fingers move it.",
+    ),
   );
 }

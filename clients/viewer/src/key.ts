@@ -6,7 +6,12 @@ import { el, id } from "./dom.ts";
 export class KeyDialog {
   readonly #dialog: HTMLDialogElement;
   readonly #text = el("p");
-  readonly #field = el("input", { type: "password", id: id(), autocomplete: "off", required: true });
+  readonly #field = el("input", {
+    type: "password",
+    id: id(),
+    autocomplete: "off",
+    required: true,
+  });
 
   constructor(host: HTMLElement, take: (key: string) => void) {
     const form = el(

@@ -3,9 +3,9 @@
 import type { Bone, Shape } from "./build.ts";
 
 /** Points around a ring, and rings along a bone, ends included. */
-const AROUND = 14;
-const CAP = 4;
-const BODY = 7;
+const AROUND = 12;
+const CAP = 3;
+const BODY = 6;
 /** Shares of a bone from its ends in which its neighbours move the skin too. */
 const SOFT = 0.28;
 
@@ -131,7 +131,7 @@ function soft(along: number): number {
 function quad(index: number[], ring: number, i: number): void {
   const next = (i + 1) % AROUND;
   const [a, b, c, d] = [ring + i, ring + next, ring + AROUND + i, ring + AROUND + next];
-  index.push(a, b, c, b, d, c);
+  index.push(a, c, b, b, c, d);
 }
 
 function cross(a: readonly number[], b: readonly number[]): number[] {

@@ -2,9 +2,9 @@
 
 import type { ModelCard } from "@posefield/client";
 import {
-  Bone as Joint,
   BufferAttribute,
   BufferGeometry,
+  Bone as Joint,
   type Material,
   Matrix4,
   Object3D,
@@ -41,7 +41,10 @@ export class Mannequin extends Object3D {
     parents.forEach((parent, at) => {
       (parent < 0 ? this : this.#joints[parent]!).add(this.#joints[at]!);
     });
-    this.#skeleton = new Skeleton([...this.#joints], names.map(() => new Matrix4()));
+    this.#skeleton = new Skeleton(
+      [...this.#joints],
+      names.map(() => new Matrix4()),
+    );
     this.#wrap();
     materials.forEach((material, order) => void this.add(this.#clothed(material, order)));
   }
@@ -57,7 +60,7 @@ export class Mannequin extends Object3D {
     });
   }
 
-  dispose(): void {
+  override dispose(): void {
     this.#geometry.dispose();
     this.#skeleton.dispose();
   }

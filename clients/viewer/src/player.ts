@@ -5,7 +5,16 @@ import type { ModelCard, Motion, Poses, Trust } from "@posefield/client";
 import * as ask from "./ask.ts";
 import { Latest } from "./latest.ts";
 import type { Page } from "./page.ts";
-import { advanced, type Carried, after, carried, NOWHERE, type Pose, pose, sample } from "./playback.ts";
+import {
+  advanced,
+  after,
+  type Carried,
+  carried,
+  NOWHERE,
+  type Pose,
+  pose,
+  sample,
+} from "./playback.ts";
 import type { State } from "./state.ts";
 import { Stopwatch } from "./stopwatch.ts";
 
@@ -169,7 +178,8 @@ export class Player {
     const { loop, playing, speed, time } = this.#page.store.state;
     if (!playing || !this.#clip) return false;
     const next = advanced(time, seconds * speed, this.duration, loop);
-    for (let lap = 0; lap < Math.min(next.laps, 4); lap++) this.#carried = after(this.#carried, this.#lap);
+    for (let lap = 0; lap < Math.min(next.laps, 4); lap++)
+      this.#carried = after(this.#carried, this.#lap);
     this.#show(next.time);
     this.#page.store.set({ time: next.time, playing: next.playing });
     return next.playing;

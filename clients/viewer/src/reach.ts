@@ -27,7 +27,9 @@ export class Reach {
   constructor(session: Session, event: CardEvent) {
     this.#session = session;
     this.#event = event;
-    this.#free = session.card.controls.filter((each) => !each.values.length).map((each) => each.name);
+    this.#free = session.card.controls
+      .filter((each) => !each.values.length)
+      .map((each) => each.name);
   }
 
   /** From here on the controls leave where they are now only as far as they must. */
@@ -53,7 +55,9 @@ export class Reach {
       );
       if (!wanted()) return;
       yield miss;
-      const moved = next.some((value, i) => Math.abs(value - values[i]!) > 1e-4 * (free[i]!.maximum - free[i]!.minimum));
+      const moved = next.some(
+        (value, i) => Math.abs(value - values[i]!) > 1e-4 * (free[i]!.maximum - free[i]!.minimum),
+      );
       if (miss < NEAR || !moved) return;
       values = next;
       this.#take(values, player.duration);

@@ -12,19 +12,21 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { Ground } from "./ground.ts";
+import { isSoftware, Quality } from "./quality.ts";
 import * as theme from "./theme.ts";
 
 /** Called before each drawing with the seconds since the last; true asks to be called again. */
 export type Step = (seconds: number) => boolean;
 
 /** How far the body may be from where the camera looks before the camera goes along, m. */
-const LEASH = 0.5;
+const LEASH = 0.15;
 
 export class Scene {
   readonly root = new Root();
   readonly camera = new PerspectiveCamera(38, 1, 0.05, 500);
   readonly renderer: WebGLRenderer;
   readonly orbit: OrbitControls;
+  readonly #quality: Quality;
   readonly #steps = new Set<Step>();
   readonly #ground = new Ground();
   readonly #sun = sun();
@@ -32,7 +34,10 @@ export class Scene {
   #last = 0;
 
   constructor(host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: true });
+    const software = isSoftware();
+    this.renderer = new WebGLRenderer({ antialias: !software });
+    this.#quality = new Quality(this.renderer, software, () => this.redraw());
+    if (software) this.#sun.shadow.mapSize.set(512, 512);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     const canvas = this.renderer.domElement;
@@ -107,8 +112,10 @@ export class Scene {
   }
 
   #draw(now: number): void {
-    const seconds = Math.min(0.1, (now - this.#last) / 1000);
+    const since = now - this.#last;
+    const seconds = Math.min(0.1, since / 1000);
     this.#last = now;
+    this.#quality.drawing(since);
     this.#asked = false;
     const goOn = [...this.#steps].map((step) => step(seconds)).some(Boolean);
     this.renderer.render(this.root, this.camera);
@@ -117,7 +124,6 @@ export class Scene {
 
   #fit(host: HTMLElement): void {
     const { clientWidth: width, clientHeight: height } = host;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height);
     this.camera.aspect = width / Math.max(1, height);
     this.camera.updateProjectionMatrix();

@@ -60,7 +60,10 @@ export class Slider {
     const { minimum, maximum, unit } = this.#control;
     const outside = value < minimum || value > maximum;
     this.#range.value = String(Math.round(STEPS * share(this.#control, value)));
-    this.#range.setAttribute("aria-valuetext", `${this.#text()} ${unit}${outside ? ", outside what was sampled" : ""}`);
+    this.#range.setAttribute(
+      "aria-valuetext",
+      `${this.#text()} ${unit}${outside ? ", outside what was sampled" : ""}`,
+    );
     if (document.activeElement !== this.#number) this.#number.value = this.#text();
     this.element.toggleAttribute("data-outside", outside);
     this.#mark.textContent = outside ? "outside" : "";
@@ -82,8 +85,8 @@ export class Slider {
 
   #typed(): void {
     const found = written.read(this.#number.value);
-    if (typeof found === "string") return this.#refuse(found);
-    this.#refuse("");
+    this.#refuse(typeof found === "string" ? found : "");
+    if (typeof found === "string") return;
     this.#set(found);
     this.#number.value = this.#text();
   }

@@ -11,7 +11,6 @@ export interface Free {
 /** Where the joint is at each of some settings of the free controls, m. */
 export type Places = (settings: readonly (readonly number[])[]) => Promise<readonly Point[]>;
 
-
 /** Share of a control's range by which it is moved to see what that does. */
 const PROBE = 0.01;
 /** What a whole range away from the start costs, as metres missed. */
@@ -60,7 +59,9 @@ function blocked(
   return free.map(({ minimum, maximum }, i) => {
     const pull = dot(jacobian[i]!, miss);
     const reach = 1e-9 * (maximum - minimum);
-    return (values[i]! <= minimum + reach && pull < 0) || (values[i]! >= maximum - reach && pull > 0);
+    return (
+      (values[i]! <= minimum + reach && pull < 0) || (values[i]! >= maximum - reach && pull > 0)
+    );
   });
 }
 

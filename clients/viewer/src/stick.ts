@@ -55,7 +55,7 @@ export class Stick extends Object3D {
     this.#sticks.instanceMatrix.needsUpdate = this.#balls.instanceMatrix.needsUpdate = true;
   }
 
-  dispose(): void {
+  override dispose(): void {
     for (const mesh of [this.#sticks, this.#balls]) {
       mesh.geometry.dispose();
       mesh.dispose();

@@ -18,7 +18,7 @@ export class Stopwatch {
     this.#answered = asked;
   }
 
- /** Called while what was answered is about to be drawn: it is when this turn ends. */
+  /** Called while what was answered is about to be drawn: it is when this turn ends. */
   drawn(): void {
     if (this.#answered && this.#open.length) queueMicrotask(() => this.#close());
   }

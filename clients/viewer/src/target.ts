@@ -44,8 +44,17 @@ class Target {
     this.#fields = AXES.map((axis) => this.#field(axis));
     const joint = card.skeleton.names[found.joint]!;
     host.append(
-      el("div", { class: "title" }, el("h2", {}, "Target"), el("span", {}, "misses by ", this.#miss)),
-      el("p", { class: "about" }, `Drag the handle, or type where ${joint} shall be ${Math.round(100 * found.share)} % through the clip. Controls stay within what was sampled.`),
+      el(
+        "div",
+        { class: "title" },
+        el("h2", {}, "Target"),
+        el("span", {}, "misses by ", this.#miss),
+      ),
+      el(
+        "p",
+        { class: "about" },
+        `Drag the handle, or type where ${joint} shall be ${Math.round(100 * found.share)} % through the clip. Controls stay within what was sampled.`,
+      ),
       el("div", { class: "point" }, ...this.#fields.map((field, i) => labelled(AXES[i]!, field))),
       this.#fault,
     );
@@ -115,7 +124,12 @@ class Target {
   }
 
   #field(axis: (typeof AXES)[number]): HTMLInputElement {
-    const field = el("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: id() });
+    const field = el("input", {
+      type: "text",
+      inputmode: "decimal",
+      autocomplete: "off",
+      id: id(),
+    });
     field.dataset["axis"] = axis;
     field.addEventListener("change", () => this.#typed(field));
     return field;
@@ -136,7 +150,8 @@ class Target {
 
   #write(point: Point): void {
     this.#fields.forEach((field, i) => {
-      if (document.activeElement !== field || this.#gizmo.dragging) field.value = point[i]!.toFixed(3);
+      if (document.activeElement !== field || this.#gizmo.dragging)
+        field.value = point[i]!.toFixed(3);
     });
   }
 
@@ -152,5 +167,11 @@ class Target {
 }
 
 function labelled(axis: string, field: HTMLInputElement): HTMLElement {
-  return el("span", { class: "field" }, el("label", { for: field.id }, axis), field, el("span", { class: "unit" }, "m"));
+  return el(
+    "span",
+    { class: "field" },
+    el("label", { for: field.id }, axis),
+    field,
+    el("span", { class: "unit" }, "m"),
+  );
 }

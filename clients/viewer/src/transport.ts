@@ -10,9 +10,17 @@ export function mount(host: HTMLElement, session: Session): void {
   const play = button(icon("play"), "Play (space)", () => togglePlay(session));
   play.classList.add("play");
   const back = button(icon("back"), "One frame back (left arrow)", () => move(session, -1));
-  const forward = button(icon("forward"), "One frame forward (right arrow)", () => move(session, 1));
+  const forward = button(icon("forward"), "One frame forward (right arrow)", () =>
+    move(session, 1),
+  );
   const loop = toggle(icon("loop"), "Loop", (on) => store.set({ loop: on }));
-  const scrubber = el("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time" });
+  const scrubber = el("input", {
+    type: "range",
+    min: 0,
+    max: 1,
+    step: "any",
+    "aria-label": "Time",
+  });
   const time = el("output", { class: "time" });
   scrubber.addEventListener("input", () =>
     store.set({ playing: false, time: Math.min(player.duration, Number(scrubber.value)) }),

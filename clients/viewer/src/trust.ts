@@ -25,7 +25,12 @@ export function mount(host: HTMLElement, session: Session): void {
   const aloud = el("p", { class: "unseen", "aria-live": "polite" });
   const meter = el("meter", { min: 0, max: 1, "aria-hidden": "true" });
   host.append(
-    el("div", { class: "title" }, el("h2", {}, "Trust"), el("span", { class: "sigma" }, "σ ", sigma)),
+    el(
+      "div",
+      { class: "title" },
+      el("h2", {}, "Trust"),
+      el("span", { class: "sigma" }, "σ ", sigma),
+    ),
     meter,
     sentence,
     warnings,
@@ -62,7 +67,8 @@ export function mount(host: HTMLElement, session: Session): void {
 function says(trust: Trust, usual: number): string {
   const found = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
   if (trust.warnings.length) return `${found} That is a guess: nothing was captured out here.`;
-  if (trust.sigma > 1.5 * usual) return `${found} That is far more than usual: the examples are sparse here.`;
+  if (trust.sigma > 1.5 * usual)
+    return `${found} That is far more than usual: the examples are sparse here.`;
   return found;
 }
 
@@ -81,7 +87,7 @@ function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement 
     "button",
     { type: "button", title: `Go there: ${values.join(", ")}` },
     el("span", { class: "source" }, clip.source),
-    el("span", { class: "weight" }, `${Math.round(100 * clip.weight)} %`),
+    el("span", { class: "weight" }, `${percent(clip.weight)}`),
     el("meter", { min: 0, max: 1, value: Math.max(0, clip.weight), "aria-hidden": "true" }),
     el("span", { class: "about" }, `distance ${clip.distance.toFixed(2)}${who(clip)}`),
   );
@@ -96,5 +102,9 @@ function who({ performer }: Captured): string {
 }
 
 function rest({ others }: Reasons): string {
-  return others.count ? `${others.count} others together ${Math.round(100 * others.weight)} %` : "";
+  return others.count ? `${others.count} others together ${percent(others.weight)}` : "";
+}
+
+function percent(share: number): string {
+  return `${(100 * share).toFixed(Math.abs(share) < 0.1 ? 1 : 0)} %`;
 }
