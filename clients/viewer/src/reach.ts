@@ -5,7 +5,7 @@ import type { CrowdPoses, Motion } from "@posefield/client";
 import { pose, sample } from "./playback.ts";
 import type { CardEvent, Session } from "./session.ts";
 import { place, placed } from "./skeleton.ts";
-import { type Point, stepped } from "./solve.ts";
+import { Descent, type Places, type Point } from "./solve.ts";
 
 /** Steps at most, and what is near enough, m. */
 const STEPS = 12;
@@ -45,22 +45,15 @@ export class Reach {
     const { card, player } = this.#session;
     const free = this.#free.map((name) => card.controls.find((each) => each.name === name)!);
     let values = this.#within();
+    const places: Places = (settings) => this.#places(settings);
+    const descent = new Descent(places, free, values, this.#start, point);
     for (let left = STEPS; left > 0 && wanted(); left--) {
-      const { next, miss } = await stepped(
-        (settings) => this.#places(settings),
-        free,
-        values,
-        this.#start,
-        point,
-      );
+      const found = await descent.step();
       if (!wanted()) return;
-      yield miss;
-      const moved = next.some(
-        (value, i) => Math.abs(value - values[i]!) > 1e-4 * (free[i]!.maximum - free[i]!.minimum),
-      );
-      if (miss < NEAR || !moved) return;
-      values = next;
-      this.#take(values, player.duration);
+      if (found.values !== values) this.#take(found.values, player.duration);
+      values = found.values;
+      yield found.miss;
+      if (found.miss < NEAR) return;
     }
   }
 

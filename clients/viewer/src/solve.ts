@@ -18,35 +18,87 @@ const STAY = 0.02;
 /** Of range a step, at most. */
 const STRIDE = 0.35;
 
-/** One step towards the point from `values`: one question, with a setting for each control.
- *
- * start: where the controls were when it began; they leave it no farther than the point needs.
- */
-export async function stepped(
-  places: Places,
-  free: readonly Free[],
-  values: readonly number[],
-  start: readonly number[],
-  target: Point,
-): Promise<{ readonly next: readonly number[]; readonly miss: number }> {
-  const ranges = free.map(({ minimum, maximum }) => maximum - minimum || 1);
-  // Towards the middle, so that probes stay within the range too.
-  const probes = free.map(({ minimum, maximum }, i) =>
-    values[i]! > (minimum + maximum) / 2 ? -PROBE : PROBE,
-  );
-  const settings = free.map((_, i) =>
-    values.map((value, k) => (k === i ? value + probes[i]! * ranges[i]! : value)),
-  );
-  const [here, ...there] = await places([values, ...settings]);
-  const miss = minus(target, here!);
-  const jacobian = there.map((point, i) => minus(point, here!).map((x) => x / probes[i]!));
-  const away = values.map((value, i) => (value - start[i]!) / ranges[i]!);
-  const step = solved(jacobian, miss, away, blocked(free, values, jacobian, miss));
-  const longest = Math.max(STRIDE, ...step.map(Math.abs)) / STRIDE;
-  const next = values.map((value, i) =>
-    clamped(value + (step[i]! / longest) * ranges[i]!, free[i]!),
-  );
-  return { next, miss: Math.hypot(...miss) };
+/** Resistance to steps at first, and what it is multiplied by after a good and a bad one. */
+const RESIST = 1e-3;
+const GOOD = 0.3;
+const BAD = 6;
+
+interface Seen {
+  readonly values: readonly number[];
+  readonly miss: readonly [number, number, number];
+  /** Metres that the joint moves for a whole range of each control. */
+  readonly jacobian: readonly (readonly number[])[];
+  readonly cost: number;
+}
+
+/** Goes from where the controls are to where the joint is at the target, as near as they may. */
+export class Descent {
+  readonly #places: Places;
+  readonly #free: readonly Free[];
+  readonly #start: readonly number[];
+  readonly #target: Point;
+  #next: readonly number[];
+  #best: Seen | null = null;
+  #resist = RESIST;
+
+  /** start: what the controls leave no farther than the point needs. */
+  constructor(
+    places: Places,
+    free: readonly Free[],
+    values: readonly number[],
+    start: readonly number[],
+    target: Point,
+  ) {
+    this.#places = places;
+    this.#free = free;
+    this.#next = values;
+    this.#start = start;
+    this.#target = target;
+  }
+
+  /** One question, with a setting for each control; the best so far, and how far it misses, m. */
+  async step(): Promise<{ readonly values: readonly number[]; readonly miss: number }> {
+    const seen = await this.#look(this.#next);
+    const better = !this.#best || seen.cost < this.#best.cost;
+    this.#best = better ? seen : this.#best!;
+    this.#resist = Math.max(1e-7, this.#resist * (better ? GOOD : BAD));
+    this.#next = this.#on(this.#best);
+    return { values: this.#best.values, miss: Math.hypot(...this.#best.miss) };
+  }
+
+  async #look(values: readonly number[]): Promise<Seen> {
+    // Towards the middle, so that probes stay within the range too.
+    const probes = this.#free.map(({ minimum, maximum }, i) =>
+      values[i]! > (minimum + maximum) / 2 ? -PROBE : PROBE,
+    );
+    const settings = this.#free.map((free, i) =>
+      values.map((value, k) => (k === i ? value + probes[i]! * range(free) : value)),
+    );
+    const [here, ...there] = await this.#places([values, ...settings]);
+    const miss = minus(this.#target, here!);
+    const jacobian = there.map((point, i) => minus(point, here!).map((x) => x / probes[i]!));
+    const away = this.#away(values);
+    return { values, miss, jacobian, cost: dot(miss, miss) + STAY * STAY * dot(away, away) };
+  }
+
+  /** The next values to look at, from there. */
+  #on({ jacobian, miss, values }: Seen): readonly number[] {
+    const held = blocked(this.#free, values, jacobian, miss);
+    const step = solved(jacobian, miss, this.#away(values), held, this.#resist);
+    const longest = Math.max(STRIDE, ...step.map(Math.abs)) / STRIDE;
+    return values.map((value, i) =>
+      clamped(value + (step[i]! / longest) * range(this.#free[i]!), this.#free[i]!),
+    );
+  }
+
+  /** In shares of ranges. */
+  #away(values: readonly number[]): readonly number[] {
+    return values.map((value, i) => (value - this.#start[i]!) / range(this.#free[i]!));
+  }
+}
+
+function range({ minimum, maximum }: Free): number {
+  return maximum - minimum || 1;
 }
 
 /** Controls at an end of their range that the point pulls beyond it. */
@@ -65,17 +117,18 @@ function blocked(
   });
 }
 
-/** The step in shares of ranges: (JᵀJ + s²I) d = Jᵀm − s²a, held controls left out. */
+/** The step in shares of ranges: (JᵀJ + (s² + r) I) d = Jᵀm − s²a, held controls left out. */
 function solved(
   jacobian: readonly (readonly number[])[],
   miss: readonly number[],
   away: readonly number[],
   held: readonly boolean[],
+  resist: number,
 ): number[] {
   const stay = STAY * STAY;
   const rows = jacobian.map((column, i) => [
     ...jacobian.map((other, k) =>
-      held[i] || held[k] ? Number(i === k) : dot(column, other) + (i === k ? stay : 0),
+      held[i] || held[k] ? Number(i === k) : dot(column, other) + (i === k ? stay + resist : 0),
     ),
     held[i] ? 0 : dot(column, miss) - stay * away[i]!,
   ]);
