@@ -72,7 +72,7 @@ export class Scene {
 
   /** Where the whole of a body is seen that stands at the origin. */
   frame(): void {
-    this.camera.position.set(2.1, 1.75, 3.4);
+    this.camera.position.set(1.75, 1.55, 3.05);
     this.orbit.target.set(0, 0.88, 0);
     this.orbit.update();
     this.#light();

@@ -59,6 +59,7 @@ class Target {
       this.#fault,
     );
     scene.root.add(this.#handle, this.#gizmo.getHelper());
+    const stop = scene.add(() => this.#tell(host));
     this.#listen();
     player.onClip(() => this.#rest());
     theme.listen(() => this.#tint(), signal);
@@ -69,6 +70,7 @@ class Target {
     });
     signal.addEventListener("abort", () => {
       leave();
+      stop();
       this.#gizmo.dispose();
       this.#gizmo.getHelper().removeFromParent();
       this.#handle.removeFromParent();
@@ -153,6 +155,16 @@ class Target {
       if (document.activeElement !== field || this.#gizmo.dragging)
         field.value = point[i]!.toFixed(3);
     });
+  }
+
+  /** Where on the stage the handle is drawn, px: for those who press there without eyes. */
+  #tell(host: HTMLElement): boolean {
+    const { camera, renderer } = this.#session.scene;
+    const { clientWidth, clientHeight } = renderer.domElement;
+    const { x, y } = this.#handle.position.clone().project(camera);
+    const at = [((x + 1) / 2) * clientWidth, ((1 - y) / 2) * clientHeight];
+    host.dataset["handle"] = at.map((pixel) => pixel.toFixed(0)).join(" ");
+    return false;
   }
 
   #appear(): void {

@@ -7,8 +7,24 @@ export const CARD = {
   name: "hop",
   description: "Hops",
   controls: [
-    { name: "speed", unit: "m/s", description: "", minimum: 0.5, maximum: 2, default: 1, values: [] },
-    { name: "time", unit: "deg", description: "", minimum: -20, maximum: 20, default: 0, values: [] },
+    {
+      name: "speed",
+      unit: "m/s",
+      description: "",
+      minimum: 0.5,
+      maximum: 2,
+      default: 1,
+      values: [],
+    },
+    {
+      name: "time",
+      unit: "deg",
+      description: "",
+      minimum: -20,
+      maximum: 20,
+      default: 0,
+      values: [],
+    },
   ],
   skeleton: {
     names: ["Hips", "Leg", "Foot", "Arm"],

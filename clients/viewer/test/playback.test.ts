@@ -45,7 +45,12 @@ function clip(): Motion {
 
 test("between frames rotations are three's slerp, at frames the frames", () => {
   const of = clip();
-  for (const [time, first, share] of [[0.03, 0, 0.3], [0.1, 1, 0], [0.17, 1, 0.7], [9, 1, 1]] as const) {
+  for (const [time, first, share] of [
+    [0.03, 0, 0.3],
+    [0.1, 1, 0],
+    [0.17, 1, 0.7],
+    [9, 1, 1],
+  ] as const) {
     const found = sample(pose(2), of, time);
     for (const joint of [0, 1]) {
       const [a, b] = [at(of, first, joint), at(of, first + 1, joint)];
@@ -76,7 +81,10 @@ test("a cycle's last frame, carried, is the next cycle's first", () => {
   const [x, z] = turned(0.1, 0, lap.turn);
   assert.ok(Math.hypot(x + lap.x - 0.3, z + lap.z - 1.4) < 1e-6);
   const [wrong] = turned(0.1, 0, -lap.turn);
-  assert.ok(Math.abs(turned(0.1, 0, lap.turn)[1] - turned(0.1, 0, -lap.turn)[1]) > 0.05, `${wrong}`);
+  assert.ok(
+    Math.abs(turned(0.1, 0, lap.turn)[1] - turned(0.1, 0, -lap.turn)[1]) > 0.05,
+    `${wrong}`,
+  );
 });
 
 test("laps add up as one way after the other", () => {

@@ -6,7 +6,13 @@ import { test } from "node:test";
 import { centimetres, read, short } from "../src/written.ts";
 
 test("numbers are read", () => {
-  for (const [text, value] of [["1.5", 1.5], [" -2 ", -2], ["−3", -3], [".5", 0.5], ["1e-3", 0.001]] as const)
+  for (const [text, value] of [
+    ["1.5", 1.5],
+    [" -2 ", -2],
+    ["−3", -3],
+    [".5", 0.5],
+    ["1e-3", 0.001],
+  ] as const)
     assert.equal(read(text), value);
 });
 
