@@ -10,8 +10,10 @@ import { Descent, type Places, type Point } from "./solve.ts";
 /** Steps at most, and what is near enough, m. */
 const STEPS = 12;
 const NEAR = 0.001;
-/** Of the moment, so that no clip ends before it. */
-const BEFORE_END = 0.995;
+/** Later than this share of a clip, how long each clip is has to be asked first. */
+const LATE = 0.85;
+/** So much before its end is a clip's end, whatever was rounded. */
+const END = 0.9999;
 
 export class Reach {
   readonly #session: Session;
@@ -85,7 +87,7 @@ export class Reach {
     });
   }
 
-  /** One question: a crowd of as many as there are settings, all at the moment of the event. */
+  /** A crowd of as many as there are settings, all at the moment of the event. */
   async #places(settings: readonly (readonly number[])[]): Promise<readonly Point[]> {
     const { card, player, signal, source, store } = this.#session;
     const { controls, level, model, performer } = store.state;
@@ -95,9 +97,13 @@ export class Reach {
         return [name, settings.map((row) => (free < 0 ? controls[name]! : row[free]!))];
       }),
     );
-    const share = Math.min(BEFORE_END, this.#event.share);
-    const time = settings.map((_, i) => share * (this.#durations[i] ?? player.duration));
-    const crowd = await source.crowd(model, { controls: columns, time, level, performer }, signal);
+    const ask = (time: readonly number[]) =>
+      source.crowd(model, { controls: columns, time: [...time], level, performer }, signal);
+    const share = Math.min(END, this.#event.share);
+    if (share > LATE) this.#durations = [...(await ask(settings.map(() => 0))).duration];
+    const crowd = await ask(
+      settings.map((_, i) => share * (this.#durations[i] ?? player.duration)),
+    );
     this.#durations = [...crowd.duration];
     return settings.map((_, i) => this.#of(crowd, i));
   }

@@ -19,11 +19,14 @@ before(async () => {
 after(() => chromium.close());
 
 /** A page in which nothing may go wrong unnoticed. */
-async function on(path: string, act: (page: Page) => Promise<void>): Promise<void> {
+async function on(
+  path: string,
+  act: (page: Page, faults: string[]) => Promise<void>,
+): Promise<void> {
   const { page, faults } = await opened(chromium, path);
   try {
     await settled(page);
-    await act(page);
+    await act(page, faults);
     assert.deepEqual(faults, []);
   } finally {
     await page.close();
@@ -222,10 +225,11 @@ test("back, forward and reload", () =>
       "forward is forward",
     );
     assert.equal(page.url(), there);
-    const before = await picture(page);
+    const [turn, trusted] = [await typed(page, "turn").inputValue(), await sigma(page)];
     await page.reload();
     await settled(page);
-    assert.ok(before.equals(await picture(page)), "the same picture");
+    assert.deepEqual([await typed(page, "turn").inputValue(), await sigma(page)], [turn, trusted]);
+    assert.equal(await time(page), 0.5);
     await page.getByLabel("Model", { exact: true }).selectOption("cmu_walk");
     await page.locator('[data-control="speed"]').waitFor();
     await until(async () => page.url().includes("#cmu_walk"), "the address follows");
@@ -244,9 +248,10 @@ test("entries of the address that make no sense are named", () =>
   }));
 
 test("an unknown model is said to be unknown, and another is shown", () =>
-  on("/#nobody", async (page) => {
+  on("/#nobody", async (page, faults) => {
     await page.getByText(/nobody is not on this service.*showing cmu_walk/).waitFor();
     await page.locator('[data-control="speed"]').waitFor();
+    assert.match(faults.splice(0).join(), /^Failed to load resource.*404/);
   }));
 
 test("keys are listed, and close with Escape", () =>
