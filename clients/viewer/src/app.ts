@@ -26,7 +26,7 @@ interface Open {
 export class App {
   readonly #service = new Service();
   readonly #notice = new Notice(at("#notice"));
-  readonly #header = new Header(at("#bar"), (model) => void this.#go({ model, entries: [] }));
+  readonly #header = new Header(at("#bar"), (model) => this.#choose(model));
   readonly #key = new KeyDialog(document.body, (key) => this.#unlock(key));
   readonly #watch = new Watch(
     () => this.#look(),
@@ -42,6 +42,12 @@ export class App {
     addEventListener("popstate", () => void this.#restore(address(location.hash)));
     // What was asked for is on its way while this takes its time.
     this.#scene = new Scene(at("#stage"));
+  }
+
+  /** A step that one may go back. */
+  #choose(model: string): void {
+    history.pushState(null, "", `#${encodeURIComponent(model)}`);
+    void this.#go({ model, entries: [] });
   }
 
   /** Shows that model as the address says, or says why not. A later call overtakes this one. */

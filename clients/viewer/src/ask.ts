@@ -9,6 +9,7 @@ import {
 } from "@posefield/client";
 
 import type { Source } from "./page.ts";
+import { pose as posture, sample } from "./playback.ts";
 import type { State } from "./state.ts";
 
 /** Frames a second that a clip is fetched at; poses between them are interpolated. */
@@ -25,21 +26,30 @@ export function clip(
   return source.clip(model, question, signal);
 }
 
-/** The pose at that time, or the last one where the clip has become shorter than that. */
+/** Beyond this share of the last clip known, the next may well have ended: it is asked as a whole. */
+const LATE = 0.9;
+
+/** The pose at that time, or the last one where the clip has become shorter than that.
+ *
+ * duration: of the clip before, s.
+ */
 export async function pose(
   source: Source,
   card: ModelCard,
   state: State,
   time: number,
+  duration: number,
   signal: AbortSignal,
 ): Promise<Poses> {
+  const whole = async () => at(await clip(source, card, state, signal), time);
+  if (time > LATE * duration) return whole();
   try {
     return state.root === card.root
       ? await travelling(source, state, time, signal)
       : await inPlace(source, state, time, signal);
   } catch (fault) {
     if (!(fault instanceof Problem && /^times?\b/.test(fault.detail))) throw fault;
-    return last(await clip(source, card, state, signal));
+    return whole();
   }
 }
 
@@ -73,10 +83,7 @@ function trust(answer: CrowdPoses, { controls, performer, level }: State): Poses
   };
 }
 
-function last(found: Motion): Poses {
-  return {
-    ...found,
-    rotations: found.rotations.slice(-4 * found.names.length),
-    rootPosition: found.rootPosition.slice(-3),
-  };
+function at(found: Motion, time: number): Poses {
+  const { rotations, root } = sample(posture(found.names.length), found, time);
+  return { ...found, rotations, rootPosition: root };
 }

@@ -128,8 +128,10 @@ export class Player {
 
   async #askPose(asked: number): Promise<void> {
     const { card, source, store } = this.#page;
-    const time = Math.min(store.state.time, this.duration);
-    const answer = await this.#tried(ask.pose(source, card, store.state, time, this.#signal()));
+    const { duration } = this;
+    const time = Math.min(store.state.time, duration);
+    const question = ask.pose(source, card, store.state, time, duration, this.#signal());
+    const answer = await this.#tried(question);
     if (!answer || asked < this.#answered) return;
     this.#pose.rotations.set(answer.rotations.subarray(0, this.#pose.rotations.length));
     this.#pose.root.set(answer.rootPosition.subarray(0, 3));

@@ -27,6 +27,7 @@ export function follow(store: Store, card: ModelCard, signal: AbortSignal): void
     clearTimeout(timer);
     timer = setTimeout(write, REST);
   });
+  write();
   signal.addEventListener("abort", () => {
     clearTimeout(timer);
     leave();
