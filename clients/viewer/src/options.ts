@@ -13,7 +13,7 @@ export const mount: Mount = (host, { card, signal, store }) => {
     (value) => store.set({ body: value }),
   );
   const ghost = toggle("Ghost", "Ghost of the nearest example", (on) => store.set({ ghost: on }));
-  const feet = toggle("Feet", "Foot contacts and skate", (on) => store.set({ feet: on }));
+  const feet = toggle("Feet", "Feet: contacts and skate", (on) => store.set({ feet: on }));
   const root = toggle("Root motion", "Root motion: the body travels", (on) =>
     store.set({ root: on ? "travelling" : "in_place" }),
   );

@@ -155,7 +155,7 @@ test("performers are chosen by name", () =>
 test("sticks, ghost, feet and level change the picture", () =>
   on(WALK, async (page) => {
     const seen = [await picture(page)];
-    for (const name of ["Sticks", "Ghost of the nearest example", "Foot contacts and skate"]) {
+    for (const name of ["Sticks", "Ghost of the nearest example", "Feet: contacts and skate"]) {
       await page.getByRole("button", { name }).click();
       seen.push(await picture(page));
     }

@@ -14,7 +14,7 @@ before(async () => {
 });
 after(() => chromium.close());
 
-test("from opening to the first pose", async ({ diagnostic }) => {
+test("from opening to the first pose", async (context) => {
   const found: number[] = [];
   for (let round = 0; round < 3; round++) {
     const { page } = await opened(chromium);
@@ -25,11 +25,11 @@ test("from opening to the first pose", async ({ diagnostic }) => {
     found.push(Math.round(first!));
     await page.close();
   }
-  diagnostic(`first pose: ${found.join(", ")} ms`);
+  context.diagnostic(`first pose: ${found.join(", ")} ms`);
   assert.equal(found.length, 3);
 });
 
-test("from a slider's movement to the pose", async ({ diagnostic }) => {
+test("from a slider's movement to the pose", async (context) => {
   const { page } = await opened(chromium, "/#reaching?~playing=no&~time=0.5");
   await settled(page);
   const track = page.locator('[data-control="target_height"] input[type=range]');
@@ -47,7 +47,9 @@ test("from a slider's movement to the pose", async ({ diagnostic }) => {
   );
   took.sort((a, b) => a - b);
   const at = (share: number) => took[Math.floor(share * took.length)]!.toFixed(0);
-  diagnostic(`drag: ${took.length} movements, median ${at(0.5)} ms, nine in ten ${at(0.9)} ms`);
+  context.diagnostic(
+    `drag: ${took.length} movements, median ${at(0.5)} ms, nine in ten ${at(0.9)} ms`,
+  );
   assert.ok(took.length > 40, `${took.length} movements of 90 were answered`);
   await page.close();
 });
