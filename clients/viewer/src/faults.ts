@@ -1,6 +1,6 @@
 /** What went wrong, in words, and what the page does about it. */
 
-import { Problem, Unexpected, Unreachable } from "@posefield/client";
+import { Problem, TimedOut, Unexpected, Unreachable } from "@posefield/client";
 
 /** wait: ask /readyz until it is well. key: ask for one. model: it is gone, show another. */
 export type Remedy = "wait" | "key" | "model" | "none";
@@ -15,6 +15,7 @@ export function understood(fault: unknown): Fault | null {
   if (typeof fault === "string") return { text: fault, remedy: "none" };
   if (fault instanceof DOMException && fault.name === "AbortError") return null;
   if (fault instanceof DOMException && fault.name === "TimeoutError") return SLOW;
+  if (fault instanceof TimedOut) return SLOW;
   if (fault instanceof Unreachable) return DOWN;
   if (fault instanceof Problem) return refused(fault);
   if (fault instanceof Unexpected) return { text: unexpected(fault), remedy: "wait" };

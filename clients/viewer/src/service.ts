@@ -1,11 +1,11 @@
 /** The service that this page came from, with the key that it may ask for. */
 
-import { Client } from "@posefield/client";
+import { Client, type ClientOptions, CONTRACT } from "@posefield/client";
 
 import type { Source } from "./page.ts";
 
-/** Major number of the contract that this page speaks, and the whole of it. */
-const CONTRACT = "2.1.0";
+/** The page asks again by itself (watch.ts), and asks so that nothing fills caches on the way. */
+const ASKING: ClientOptions = { retries: 0, timeout: 8000, longestLink: 0 };
 const KEPT = "posefield-key";
 
 /** A source whose key may change while others hold it. */
@@ -15,7 +15,7 @@ export class Service implements Source {
   /** For this tab alone, and gone with it. */
   use(key: string): void {
     sessionStorage.setItem(KEPT, key);
-    this.#client = new Client("", { key });
+    this.#client = new Client("", { ...ASKING, key });
   }
 
   readonly models: Source["models"] = (...words) => this.#client.models(...words);
@@ -54,7 +54,7 @@ export function differs({ contract }: { readonly contract?: string }): string | 
   return `The service is of another version: it speaks contract ${contract}, and ${page}. Reload the page; if that does not help, what it shows may be wrong.`;
 }
 
-function kept(): { key?: string } {
+function kept(): ClientOptions {
   const key = sessionStorage.getItem(KEPT);
-  return key ? { key } : {};
+  return key ? { ...ASKING, key } : ASKING;
 }

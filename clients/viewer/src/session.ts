@@ -1,5 +1,7 @@
 /** What the parts of this page share beyond what every part is given. */
 
+import type { ModelCard } from "@posefield/client";
+
 import type { Page } from "./page.ts";
 import type { Player } from "./player.ts";
 
@@ -15,6 +17,6 @@ export interface CardEvent {
 }
 
 /** Services before contract 2.1 do not tell. */
-export function event(card: object): CardEvent | null {
-  return (card as { event?: CardEvent | null }).event ?? null;
+export function event({ event: found }: ModelCard): CardEvent | null {
+  return found ?? null;
 }
