@@ -147,6 +147,8 @@ test("a busy service is said to be busy", () =>
       title: "Busy",
       status: 503,
       detail: "1000 requests",
+      instance: "0123456789abcdef",
+      errors: [],
     });
     const answer = { status: 503, contentType: "application/problem+json", body };
     await page.route(/msgpack/, (route) => route.fulfill(answer));
