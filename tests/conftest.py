@@ -1,6 +1,7 @@
 """What many tests need: random numbers from one seed, and a small model really trained."""
 
 import os
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -150,3 +151,13 @@ def posefield(monkeypatch, capsys):
         return code, said.out, said.err
 
     return run
+
+
+@pytest.fixture(scope="session")
+def models(labelled_path, walk_path, tmp_path_factory) -> Path:
+    """Folder with models under the names that the examples use: one that knows performers, and one
+    of a gait."""
+    folder = tmp_path_factory.mktemp("models")
+    shutil.copy(labelled_path, folder / "reach.onnx")
+    shutil.copy(walk_path, folder / "walk.onnx")
+    return folder

@@ -17,9 +17,13 @@ PAGES = tuple(pair for pair in COMMON if pair[0] != b"content-security-policy")
 """Headers of every page of our own, which says by itself what it loads: see `page`."""
 
 
-def of(media_type: str | None) -> tuple[tuple[bytes, bytes], ...]:
-    """Headers of an answer."""
-    return PAGES if media_type == "text/html" else COMMON
+def of(media_type: str | None, status: int = 200) -> tuple[tuple[bytes, bytes], ...]:
+    """Headers of an answer.
+
+    Those of a 304 take the place of those that a browser holds: a policy in it would be that of
+    the page from then on, which then loads nothing when it is opened again.
+    """
+    return PAGES if media_type == "text/html" or status == 304 else COMMON
 
 
 def page(script: str = "'self'", style: str = "'self'") -> dict[str, str]:

@@ -188,7 +188,8 @@ class Exchange:
 
     def _surrounding(self, response: Response) -> list[tuple[bytes, bytes]]:
         """Headers that every answer has, or every answer of its kind."""
-        headers = [(b"x-request-id", self._identity.encode()), *browser.of(response.media_type)]
+        kind = browser.of(response.media_type, response.status_code)
+        headers = [(b"x-request-id", self._identity.encode()), *kind]
         if origins := self._site.service.origins:
             headers += cors.headers(self._headers.get(b"origin"), origins)
         held = response.status_code in (200, 304)

@@ -1,6 +1,5 @@
 """The service under test: one small model named `reach`, and ways to ask it."""
 
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +14,6 @@ from service.web.app import create_app
 from service.web.settings import Settings
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="session")
-def models(labelled_path, walk_path, tmp_path_factory) -> Path:
-    """Folder with models under the names that the examples use: one that knows performers, and one
-    of a gait."""
-    folder = tmp_path_factory.mktemp("models")
-    shutil.copy(labelled_path, folder / "reach.onnx")
-    shutil.copy(walk_path, folder / "walk.onnx")
-    return folder
 
 
 @pytest.fixture(scope="session")

@@ -3,42 +3,56 @@
 import {
   Color,
   DirectionalLight,
-  GridHelper,
   HemisphereLight,
+  PCFShadowMap,
   PerspectiveCamera,
   Scene as Root,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+import { Ground } from "./ground.ts";
+import { isSoftware, Quality } from "./quality.ts";
+import * as theme from "./theme.ts";
+
 /** Called before each drawing with the seconds since the last; true asks to be called again. */
 export type Step = (seconds: number) => boolean;
 
+/** How far the body may be from where the camera looks before the camera goes along, m. */
+const LEASH = 0.15;
+
 export class Scene {
   readonly root = new Root();
-  readonly camera = new PerspectiveCamera(45, 1, 0.05, 500);
+  readonly camera = new PerspectiveCamera(38, 1, 0.05, 500);
   readonly renderer: WebGLRenderer;
   readonly orbit: OrbitControls;
+  readonly #quality: Quality;
   readonly #steps = new Set<Step>();
+  readonly #ground = new Ground();
+  readonly #sun = sun();
   #asked = false;
   #last = 0;
 
   constructor(host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: true });
-    host.append(this.renderer.domElement);
-    this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
-    this.camera.position.set(2.4, 1.7, 3.2);
-    this.orbit.target.set(0, 0.9, 0);
-    this.orbit.update();
+    const software = isSoftware();
+    this.renderer = new WebGLRenderer({ antialias: !software });
+    this.#quality = new Quality(this.renderer, software, () => this.redraw());
+    if (software) this.#sun.shadow.mapSize.set(512, 512);
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    const canvas = this.renderer.domElement;
+    canvas.setAttribute("aria-hidden", "true");
+    host.append(canvas);
+    this.orbit = new OrbitControls(this.camera, canvas);
+    this.orbit.maxPolarAngle = 0.53 * Math.PI;
+    this.orbit.minDistance = 0.5;
+    this.orbit.maxDistance = 60;
+    this.frame();
     this.orbit.addEventListener("change", () => this.redraw());
-    const sun = new DirectionalLight(0xffffff, 2.2);
-    sun.position.set(2, 5, 3);
-    this.root.add(
-      new HemisphereLight(0xffffff, 0x8899aa, 1.6),
-      sun,
-      new GridHelper(10, 20, 0x888888, 0xbbbbbb),
-    );
-    this.root.background = new Color(0xf4f5f7);
+    const sky = new HemisphereLight(0xffffff, 0x8d8f98, 1.7);
+    this.root.add(sky, this.#sun, this.#sun.target, this.#ground.mesh);
+    this.tint();
+    theme.listen(() => this.tint());
     new ResizeObserver(() => this.#fit(host)).observe(host);
   }
 
@@ -56,9 +70,52 @@ export class Scene {
     requestAnimationFrame((now) => this.#draw(now));
   }
 
+  /** Where the whole of a body is seen that stands at the origin. */
+  frame(): void {
+    this.camera.position.set(1.75, 1.55, 3.05);
+    this.orbit.target.set(0, 0.88, 0);
+    this.orbit.update();
+    this.#light();
+  }
+
+  /** Goes along with a body at that place on the ground, on a loose leash. */
+  follow(x: number, z: number): void {
+    const { target } = this.orbit;
+    const way = Math.hypot(x - target.x, z - target.z);
+    if (way <= LEASH) return;
+    const share = 1 - LEASH / way;
+    const [dx, dz] = [share * (x - target.x), share * (z - target.z)];
+    for (const place of [target, this.camera.position]) {
+      place.x += dx;
+      place.z += dz;
+    }
+    this.orbit.update();
+    this.#light();
+  }
+
+  tint(): void {
+    this.root.background = new Color(theme.colour("--paper"));
+    this.#ground.tint(
+      theme.colour("--paper"),
+      theme.colour("--grid"),
+      theme.isDark() ? 0.55 : 0.82,
+    );
+    this.redraw();
+  }
+
+  /** Shadows and ground are where one looks. */
+  #light(): void {
+    const { x, z } = this.orbit.target;
+    this.#sun.position.set(x + 1.8, 4.5, z + 2.2);
+    this.#sun.target.position.set(x, 0.6, z);
+    this.#ground.mesh.position.set(x, 0, z);
+  }
+
   #draw(now: number): void {
-    const seconds = Math.min(0.1, (now - this.#last) / 1000);
+    const since = now - this.#last;
+    const seconds = Math.min(0.1, since / 1000);
     this.#last = now;
+    this.#quality.drawing(since);
     this.#asked = false;
     const goOn = [...this.#steps].map((step) => step(seconds)).some(Boolean);
     this.renderer.render(this.root, this.camera);
@@ -67,10 +124,20 @@ export class Scene {
 
   #fit(host: HTMLElement): void {
     const { clientWidth: width, clientHeight: height } = host;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height);
     this.camera.aspect = width / Math.max(1, height);
     this.camera.updateProjectionMatrix();
     this.redraw();
   }
+}
+
+function sun(): DirectionalLight {
+  const light = new DirectionalLight(0xffffff, 2);
+  light.castShadow = true;
+  light.shadow.mapSize.set(1024, 1024);
+  light.shadow.radius = 3;
+  light.shadow.bias = -0.0006;
+  light.shadow.normalBias = 0.01;
+  Object.assign(light.shadow.camera, { left: -1.6, right: 1.6, top: 1.8, bottom: -1.6, far: 12 });
+  return light;
 }

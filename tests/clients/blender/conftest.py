@@ -1,7 +1,6 @@
-"""What of the add-on needs no Blender, a real service for it to ask, and servers that misbehave."""
+"""What of the add-on needs no Blender, and servers that misbehave."""
 
 import contextlib
-import shutil
 import sys
 from pathlib import Path
 
@@ -10,25 +9,7 @@ from misbehaving import Scripted
 
 ROOT = Path(__file__).parents[3]
 ADDON = ROOT / "clients/blender/posefield"
-sys.path[:0] = [str(ADDON), str(ADDON.parent), str(ROOT / "tests/contract")]
-
-
-@pytest.fixture(scope="session")
-def models(labelled_path, walk_path, tmp_path_factory) -> Path:
-    """Folder with the models that the examples ask: one that knows performers, one of a gait."""
-    folder = tmp_path_factory.mktemp("models")
-    shutil.copy(labelled_path, folder / "reach.onnx")
-    shutil.copy(walk_path, folder / "walk.onnx")
-    return folder
-
-
-@pytest.fixture(scope="session")
-def address(models):
-    """Where a service listens that is a process of its own."""
-    import serving
-
-    with serving.process(models) as child:
-        yield serving.address(child)
+sys.path[:0] = [str(ADDON), str(ADDON.parent)]
 
 
 @pytest.fixture

@@ -17,8 +17,10 @@ PLACES = [[0, 0, 0], [3, 0, 1], [-2, 0, 5]]
 CROWD = {"time": [0.0, 0.2, 0.4], "heading": [0.0, 1.0, -2.0], "position": PLACES}
 
 
-def test_its_own_tests_pass_against_a_real_service(url, kinematics, expect_success):
-    said = expect_success("npm", "test", POSEFIELD_URL=url, POSEFIELD_KINEMATICS=str(kinematics))
+def test_its_own_tests_pass_against_a_real_service(address, kinematics, expect_success):
+    said = expect_success(
+        "npm", "test", POSEFIELD_URL=address, POSEFIELD_KINEMATICS=str(kinematics)
+    )
     assert "\nℹ fail 0\n" in said
     assert "\nℹ skipped 0\n" in said
 
@@ -44,9 +46,9 @@ def test_a_failure_of_the_tools_is_one_of_this_suite(expect_success):
 
 
 @pytest.fixture
-def kinematics(url, tmp_path):
+def kinematics(address, tmp_path):
     """Joints in the world by the service's own kinematics, for what TypeScript asks as well."""
-    with httpx.Client(base_url=url, timeout=60) as client:
+    with httpx.Client(base_url=address, timeout=60) as client:
         card = client.get(REACH).raise_for_status().json()
         controls = {control["name"]: control["default"] for control in card["controls"]}
         clip = {"controls": controls, "fps": 20}

@@ -10,8 +10,10 @@ import time
 from collections import Counter
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 POSEFIELD = Path(sys.executable).with_name("posefield")
+# Seconds after which nobody waits for a process any more, however busy the machine.
+LIFETIME = 600
 
 
 @contextlib.contextmanager
@@ -27,7 +29,7 @@ def started(command, **environ):
     given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", **environ}
     pipe = subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, env=given, stdout=pipe, stderr=pipe) as child:
-        watch = threading.Timer(90, child.kill)
+        watch = threading.Timer(LIFETIME, child.kill)
         watch.start()
         try:
             yield child

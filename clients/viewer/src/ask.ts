@@ -1,0 +1,89 @@
+/** Questions about the body that is shown. */
+
+import {
+  type CrowdPoses,
+  type ModelCard,
+  type Motion,
+  type Poses,
+  Problem,
+} from "@posefield/client";
+
+import type { Source } from "./page.ts";
+import { pose as posture, sample } from "./playback.ts";
+import type { State } from "./state.ts";
+
+/** Frames a second that a clip is fetched at; poses between them are interpolated. */
+const RATE = 60;
+
+export function clip(
+  source: Source,
+  card: ModelCard,
+  state: State,
+  signal: AbortSignal,
+): Promise<Motion> {
+  const { controls, performer, level, loop, model, root } = state;
+  const question = { controls, performer, level, root, fps: RATE, loop: card.cyclic && loop };
+  return source.clip(model, question, signal);
+}
+
+/** Beyond this share of the last clip known, the next may well have ended: it is asked as a whole. */
+const LATE = 0.9;
+
+/** The pose at that time, or the last one where the clip has become shorter than that.
+ *
+ * duration: of the clip before, s.
+ */
+export async function pose(
+  source: Source,
+  card: ModelCard,
+  state: State,
+  time: number,
+  duration: number,
+  signal: AbortSignal,
+): Promise<Poses> {
+  const whole = async () => at(await clip(source, card, state, signal), time);
+  if (time > LATE * duration) return whole();
+  try {
+    return state.root === card.root
+      ? await travelling(source, state, time, signal)
+      : await inPlace(source, state, time, signal);
+  } catch (fault) {
+    if (!(fault instanceof Problem && /^times?\b/.test(fault.detail))) throw fault;
+    return whole();
+  }
+}
+
+function travelling(source: Source, state: State, time: number, signal: AbortSignal) {
+  const { controls, performer, level, model } = state;
+  return source.pose(model, { controls, performer, level, times: [time] }, signal);
+}
+
+/** A crowd of one: crowds alone may be asked for poses that stay where they are. */
+async function inPlace(
+  source: Source,
+  state: State,
+  time: number,
+  signal: AbortSignal,
+): Promise<Poses> {
+  const { controls, performer, level, model } = state;
+  const question = { controls, performer, level, time: [time], root: "in_place" as const };
+  const answer = await source.crowd(model, question, signal);
+  return { ...answer, times: Float64Array.of(time), trust: trust(answer, state) };
+}
+
+function trust(answer: CrowdPoses, { controls, performer, level }: State): Poses["trust"] {
+  return {
+    model: answer.model,
+    controls: { ...controls },
+    performer,
+    level,
+    duration: answer.duration[0]!,
+    sigma: answer.sigma[0]!,
+    warnings: [...answer.warnings],
+  };
+}
+
+function at(found: Motion, time: number): Poses {
+  const { rotations, root } = sample(posture(found.names.length), found, time);
+  return { ...found, rotations, rootPosition: root };
+}

@@ -1,0 +1,190 @@
+/** The state as the address bar's hash: `#reaching?stature=1.72&turn=20&~time=0.5`.
+ *
+ * Controls by their names; everything else begins with `~` and is written only where it is not as
+ * at the start. What cannot be read is named, and the rest holds.
+ */
+
+import type { ModelCard } from "@posefield/client";
+
+import type { State } from "./state.ts";
+import { read as number } from "./written.ts";
+
+export interface Address {
+  /** null where none is named. */
+  readonly model: string | null;
+  readonly entries: readonly (readonly [string, string])[];
+}
+
+type Rest = Omit<State, "model" | "controls">;
+type Key = keyof Rest;
+
+/** `undefined` where the text says nothing that is expected. */
+interface Field<Value> {
+  readonly expected: (card: ModelCard) => string;
+  readonly read: (text: string, card: ModelCard) => Value | undefined;
+  readonly write: (value: Value) => string;
+}
+
+export function address(hash: string): Address {
+  const [model = "", rest = ""] = hash.replace(/^#/, "").split(/\?(.*)/s);
+  const entries = rest
+    .split("&")
+    .filter(Boolean)
+    .map((entry) => {
+      const [key = "", value = ""] = entry.split(/=(.*)/s);
+      return [plain(key), plain(value)] as const;
+    });
+  return { model: plain(model) || null, entries };
+}
+
+/** What a model's page shows where nobody says otherwise. */
+export function initial(model: string, card: ModelCard): State {
+  const names = card.controls.map((control) => control.name);
+  return {
+    model,
+    controls: Object.fromEntries(card.controls.map(({ name, default: value }) => [name, value])),
+    performer: null,
+    level: 0,
+    time: 0,
+    playing: true,
+    speed: 1,
+    loop: true,
+    root: card.root,
+    body: "mannequin",
+    ghost: false,
+    feet: false,
+    view: "one",
+    across: names[0] ?? "",
+    along: names[1] ?? "",
+  };
+}
+
+export function restored(
+  found: Address,
+  model: string,
+  card: ModelCard,
+): { state: State; faults: readonly string[] } {
+  const start = initial(model, card);
+  const controls: Record<string, number> = { ...start.controls };
+  const rest: Partial<Record<Key, unknown>> = {};
+  const faults: string[] = [];
+  for (const [key, text] of found.entries) {
+    const fault = key.startsWith("~")
+      ? take(rest, key.slice(1), text, card)
+      : steer(controls, key, text);
+    if (fault) faults.push(fault);
+  }
+  return { state: { ...start, ...(rest as Partial<Rest>), controls }, faults };
+}
+
+export function written(state: State, card: ModelCard): string {
+  const start = initial(state.model, card);
+  const controls = Object.entries(state.controls).map(
+    ([name, value]) => `${safe(name)}=${rounded(value)}`,
+  );
+  const rest = (Object.keys(FIELDS) as Key[])
+    .filter((key) => state[key] !== start[key])
+    .map((key) => `~${key}=${safe((FIELDS[key] as Field<unknown>).write(state[key]))}`);
+  return `#${safe(state.model)}?${[...controls, ...rest].join("&")}`;
+}
+
+function steer(controls: Record<string, number>, name: string, text: string): string | null {
+  if (!Object.hasOwn(controls, name)) return `${name}: this model has no such control`;
+  const value = number(text);
+  if (typeof value === "string") return `${name}: ${value}`;
+  controls[name] = value;
+  return null;
+}
+
+function take(
+  rest: Partial<Record<Key, unknown>>,
+  key: string,
+  text: string,
+  card: ModelCard,
+): string | null {
+  if (!Object.hasOwn(FIELDS, key)) return `~${key}: unknown`;
+  const field = FIELDS[key as Key] as Field<unknown>;
+  const value = field.read(text, card);
+  if (value === undefined) return `~${key}: “${text}”, expected ${field.expected(card)}`;
+  rest[key as Key] = value;
+  return null;
+}
+
+const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
+  performer: {
+    expected: (card) => card.performers.join(", ") || "nobody: performers are not told apart",
+    read: (text, card) => (card.performers.includes(text) ? text : undefined),
+    write: (value) => value ?? "",
+  },
+  level: between((card) => [0, card.levels.length - 1], Number.isInteger),
+  time: between(() => [0, 3600]),
+  playing: yes(),
+  speed: between(() => [0.1, 2]),
+  loop: yes(),
+  root: one("travelling", "in_place"),
+  body: one("stick", "mannequin"),
+  ghost: yes(),
+  feet: yes(),
+  view: one("one", "levels", "crowd"),
+  across: control(),
+  along: control(),
+};
+
+function between(
+  range: (card: ModelCard) => readonly [number, number],
+  fits: (value: number) => boolean = () => true,
+): Field<number> {
+  return {
+    expected: (card) => range(card).join(" to "),
+    read: (text, card) => {
+      const value = number(text);
+      const [least, most] = range(card);
+      const good = typeof value === "number" && value >= least && value <= most && fits(value);
+      return good ? value : undefined;
+    },
+    write: rounded,
+  };
+}
+
+function yes(): Field<boolean> {
+  return {
+    expected: () => "yes or no",
+    read: (text) => ({ yes: true, no: false })[text],
+    write: (value) => (value ? "yes" : "no"),
+  };
+}
+
+function one<Word extends string>(...words: readonly Word[]): Field<Word> {
+  return {
+    expected: () => words.join(" or "),
+    read: (text) => words.find((word) => word === text),
+    write: (value) => value,
+  };
+}
+
+function control(): Field<string> {
+  const names = (card: ModelCard) => card.controls.map(({ name }) => name);
+  return {
+    expected: (card) => names(card).join(", "),
+    read: (text, card) => (names(card).includes(text) ? text : undefined),
+    write: (value) => value,
+  };
+}
+
+/** Six digits: finer than any slider, and the same text again when read back. */
+function rounded(value: number): string {
+  return String(Number(value.toPrecision(6)));
+}
+
+function safe(text: string): string {
+  return encodeURIComponent(text).replaceAll("%40", "@");
+}
+
+/** As it stands, where percent signs make no sense. */
+function plain(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}

@@ -1,0 +1,43 @@
+/** Shortcuts, where nobody is typing. */
+
+import type { Session } from "./session.ts";
+import * as theme from "./theme.ts";
+import { move, togglePlay } from "./transport.ts";
+
+export function mount(session: Session): void {
+  const { card, player, signal, store } = session;
+  const flip = (key: "loop" | "ghost" | "feet") => () => store.set({ [key]: !store.state[key] });
+  const acts: Readonly<Record<string, (event: KeyboardEvent) => void>> = {
+    " ": () => togglePlay(session),
+    arrowleft: ({ shiftKey }) => move(session, shiftKey ? -10 : -1),
+    arrowright: ({ shiftKey }) => move(session, shiftKey ? 10 : 1),
+    home: () => store.set({ playing: false, time: 0 }),
+    end: () => store.set({ playing: false, time: player.duration }),
+    r: () => store.set({ controls: defaults(card.controls) }),
+    l: flip("loop"),
+    g: flip("ghost"),
+    f: flip("feet"),
+    b: () => store.set({ body: store.state.body === "stick" ? "mannequin" : "stick" }),
+    t: theme.toggle,
+  };
+  const press = (event: KeyboardEvent) => {
+    const key = event.key.toLowerCase();
+    const act = acts[key];
+    if (!act || event.ctrlKey || event.metaKey || event.altKey || taken(event.target, key)) return;
+    event.preventDefault();
+    act(event);
+  };
+  document.addEventListener("keydown", press, { signal });
+}
+
+function defaults(controls: Session["card"]["controls"]): Record<string, number> {
+  return Object.fromEntries(controls.map((control) => [control.name, control.default]));
+}
+
+/** Whether the element that has the focus does something with the key itself. */
+function taken(target: EventTarget | null, key: string): boolean {
+  if (!(target instanceof HTMLElement) || target.closest("dialog")) return true;
+  if (target instanceof HTMLInputElement) return target.type !== "range" || key.length > 1;
+  if (target instanceof HTMLSelectElement || target instanceof HTMLTextAreaElement) return true;
+  return key === " " && target.closest("button, a, summary") !== null;
+}

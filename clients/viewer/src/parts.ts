@@ -1,0 +1,42 @@
+/** The parts of the page, in their places. */
+
+import * as bodies from "./bodies.ts";
+import * as controls from "./controls.ts";
+import * as feet from "./feet.ts";
+import * as ghost from "./ghost.ts";
+import * as keys from "./keys.ts";
+import * as options from "./options.ts";
+import type { Session } from "./session.ts";
+import * as target from "./target.ts";
+import * as transport from "./transport.ts";
+import * as trust from "./trust.ts";
+
+type Part = (host: HTMLElement, session: Session) => void;
+
+/** Each gets a section of its own, in this order, named for styles and tests. */
+const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<string, Part>>>> = {
+  stage: { options: options.mount, ghost: ghost.mount },
+  side: {
+    controls: controls.mount,
+    trust: trust.mount,
+    target: target.mount,
+    feet: feet.mount,
+  },
+  transport: { time: transport.mount },
+};
+
+/** Until the session's signal. */
+export function mount(session: Session): void {
+  bodies.mount(session);
+  keys.mount(session);
+  for (const [place, parts] of Object.entries(PLACES)) {
+    const host = document.querySelector(`#${place}`)!;
+    for (const [name, part] of Object.entries(parts)) {
+      const section = document.createElement("section");
+      section.dataset["part"] = name;
+      host.append(section);
+      session.signal.addEventListener("abort", () => section.remove());
+      part(section, session);
+    }
+  }
+}

@@ -1,0 +1,119 @@
+/** The time of a clip that plays, and the pose between two of its frames. */
+
+import type { Motion } from "@posefield/client";
+
+export interface Moment {
+  readonly time: number;
+  readonly playing: boolean;
+  /** How often the end was passed on the way here. */
+  readonly laps: number;
+}
+
+/** The moment `seconds` later. At the end a clip begins again, or stops there. */
+export function advanced(time: number, seconds: number, duration: number, loop: boolean): Moment {
+  const next = time + seconds;
+  if (next < duration) return { time: Math.max(0, next), playing: true, laps: 0 };
+  if (!loop || duration <= 0) return { time: duration, playing: false, laps: 0 };
+  return { time: next % duration, playing: true, laps: Math.floor(next / duration) };
+}
+
+/** Joints' rotations local to their parents (J × 4) and the root (3, m), at one time. */
+export interface Pose {
+  readonly rotations: Float32Array;
+  readonly root: Float32Array;
+}
+
+export function pose(joints: number): Pose {
+  return { rotations: new Float32Array(4 * joints), root: new Float32Array(3) };
+}
+
+/** The pose at `time` between the two frames around it, written into `out`. */
+export function sample(out: Pose, clip: Motion, time: number): Pose {
+  const joints = out.rotations.length / 4;
+  const last = clip.times.length - 1;
+  const at = Math.min(last, Math.max(0, (time - clip.times[0]!) / step(clip)));
+  const first = Math.min(Math.floor(at), Math.max(0, last - 1));
+  const second = Math.min(last, first + 1);
+  const share = at - first;
+  for (let i = 0; i < 3; i++)
+    out.root[i] = mixed(
+      clip.rootPosition[3 * first + i]!,
+      clip.rootPosition[3 * second + i]!,
+      share,
+    );
+  for (let joint = 0; joint < joints; joint++)
+    slerp(
+      out.rotations,
+      4 * joint,
+      clip.rotations,
+      4 * (joints * first + joint),
+      4 * (joints * second + joint),
+      share,
+    );
+  return out;
+}
+
+/** Seconds from a frame to the next. */
+export function step(clip: Motion): number {
+  const { times } = clip;
+  return times.length > 1 ? (times.at(-1)! - times[0]!) / (times.length - 1) : 1 / clip.rate;
+}
+
+/** How a lap carries the ground under a character on: a turn about +Y, then a way. */
+export interface Carried {
+  readonly turn: number;
+  readonly x: number;
+  readonly z: number;
+}
+
+export const NOWHERE: Carried = { turn: 0, x: 0, z: 0 };
+
+/** From a cycle's first frame to its last, which is the first carried on. */
+export function carried(clip: Motion, joints: number): Carried {
+  const last = clip.times.length - 1;
+  const turn = heading(clip.rotations, 4 * joints * last) - heading(clip.rotations, 0);
+  const [x0, z0] = turned(clip.rootPosition[0]!, clip.rootPosition[2]!, turn);
+  return {
+    turn,
+    x: clip.rootPosition[3 * last]! - x0,
+    z: clip.rootPosition[3 * last + 2]! - z0,
+  };
+}
+
+/** One after the other. */
+export function after(first: Carried, then: Carried): Carried {
+  const [x, z] = turned(then.x, then.z, first.turn);
+  return { turn: first.turn + then.turn, x: first.x + x, z: first.z + z };
+}
+
+/** Of a point on the ground about the origin, positive from +Z to +X. */
+export function turned(x: number, z: number, turn: number): readonly [number, number] {
+  const [c, s] = [Math.cos(turn), Math.sin(turn)];
+  return [c * x + s * z, c * z - s * x];
+}
+
+/** The part of a rotation that is about +Y. */
+function heading(q: Float32Array, at: number): number {
+  return 2 * Math.atan2(q[at + 2]!, q[at]!);
+}
+
+function slerp(
+  out: Float32Array,
+  to: number,
+  q: Float32Array,
+  a: number,
+  b: number,
+  share: number,
+): void {
+  let cosine = 0;
+  for (let i = 0; i < 4; i++) cosine += q[a + i]! * q[b + i]!;
+  const angle = Math.acos(Math.min(1, Math.abs(cosine)));
+  const sine = Math.sin(angle);
+  const near = sine < 1e-5 ? 1 - share : Math.sin((1 - share) * angle) / sine;
+  const far = (sine < 1e-5 ? share : Math.sin(share * angle) / sine) * (cosine < 0 ? -1 : 1);
+  for (let i = 0; i < 4; i++) out[to + i] = near * q[a + i]! + far * q[b + i]!;
+}
+
+function mixed(a: number, b: number, share: number): number {
+  return a + share * (b - a);
+}

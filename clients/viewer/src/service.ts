@@ -1,0 +1,60 @@
+/** The service that this page came from, with the key that it may ask for. */
+
+import { Client, type ClientOptions, CONTRACT } from "@posefield/client";
+
+import type { Source } from "./page.ts";
+
+/** The page asks again by itself (watch.ts), and asks so that nothing fills caches on the way. */
+const ASKING: ClientOptions = { retries: 0, timeout: 8000, longestLink: 0 };
+const KEPT = "posefield-key";
+
+/** A source whose key may change while others hold it. */
+export class Service implements Source {
+  #client = new Client("", kept());
+
+  /** For this tab alone, and gone with it. */
+  use(key: string): void {
+    sessionStorage.setItem(KEPT, key);
+    this.#client = new Client("", { ...ASKING, key });
+  }
+
+  readonly models: Source["models"] = (...words) => this.#client.models(...words);
+  readonly card: Source["card"] = (...words) => this.#client.card(...words);
+  readonly pose: Source["pose"] = (...words) => this.#client.pose(...words);
+  readonly clip: Source["clip"] = (...words) => this.#client.clip(...words);
+  readonly crowd: Source["crowd"] = (...words) => this.#client.crowd(...words);
+  readonly sigma: Source["sigma"] = (...words) => this.#client.sigma(...words);
+  readonly why: Source["why"] = (...words) => this.#client.why(...words);
+}
+
+/** Whether it may be asked again. */
+export async function ready(): Promise<boolean> {
+  try {
+    return (await fetch("/readyz", { signal: AbortSignal.timeout(4000) })).ok;
+  } catch {
+    return false;
+  }
+}
+
+/** In words, where the service's contract is not this page's; null where it is, or nobody answers. */
+export async function mismatch(): Promise<string | null> {
+  try {
+    const answer = await fetch("/livez", { signal: AbortSignal.timeout(4000) });
+    return answer.ok ? differs((await answer.json()) as { contract?: string }) : null;
+  } catch {
+    return null;
+  }
+}
+
+export function differs({ contract }: { readonly contract?: string }): string | null {
+  const page = `this page speaks ${CONTRACT}`;
+  if (!contract)
+    return `The service is older: it does not say which contract it speaks, and ${page}. Some things may be missing.`;
+  if (contract.split(".")[0] === CONTRACT.split(".")[0]) return null;
+  return `The service is of another version: it speaks contract ${contract}, and ${page}. Reload the page; if that does not help, what it shows may be wrong.`;
+}
+
+function kept(): ClientOptions {
+  const key = sessionStorage.getItem(KEPT);
+  return key ? { ...ASKING, key } : ASKING;
+}

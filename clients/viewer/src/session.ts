@@ -1,0 +1,22 @@
+/** What the parts of this page share beyond what every part is given. */
+
+import type { ModelCard } from "@posefield/client";
+
+import type { Page } from "./page.ts";
+import type { Player } from "./player.ts";
+
+export interface Session extends Page {
+  readonly player: Player;
+}
+
+/** The joint that a reach is for, and when in the clip it gets there. */
+export interface CardEvent {
+  readonly joint: number;
+  /** Of the clip's duration. */
+  readonly share: number;
+}
+
+/** Services before contract 2.1 do not tell. */
+export function event({ event: found }: ModelCard): CardEvent | null {
+  return found ?? null;
+}

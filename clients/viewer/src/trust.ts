@@ -1,0 +1,110 @@
+/** What the answer is worth: sigma, what lies outside, and the captured clips that it is made of. */
+
+import type { ModelCard, Reasons, Trust } from "@posefield/client";
+
+import { el } from "./dom.ts";
+import { Latest } from "./latest.ts";
+import type { Session } from "./session.ts";
+import { title } from "./slider.ts";
+import * as written from "./written.ts";
+
+/** How many captured clips are named. */
+const NEAREST = 4;
+/** Milliseconds without a new answer until somebody asks why, and until it is said aloud. */
+const CALM = 160;
+
+type Captured = Reasons["nearest"][number];
+
+export function mount(host: HTMLElement, session: Session): void {
+  const { card, player, signal, source, store } = session;
+  const sigma = el("strong", { "data-sigma": "" }, "…");
+  const sentence = el("p", { class: "sentence" });
+  const warnings = el("ul", { class: "warnings" });
+  const list = el("ol", { class: "nearest" });
+  const others = el("p", { class: "about" });
+  const aloud = el("p", { class: "unseen", "aria-live": "polite" });
+  const meter = el("meter", { min: 0, max: 1, "aria-hidden": "true" });
+  host.append(
+    el(
+      "div",
+      { class: "title" },
+      el("h2", {}, "Trust"),
+      el("span", { class: "sigma" }, "σ ", sigma),
+    ),
+    meter,
+    sentence,
+    warnings,
+    el("h3", {}, "Made of these captured clips"),
+    list,
+    others,
+    aloud,
+  );
+  const why = new Latest<null>(async () => {
+    const { controls, model, performer } = store.state;
+    const question = { controls, performer, nearest: NEAREST };
+    const reasons = await source.why(model, question, signal).catch(() => null);
+    if (!reasons || signal.aborted) return;
+    list.replaceChildren(...reasons.nearest.map((clip) => item(clip, card, session)));
+    others.textContent = rest(reasons);
+  });
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  signal.addEventListener("abort", () => clearTimeout(timer));
+  player.onTrust((trust) => {
+    const usual = worst(card);
+    sigma.textContent = written.centimetres(trust.sigma);
+    meter.value = Math.min(1, trust.sigma / (3 * usual));
+    sentence.textContent = says(trust, usual);
+    warnings.replaceChildren(...trust.warnings.map((text) => el("li", {}, text)));
+    host.toggleAttribute("data-outside", trust.warnings.length > 0);
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      why.ask(null);
+      aloud.textContent = [says(trust, usual), ...trust.warnings].join(" ");
+    }, CALM);
+  });
+}
+
+function says(trust: Trust, usual: number): string {
+  const found = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
+  if (trust.warnings.length) return `${found} That is a guess: nothing was captured out here.`;
+  if (trust.sigma > 1.5 * usual)
+    return `${found} That is far more than usual: the examples are sparse here.`;
+  return found;
+}
+
+/** What a clip left out typically lies away, m; what that is not known of: the finest level's error. */
+function worst(card: ModelCard): number {
+  const found = (card.diagnostics as Record<string, unknown>)["leave_one_out_rms_m"];
+  return typeof found === "number" ? found : card.levels[0]!.rms;
+}
+
+function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement {
+  const values = card.controls.map(({ name, unit, minimum, maximum }) => {
+    const value = written.short(clip.controls[name]!, maximum - minimum);
+    return `${title(name).toLowerCase()} ${value} ${unit}`;
+  });
+  const go = el(
+    "button",
+    { type: "button", title: `Go there: ${values.join(", ")}` },
+    el("span", { class: "source" }, clip.source),
+    el("span", { class: "weight" }, `${percent(clip.weight)}`),
+    el("meter", { min: 0, max: 1, value: Math.max(0, clip.weight), "aria-hidden": "true" }),
+    el("span", { class: "about" }, `distance ${clip.distance.toFixed(2)}${who(clip)}`),
+  );
+  go.addEventListener("click", () =>
+    store.set({ controls: { ...clip.controls }, performer: clip.performer }),
+  );
+  return el("li", {}, go);
+}
+
+function who({ performer }: Captured): string {
+  return performer ? ` · ${performer}` : "";
+}
+
+function rest({ others }: Reasons): string {
+  return others.count ? `${others.count} others together ${percent(others.weight)}` : "";
+}
+
+function percent(share: number): string {
+  return `${(100 * share).toFixed(Math.abs(share) < 0.1 ? 1 : 0)} %`;
+}

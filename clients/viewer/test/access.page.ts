@@ -1,0 +1,114 @@
+/** Everybody can use it: axe finds nothing serious, in light and dark, on a desk and on a tablet. */
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { after, before, test } from "node:test";
+
+import type { Browser, Page } from "playwright-core";
+
+import { browser, SERVICE } from "./harness.ts";
+import { settled, slider } from "./look.ts";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const REACH =
+  "/#reaching?stature=1.75&hip_height=0.9&turn=20&target_height=1.1&~playing=no&~ghost=yes&~feet=yes";
+const SIZES = { desk: { width: 1280, height: 720 }, tablet: { width: 768, height: 1024 } };
+
+let chromium: Browser;
+before(async () => {
+  chromium = await browser();
+});
+after(() => chromium.close());
+
+async function shown(scheme: "light" | "dark", size: keyof typeof SIZES): Promise<Page> {
+  const page = await chromium.newPage({
+    viewport: SIZES[size],
+    colorScheme: scheme,
+    hasTouch: size === "tablet",
+    bypassCSP: true,
+  });
+  await page.goto(SERVICE + REACH);
+  await settled(page);
+  return page;
+}
+
+/** Rules that are broken seriously, and where. */
+async function broken(page: Page): Promise<string[]> {
+  await page.evaluate(AXE);
+  return page.evaluate(async () => {
+    const { axe } = window as unknown as { axe: { run(): Promise<{ violations: Violation[] }> } };
+    type Violation = { id: string; impact: string; nodes: { target: string[] }[] };
+    const { violations } = await axe.run();
+    return violations
+      .filter(({ impact }) => impact === "serious" || impact === "critical")
+      .map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(" ")).join(", ")}`);
+  });
+}
+
+for (const scheme of ["light", "dark"] as const)
+  for (const size of ["desk", "tablet"] as const)
+    test(`nothing serious, ${scheme}, ${size}`, async () => {
+      const page = await shown(scheme, size);
+      assert.deepEqual(await broken(page), []);
+      await slider(page, "turn").fill("1500");
+      await page.locator(".warnings li").first().waitFor();
+      assert.deepEqual(await broken(page), []);
+      await page.getByRole("button", { name: "Keys" }).click();
+      assert.deepEqual(await broken(page), []);
+      await page.close();
+    });
+
+test("axe would notice a field without a name and text without contrast", async () => {
+  const page = await shown("light", "desk");
+  await page.evaluate(() => {
+    document.querySelector("#side input[type=text]")!.removeAttribute("aria-label");
+    (document.querySelector(".sentence") as HTMLElement).style.color = "#ddd";
+  });
+  assert.match((await broken(page)).join(), /color-contrast.*label|label.*color-contrast/);
+  await page.close();
+});
+
+test("nothing lies beside the screen, and everything is reached by Tab", async () => {
+  for (const size of ["desk", "tablet"] as const) {
+    const page = await shown("light", size);
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    assert.ok(wide <= 0, `${size}: ${wide} px too wide`);
+    const reached = new Set<string>();
+    for (let press = 0; press < 60; press++) {
+      await page.keyboard.press("Tab");
+      reached.add(
+        await page.evaluate(() => {
+          const at = document.activeElement!;
+          return at.closest("section")?.dataset["part"] ?? at.parentElement?.id ?? at.tagName;
+        }),
+      );
+    }
+    for (const part of ["options", "controls", "trust", "target", "time", "bar"])
+      assert.ok(reached.has(part), `${part} of ${[...reached]}`);
+    await page.close();
+  }
+});
+
+test("who wants stillness gets it, and may play all the same", async () => {
+  const page = await chromium.newPage({ reducedMotion: "reduce" });
+  await page.goto(`${SERVICE}/#reaching`);
+  await settled(page);
+  const play = page.getByRole("button", { name: "Play (space)" });
+  await play.click();
+  await page.getByRole("button", { name: "Pause (space)" }).waitFor();
+  await page.close();
+});
+
+test("light and dark are as the system has them until one says otherwise", async () => {
+  const page = await chromium.newPage({ colorScheme: "dark" });
+  await page.goto(`${SERVICE}/#reaching`);
+  const paper = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const dark = await paper();
+  await page.getByRole("button", { name: "Light or dark (T)" }).click();
+  const light = await paper();
+  assert.notEqual(light, dark);
+  await page.reload();
+  assert.equal(await paper(), light);
+  await page.close();
+});

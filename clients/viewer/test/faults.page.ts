@@ -1,0 +1,207 @@
+/** What can go wrong around the page: it says so in words, and goes on by itself. */
+
+import assert from "node:assert/strict";
+import { createHash } from "node:crypto";
+import { cpSync, rmSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import type { Browser, Page } from "playwright-core";
+
+import { browser } from "./harness.ts";
+import { picture, settled, sigma, slider, typed, until } from "./look.ts";
+import { Serving } from "./serving.ts";
+
+const REACH =
+  "/#reaching?stature=1.75&hip_height=0.9&turn=20&target_height=1.1&~playing=no&~time=0.5";
+
+let chromium: Browser;
+let serving: Serving;
+before(async () => {
+  [chromium, serving] = await Promise.all([browser(), Serving.make()]);
+});
+after(async () => {
+  await chromium.close();
+  await serving.end();
+});
+
+async function on(act: (page: Page) => Promise<void>, path = REACH, at = serving): Promise<void> {
+  const page = await chromium.newPage({ viewport: { width: 1280, height: 720 } });
+  const faults: string[] = [];
+  page.on("pageerror", (fault) => faults.push(String(fault)));
+  try {
+    await page.goto(at.address + path);
+    await act(page);
+    assert.deepEqual(faults, []);
+  } finally {
+    await page.close();
+  }
+}
+
+const fault = (page: Page) => page.locator("#notice .fault");
+const remark = (page: Page) => page.locator("#notice .remark");
+
+test("a service that stops is missed, its last picture stays, and its return is noticed", () =>
+  on(async (page) => {
+    await settled(page);
+    const [before, trusted] = [await picture(page), await sigma(page)];
+    assert.ok(!(await fault(page).isVisible()));
+    await serving.stop();
+    await slider(page, "turn").fill("300");
+    await fault(page).getByText("The service does not answer").waitFor();
+    assert.ok(before.equals(await picture(page)));
+    await serving.start();
+    await fault(page).waitFor({ state: "hidden" });
+    await until(async () => (await sigma(page)) !== trusted, "what was asked is answered");
+    assert.ok(!before.equals(await picture(page)));
+  }));
+
+test("a page that nobody touches notices too", () =>
+  on(async (page) => {
+    await settled(page);
+    await serving.stop();
+    await fault(page).waitFor({ timeout: 15000 });
+    await serving.start();
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("a model that disappears is named, another is shown; one that is replaced is opened anew", () =>
+  on(async (page) => {
+    await settled(page);
+    rmSync(join(serving.models, "reaching.onnx"));
+    await remark(page)
+      .getByText(/reaching is not on this service.*cmu_walk/)
+      .waitFor();
+    await page.locator('[data-control="speed"]').waitFor();
+    const other = join(serving.models, "cmu_walk.onnx");
+    cpSync(other, join(serving.models, "reaching.onnx"));
+    await until(
+      async () =>
+        (await page.getByLabel("Model", { exact: true }).innerText()).includes("reaching"),
+      "the model is listed again",
+    );
+    await page.getByLabel("Model", { exact: true }).selectOption("reaching");
+    await until(async () => page.url().includes("#reaching"), "it is shown");
+    const models =
+      process.env["POSEFIELD_MODELS"] ?? join(import.meta.dirname, "../../../build/models");
+    cpSync(join(models, "reaching.onnx"), join(serving.models, "reaching.onnx"));
+    await remark(page).getByText("reaching has been replaced on the service").waitFor();
+    await page.locator('[data-control="stature"]').waitFor();
+  }));
+
+test("an answer that comes late does not overwrite a newer one, and none queue up", () =>
+  on(async (page) => {
+    await settled(page);
+    let asked = 0;
+    await page.route(/pose.msgpack/, async (route) => {
+      asked += 1;
+      await new Promise((done) => setTimeout(done, asked === 1 ? 900 : 100));
+      await route.continue();
+    });
+    for (let at = 0; at <= 40; at++) await slider(page, "turn").fill(String(300 + 20 * at));
+    const wanted = await typed(page, "turn").inputValue();
+    await until(
+      async () =>
+        Math.abs(
+          Number(new URLSearchParams(page.url().split("?")[1]).get("turn")) - Number(wanted),
+        ) < 1,
+      "the address has the last",
+    );
+    assert.ok(asked <= 10, `${asked} questions for 41 movements`);
+    await page.unroute(/pose.msgpack/);
+    const last = await sigma(page);
+    await page.waitForTimeout(1200);
+    assert.equal(await sigma(page), last);
+    await page.reload();
+    await settled(page);
+    assert.equal(await sigma(page), last, "as if nothing else had ever been asked");
+  }));
+
+test("an answer that makes no sense is said to be that, and the next one heals it", () =>
+  on(async (page) => {
+    await settled(page);
+    await page.route(/msgpack/, (route) => route.fulfill({ status: 200, body: "\x80" }));
+    await slider(page, "turn").fill("300");
+    await fault(page).waitFor();
+    await page.unroute(/msgpack/);
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("an answer that breaks off leaves the picture, and is asked for again", () =>
+  on(async (page) => {
+    await settled(page);
+    const before = await picture(page);
+    await page.route(/msgpack/, (route) => route.abort("connectionreset"));
+    await slider(page, "turn").fill("300");
+    await fault(page).getByText("The last picture stays").waitFor();
+    assert.ok(before.equals(await picture(page)));
+    await page.unroute(/msgpack/);
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("a busy service is said to be busy", () =>
+  on(async (page) => {
+    await settled(page);
+    const body = JSON.stringify({
+      type: "urn:posefield:problem:overloaded",
+      title: "Busy",
+      status: 503,
+      detail: "1000 requests",
+      instance: "0123456789abcdef",
+      errors: [],
+    });
+    const answer = { status: 503, contentType: "application/problem+json", body };
+    await page.route(/msgpack/, (route) => route.fulfill(answer));
+    await slider(page, "turn").fill("300");
+    await fault(page)
+      .getByText(/busy or restarting/)
+      .waitFor();
+    await page.unroute(/msgpack/);
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+for (const [contract, words] of [
+  ["2.1.0", null],
+  ["2.7.3", null],
+  ["3.0.0", /another version.*3\.0\.0/],
+  [undefined, /is older/],
+] as const)
+  test(`contract ${contract ?? "unsaid"} ${words ? "is remarked on" : "is fine"}`, async () => {
+    const page = await chromium.newPage();
+    await page.route("**/livez", (route) => route.fulfill({ json: { status: "live", contract } }));
+    await page.goto(serving.address + REACH);
+    if (words) await remark(page).getByText(words).waitFor();
+    else {
+      await settled(page);
+      assert.ok(!(await remark(page).isVisible()));
+    }
+    await page.close();
+  });
+
+test("a key is asked for, kept in this tab, and used", async () => {
+  const secret = `pf_${"a".repeat(43)}`;
+  const digest = createHash("sha256").update(secret).digest("hex");
+  const locked = await Serving.make({ POSEFIELD_KEYS: `page ${digest} read:*` });
+  try {
+    await on(
+      async (page) => {
+        const dialog = page.getByRole("dialog", { name: "A key, please" });
+        await dialog.waitFor();
+        await page.getByLabel("API key or token").fill("wrong");
+        await page.keyboard.press("Enter");
+        await dialog.waitFor();
+        await page.getByLabel("API key or token").fill(secret);
+        await page.keyboard.press("Enter");
+        await settled(page);
+        assert.ok(!(await dialog.isVisible()));
+        await page.reload();
+        await settled(page);
+        assert.equal(await page.evaluate(() => localStorage.getItem("posefield-key")), null);
+      },
+      REACH,
+      locked,
+    );
+  } finally {
+    await locked.end();
+  }
+});

@@ -1,0 +1,83 @@
+/** The address: whatever the state, it comes back; whatever the text, the rest holds. */
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { address, initial, restored, written } from "../src/hash.ts";
+import type { State } from "../src/state.ts";
+import { CARD } from "./card.ts";
+
+const START = initial("hop", CARD);
+const OTHER: State = {
+  model: "hop@0123",
+  controls: { speed: 1.25, time: -3.5 },
+  performer: "bob & co",
+  level: 2,
+  time: 0.625,
+  playing: false,
+  speed: 0.5,
+  loop: false,
+  root: "in_place",
+  body: "stick",
+  ghost: true,
+  feet: true,
+  view: "crowd",
+  across: "time",
+  along: "speed",
+};
+
+function back(state: State) {
+  return restored(address(written(state, CARD)), state.model, CARD);
+}
+
+test("every part of the state comes back", () => {
+  assert.deepEqual(back(OTHER), { state: OTHER, faults: [] });
+  for (const key of Object.keys(OTHER) as (keyof State)[]) {
+    const one = { ...START, [key]: OTHER[key] };
+    assert.deepEqual(back(one).state, one, key);
+    assert.notDeepEqual(back(one).state, START, key);
+  }
+});
+
+test("what is as at the start is not written, and the text is stable", () => {
+  assert.equal(written(START, CARD), "#hop?speed=1&time=0");
+  const text = written({ ...OTHER, controls: { speed: 1 / 3, time: 1e-7 } }, CARD);
+  const again = restored(address(text), OTHER.model, CARD).state;
+  assert.equal(written(again, CARD), text);
+});
+
+test("a control may be called as a part of the state is", () => {
+  const { state } = restored(address("#hop?time=5&~time=0.5"), "hop", CARD);
+  assert.deepEqual([state.controls["time"], state.time], [5, 0.5]);
+});
+
+const WRONG: readonly (readonly [string, RegExp])[] = [
+  ["speed=1,5", /write 1\.5/],
+  ["speed=", /a number is expected/],
+  ["speed=NaN", /is not a number/],
+  ["speed=1e999", /too large/],
+  ["height=2", /no such control/],
+  ["~level=4", /expected 0 to 3/],
+  ["~level=0.5", /expected 0 to 3/],
+  ["~view=both", /one or levels or crowd/],
+  ["~performer=eve", /ann, bob/],
+  ["~across=height", /speed, time/],
+  ["~ghost=1", /yes or no/],
+  ["~model=x", /unknown/],
+  ["~__proto__=x", /unknown/],
+  ["__proto__=1", /no such control/],
+  ["%", /no such control/],
+  ["%E0%A4=1", /no such control/],
+];
+
+for (const [entry, words] of WRONG)
+  test(`${entry} is named, and the rest holds`, () => {
+    const { state, faults } = restored(address(`#hop?${entry}&~feet=yes`), "hop", CARD);
+    assert.equal(faults.length, 1);
+    assert.match(faults[0]!, words);
+    assert.deepEqual(state, { ...START, feet: true });
+  });
+
+test("a hash without anything names no model", () => {
+  for (const text of ["", "#", "#?"]) assert.equal(address(text).model, null);
+});

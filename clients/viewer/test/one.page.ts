@@ -1,0 +1,264 @@
+/** One body: everything that one can press, drag and type, against a running service. */
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+
+import type { Browser, Page } from "playwright-core";
+
+import { browser, opened } from "./harness.ts";
+import { picture, settled, sigma, slider, time, typed, until } from "./look.ts";
+
+const REACH =
+  "/#reaching?stature=1.75&hip_height=0.9&turn=20&target_height=1.1&~playing=no&~time=0.5";
+const WALK = "/#cmu_walk?speed=1.2&turn=0&stride_length=1.3&~playing=no&~time=0.3";
+
+let chromium: Browser;
+before(async () => {
+  chromium = await browser();
+});
+after(() => chromium.close());
+
+/** A page in which nothing may go wrong unnoticed. */
+async function on(
+  path: string,
+  act: (page: Page, faults: string[]) => Promise<void>,
+): Promise<void> {
+  const { page, faults } = await opened(chromium, path);
+  try {
+    await settled(page);
+    await act(page, faults);
+    assert.deepEqual(faults, []);
+  } finally {
+    await page.close();
+  }
+}
+
+test("it opens on a body that moves", () =>
+  on("/", async (page) => {
+    assert.match(await page.title(), /posefield/);
+    const first = await time(page);
+    await until(async () => (await time(page)) !== first, "time goes on");
+    assert.ok(
+      await page
+        .locator("#notice p")
+        .evaluateAll((all) => all.every((p) => (p as HTMLElement).hidden)),
+    );
+  }));
+
+test("space plays and pauses, arrows step, the scrubber seeks", () =>
+  on(REACH, async (page) => {
+    assert.equal(await time(page), 0.5);
+    const rest = await picture(page);
+    await page.keyboard.press("ArrowRight");
+    assert.ok(Math.abs((await time(page)) - 0.52) < 0.011);
+    assert.ok(!rest.equals(await picture(page)));
+    await page.keyboard.press("ArrowLeft");
+    assert.ok(rest.equals(await picture(page)), "the same frame is the same picture");
+    await page.keyboard.press(" ");
+    await until(async () => (await time(page)) > 0.6, "it plays");
+    await page.keyboard.press(" ");
+    const stopped = await time(page);
+    await page.waitForTimeout(300);
+    assert.equal(await time(page), stopped);
+    await page.getByLabel("Time", { exact: true }).fill("1");
+    assert.equal(await time(page), 1);
+  }));
+
+test("without a loop it stops at its end; slower is slower", () =>
+  on(REACH, async (page) => {
+    await page.getByRole("button", { name: "Loop" }).click();
+    await page.getByLabel("Speed").fill("2");
+    await page.getByRole("button", { name: "Play (space)" }).click();
+    await until(
+      async () => /^(.*) s \/ \1 s$/.test((await page.locator(".time").textContent())!),
+      "it ends",
+    );
+    await page.getByRole("button", { name: "Play (space)" }).waitFor();
+    assert.match(page.url(), /~loop=no/);
+  }));
+
+test("a slider moves the body, sigma and the address", () =>
+  on(REACH, async (page) => {
+    const [rest, trusted] = [await picture(page), await sigma(page)];
+    await slider(page, "target_height").fill("1300");
+    await until(async () => (await sigma(page)) !== trusted, "sigma is another");
+    assert.ok(!rest.equals(await picture(page)));
+    await until(async () => !page.url().includes("target_height=1.1&"), "the address follows");
+    await page.keyboard.press("r");
+    await until(
+      async () => (await typed(page, "target_height").inputValue()) === "1.00",
+      "R resets",
+    );
+  }));
+
+test("numbers are typed, and what is none is refused in words", () =>
+  on(REACH, async (page) => {
+    const field = typed(page, "target_height");
+    await field.fill("1,5");
+    await field.press("Enter");
+    await page.getByText("1,5 is not a number here: write 1.5.").waitFor();
+    assert.equal(await field.getAttribute("aria-invalid"), "true");
+    assert.match(page.url(), /target_height=1\.1&/);
+    await field.fill("1.5");
+    await field.press("Enter");
+    assert.equal(await field.getAttribute("aria-invalid"), "false");
+    await until(async () => page.url().includes("target_height=1.5"), "the address follows");
+  }));
+
+test("outside of what was sampled is marked, and inside is not", () =>
+  on(REACH, async (page) => {
+    const [control, warnings] = [
+      page.locator('[data-control="turn"]'),
+      page.locator(".warnings li"),
+    ];
+    assert.equal(await control.getAttribute("data-outside"), null);
+    assert.equal(await warnings.count(), 0);
+    await slider(page, "turn").fill("1500");
+    await warnings.first().waitFor();
+    assert.match((await warnings.first().textContent())!, /turn/);
+    assert.notEqual(await control.getAttribute("data-outside"), null);
+    assert.match((await slider(page, "turn").getAttribute("aria-valuetext"))!, /outside/);
+    await page.getByText("That is a guess").first().waitFor();
+    await control.getByRole("button", { name: "Reset Turn" }).click();
+    await until(async () => (await warnings.count()) === 0, "the warning goes");
+  }));
+
+test("a control with few sampled values snaps to them", () =>
+  on(REACH, async (page) => {
+    await slider(page, "stature").fill("700");
+    assert.equal(await typed(page, "stature").inputValue(), "1.750");
+    await slider(page, "stature").fill("1100");
+    assert.equal(await typed(page, "stature").inputValue(), "1.880");
+    await slider(page, "hip_height").fill("700");
+    assert.notEqual(await typed(page, "hip_height").inputValue(), "0.900");
+  }));
+
+test("a captured clip near by is named, and a click goes there", () =>
+  on(REACH, async (page) => {
+    const before = await sigma(page);
+    await page.locator(".nearest button").first().click();
+    await until(async () => (await sigma(page)) < before, "it is surer there");
+    await until(
+      async () => /distance 0\.00/.test((await page.locator(".nearest li").first().textContent())!),
+      "it is there",
+    );
+  }));
+
+test("performers are chosen by name", () =>
+  on(WALK, async (page) => {
+    const before = await sigma(page);
+    await page.getByLabel("Performer").selectOption("cmu_35");
+    await until(async () => (await sigma(page)) < before, "a known performer is surer");
+    await until(async () => page.url().includes("~performer=cmu_35"), "the address follows");
+  }));
+
+test("sticks, ghost, feet and level change the picture", () =>
+  on(WALK, async (page) => {
+    const seen = [await picture(page)];
+    for (const name of ["Sticks", "Ghost of the nearest example", "Feet: contacts and skate"]) {
+      await page.getByRole("button", { name }).click();
+      seen.push(await picture(page));
+    }
+    await page.getByLabel("Level").selectOption("3");
+    seen.push(await picture(page));
+    seen.forEach((one, i) => {
+      seen.slice(0, i).forEach((other) => {
+        assert.ok(!one.equals(other));
+      });
+    });
+    assert.match(
+      (await page.locator("[data-ghost]").textContent())!,
+      /model's answer.*nearest captured clip/,
+    );
+    assert.match((await page.locator("[data-skate]").textContent())!, /^\d+\.\d cm\/s$/);
+  }));
+
+test("root motion carries a walker on, and in place it stays", () =>
+  on(WALK.replace("~playing=no", "~feet=yes"), async (page) => {
+    await page.getByRole("button", { name: "Root motion" }).click();
+    await page.getByText("In place, every foot slides").waitFor();
+    await until(async () => page.url().includes("~root=in_place"), "the address follows");
+    await slider(page, "speed").fill("600");
+    await until(async () => (await sigma(page)) > 0, "a pose in place is answered");
+  }));
+
+test("a point that is typed is reached within what was sampled", () =>
+  on(REACH, async (page) => {
+    const point = page.locator('[data-part="target"]');
+    const y = point.locator('[data-axis="y"]');
+    const turn = await typed(page, "turn").inputValue();
+    await y.fill(String(Number(await y.inputValue()) + 0.25));
+    await y.press("Enter");
+    const miss = () => point.locator("[data-miss]").textContent();
+    await until(async () => !page.url().includes("target_height=1.1&"), "controls follow");
+    await until(async () => Number.parseFloat((await miss())!) < 1.5, "it is reached");
+    assert.equal(await typed(page, "stature").inputValue(), "1.750");
+    await y.fill("9");
+    await y.press("Enter");
+    await until(async () => Number.parseFloat((await miss())!) > 100, "the ceiling is not");
+    assert.equal(await page.locator(".control[data-outside]").count(), 0);
+    assert.ok(turn);
+  }));
+
+test("the handle is dragged, and the controls follow", () =>
+  on(REACH, async (page) => {
+    const stage = (await page.locator("#stage").boundingBox())!;
+    const at = (await page.locator('[data-part="target"]').getAttribute("data-handle"))!.split(" ");
+    const [x, y] = [stage.x + Number(at[0]), stage.y + Number(at[1])];
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x, y - 30, { steps: 6 });
+    await page.mouse.up();
+    await until(async () => !page.url().includes("target_height=1.1&"), "controls follow");
+  }));
+
+test("back, forward and reload", () =>
+  on(REACH, async (page) => {
+    await slider(page, "turn").fill("400");
+    await until(async () => !page.url().includes("turn=20&"), "the address follows");
+    const there = page.url();
+    await page.goBack();
+    await until(async () => (await typed(page, "turn").inputValue()) === "20", "back is back");
+    await page.goForward();
+    await until(
+      async () => (await typed(page, "turn").inputValue()) !== "20",
+      "forward is forward",
+    );
+    assert.equal(page.url(), there);
+    const [turn, trusted] = [await typed(page, "turn").inputValue(), await sigma(page)];
+    await page.reload();
+    await settled(page);
+    assert.deepEqual([await typed(page, "turn").inputValue(), await sigma(page)], [turn, trusted]);
+    assert.equal(await time(page), 0.5);
+    await page.getByLabel("Model", { exact: true }).selectOption("cmu_walk");
+    await page.locator('[data-control="speed"]').waitFor();
+    await until(async () => page.url().includes("#cmu_walk"), "the address follows");
+    await page.goBack();
+    await page.locator('[data-control="stature"]').waitFor();
+  }));
+
+test("entries of the address that make no sense are named", () =>
+  on(`${REACH}&~level=9&height=2`, async (page) => {
+    const notice = page.locator("#notice");
+    await notice
+      .getByText(/~level: “9”, expected 0 to 3 · height: this model has no such control/)
+      .waitFor();
+    await notice.getByRole("button", { name: "Close this notice" }).click();
+    assert.ok(!(await notice.locator(".remark").isVisible()));
+  }));
+
+test("an unknown model is said to be unknown, and another is shown", () =>
+  on("/#nobody", async (page, faults) => {
+    await page.getByText(/nobody is not on this service.*showing cmu_walk/).waitFor();
+    await page.locator('[data-control="speed"]').waitFor();
+    assert.match(faults.splice(0).join(), /^Failed to load resource.*404/);
+  }));
+
+test("keys are listed, and close with Escape", () =>
+  on(REACH, async (page) => {
+    const help = page.getByRole("dialog", { name: "Keys" });
+    await page.getByRole("button", { name: "Keys" }).click();
+    await help.getByText("play or pause").waitFor();
+    await page.keyboard.press("Escape");
+    assert.ok(!(await help.isVisible()));
+  }));

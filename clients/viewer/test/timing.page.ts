@@ -1,0 +1,55 @@
+/** How long things take, printed; that they are measured, and that nothing queues up, is tested. */
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+
+import type { Browser } from "playwright-core";
+
+import { browser, opened } from "./harness.ts";
+import { settled } from "./look.ts";
+
+let chromium: Browser;
+before(async () => {
+  chromium = await browser();
+});
+after(() => chromium.close());
+
+test("from opening to the first pose", async (context) => {
+  const found: number[] = [];
+  for (let round = 0; round < 3; round++) {
+    const { page } = await opened(chromium);
+    await settled(page);
+    const [first] = await page.evaluate(() =>
+      performance.getEntriesByName("posefield:first-pose").map(({ duration }) => duration),
+    );
+    found.push(Math.round(first!));
+    await page.close();
+  }
+  context.diagnostic(`first pose: ${found.join(", ")} ms`);
+  assert.equal(found.length, 3);
+});
+
+test("from a slider's movement to the pose", async (context) => {
+  const { page } = await opened(chromium, "/#reaching?~playing=no&~time=0.5");
+  await settled(page);
+  const track = page.locator('[data-control="target_height"] input[type=range]');
+  const { x, y, width, height } = (await track.boundingBox())!;
+  await page.mouse.move(x + width / 2, y + height / 2);
+  await page.mouse.down();
+  for (let i = 0; i < 90; i++) {
+    await page.mouse.move(x + width * (0.5 + 0.3 * Math.sin(i / 9)), y + height / 2);
+    await page.waitForTimeout(16);
+  }
+  await page.mouse.up();
+  await page.waitForTimeout(500);
+  const took = await page.evaluate(() =>
+    performance.getEntriesByName("posefield:drag").map(({ duration }) => duration),
+  );
+  took.sort((a, b) => a - b);
+  const at = (share: number) => took[Math.floor(share * took.length)]!.toFixed(0);
+  context.diagnostic(
+    `drag: ${took.length} movements, median ${at(0.5)} ms, nine in ten ${at(0.9)} ms`,
+  );
+  assert.ok(took.length > 40, `${took.length} movements of 90 were answered`);
+  await page.close();
+});
