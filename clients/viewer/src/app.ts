@@ -7,6 +7,8 @@ import { type Address, address, restored } from "./hash.ts";
 import { Header } from "./header.ts";
 import { KeyDialog } from "./key.ts";
 import { Notice } from "./notice.ts";
+import { offline } from "./offline.ts";
+import type { Source } from "./page.ts";
 import * as parts from "./parts.ts";
 import { Player } from "./player.ts";
 import { Scene } from "./scene.ts";
@@ -25,6 +27,7 @@ interface Open {
 
 export class App {
   readonly #service = new Service();
+  #source: Source = this.#service;
   readonly #notice = new Notice(at("#notice"));
   readonly #header = new Header(at("#bar"), (model) => this.#choose(model));
   readonly #key = new KeyDialog(document.body, (key) => this.#unlock(key));
@@ -36,9 +39,18 @@ export class App {
   #open: Open | null = null;
   #turn = 0;
 
-  start(): void {
+  async start(): Promise<void> {
+    try {
+      // A copy without a service has its answers in itself.
+      this.#source = (await offline()) ?? this.#service;
+    } catch (fault) {
+      this.#fault(`The model of this page cannot be opened: ${fault}`);
+      return;
+    }
     void this.#go(address(location.hash));
-    void mismatch().then((words) => words && this.#notice.remark(words));
+    if (this.#source === this.#service) {
+      void mismatch().then((words) => words && this.#notice.remark(words));
+    }
     addEventListener("popstate", () => void this.#restore(address(location.hash)));
     // What was asked for is on its way while this takes its time.
     this.#scene = new Scene(at("#stage"));
@@ -55,12 +67,12 @@ export class App {
     const turn = ++this.#turn;
     try {
       const [models, hoped] = await Promise.all([
-        this.#service.models(),
-        wanted.model ? this.#service.card(wanted.model).catch(() => null) : null,
+        this.#source.models(),
+        wanted.model ? this.#source.card(wanted.model).catch(() => null) : null,
       ]);
       const model = hoped ? wanted.model! : models[0]?.name;
       if (!model) throw "This service has no models yet.";
-      const card = hoped ?? (await this.#service.card(model));
+      const card = hoped ?? (await this.#source.card(model));
       if (turn !== this.#turn) return;
       const missing = wanted.model && !hoped ? gone(wanted.model, model) : "";
       const { state, faults } = restored(missing ? { model, entries: [] } : wanted, model, card);
@@ -79,7 +91,7 @@ export class App {
     const end = new AbortController();
     const page = {
       store,
-      source: this.#service,
+      source: this.#source,
       card,
       scene: this.#scene!,
       notice: (fault: unknown) => this.#fault(fault),
@@ -112,7 +124,7 @@ export class App {
     const open = this.#open;
     if (!open) return this.#go(address(location.hash));
     try {
-      const models = await this.#service.models();
+      const models = await this.#source.models();
       if (open !== this.#open) return;
       const found = models.find(({ name }) => name === open.model);
       if (!found && !open.model.includes("@")) return await this.#fallBack(open.model, models);
@@ -124,7 +136,7 @@ export class App {
   }
 
   async #renew({ model, store }: Open, models: readonly ModelSummary[]): Promise<void> {
-    const card = await this.#service.card(model);
+    const card = await this.#source.card(model);
     const known = new Set(card.controls.map(({ name }) => name));
     const entries = Object.entries(store.state.controls)
       .filter(([name]) => known.has(name))

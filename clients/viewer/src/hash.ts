@@ -56,6 +56,8 @@ export function initial(model: string, card: ModelCard): State {
     view: "one",
     across: names[0] ?? "",
     along: names[1] ?? "",
+    crowd: 300,
+    pixels: 4,
   };
 }
 
@@ -128,6 +130,8 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   view: one("one", "levels", "crowd"),
   across: control(),
   along: control(),
+  crowd: between(() => [50, 1000], Number.isInteger),
+  pixels: between(() => [0.25, 16]),
 };
 
 function between(

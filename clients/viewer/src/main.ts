@@ -3,4 +3,4 @@ import { App } from "./app.ts";
 import * as theme from "./theme.ts";
 
 theme.start();
-new App().start();
+void new App().start();

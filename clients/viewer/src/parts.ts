@@ -2,9 +2,13 @@
 
 import * as bodies from "./bodies.ts";
 import * as controls from "./controls.ts";
+import * as crowd from "./crowd.ts";
 import * as feet from "./feet.ts";
+import * as files from "./files.ts";
 import * as ghost from "./ghost.ts";
 import * as keys from "./keys.ts";
+import * as levels from "./levels.ts";
+import * as map from "./map.ts";
 import * as options from "./options.ts";
 import type { Session } from "./session.ts";
 import * as target from "./target.ts";
@@ -15,12 +19,14 @@ type Part = (host: HTMLElement, session: Session) => void;
 
 /** Each gets a section of its own, in this order, named for styles and tests. */
 const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<string, Part>>>> = {
-  stage: { options: options.mount, ghost: ghost.mount },
+  stage: { options: options.mount, ghost: ghost.mount, levels: levels.mount, crowd: crowd.mount },
   side: {
     controls: controls.mount,
     trust: trust.mount,
     target: target.mount,
+    map: map.mount,
     feet: feet.mount,
+    files: files.mount,
   },
   transport: { time: transport.mount },
 };

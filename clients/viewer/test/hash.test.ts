@@ -24,6 +24,8 @@ const OTHER: State = {
   view: "crowd",
   across: "time",
   along: "speed",
+  crowd: 500,
+  pixels: 2,
 };
 
 function back(state: State) {
