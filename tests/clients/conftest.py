@@ -1,7 +1,16 @@
-"""A real service for the clients to ask."""
+"""A real service for the clients to ask, and Node as the project's own environment has it."""
+
+import os
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
 
 import pytest
 import serving
+
+CLIENTS = Path(__file__).parents[2] / "clients"
+BIN = Path(sys.executable).parent
 
 
 @pytest.fixture(scope="module")
@@ -9,3 +18,21 @@ def address(models):
     """Where a service listens that is a process of its own, with the models of api/examples."""
     with serving.process(models) as child:
         yield serving.address(child)
+
+
+@pytest.fixture(scope="session")
+def in_package():
+    """Function from an npm package's name to one that runs a command in it.
+
+    That fails with what the command prints, where it does not succeed.
+    """
+
+    def run(package, *words, **environ):
+        path = f"{BIN}{os.pathsep}{os.environ['PATH']}"
+        given = {**os.environ, "PATH": path, **environ}
+        folder = CLIENTS / package
+        done = subprocess.run(words, cwd=folder, env=given, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    return lambda package: partial(run, package)

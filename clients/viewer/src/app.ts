@@ -157,7 +157,6 @@ export class App {
 
   /** The service answers again. */
   async #back(): Promise<void> {
-    this.#notice.fault(null);
     void mismatch().then((words) => words && this.#notice.remark(words));
     const open = this.#open;
     if (!open) return this.#go(address(location.hash));
@@ -174,6 +173,7 @@ export class App {
   #fault(fault: unknown): void {
     if (fault === null) {
       if (!this.#watch.down) this.#notice.fault(null);
+      this.#watch.well();
       return;
     }
     const found = understood(fault);

@@ -6,11 +6,13 @@ import { ready } from "./service.ts";
 const CALM = 5000;
 const FIRST = 400;
 const LONGEST = 8000;
+const LONGER = 1.7;
 
 export class Watch {
   readonly #look: () => Promise<void>;
   readonly #back: () => Promise<void>;
-  #wait = 0;
+  #down = false;
+  #wait = FIRST;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   /** look: whenever all is well. back: when the service is ready again; throws while it is not. */
@@ -21,32 +23,37 @@ export class Watch {
   }
 
   get down(): boolean {
-    return this.#wait > 0;
+    return this.#down;
   }
 
   /** Something was not answered. */
   failed(): void {
-    if (this.down) return;
-    this.#wait = FIRST;
+    if (this.#down) return;
+    this.#down = true;
     this.#next();
+  }
+
+  /** Something was answered: who fails next is looked after at once. */
+  well(): void {
+    if (!this.#down) this.#wait = FIRST;
   }
 
   #next(): void {
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => void this.#turn(), this.#wait || CALM);
+    this.#timer = setTimeout(() => void this.#turn(), this.#down ? this.#wait : CALM);
   }
 
   async #turn(): Promise<void> {
-    if (this.down) await this.#again();
+    if (this.#down) await this.#again();
     else if (!document.hidden) await this.#look();
     this.#next();
   }
 
   async #again(): Promise<void> {
-    const wait = this.#wait;
-    this.#wait = Math.min(LONGEST, 1.7 * wait);
+    // It may be ready, and fail all the same.
+    this.#wait = Math.min(LONGEST, LONGER * this.#wait);
     if (!(await ready())) return;
-    this.#wait = 0;
+    this.#down = false;
     await this.#back();
   }
 }

@@ -56,6 +56,12 @@ for (const scheme of ["light", "dark"] as const)
       assert.deepEqual(await broken(page), []);
       await page.getByRole("button", { name: "Keys" }).click();
       assert.deepEqual(await broken(page), []);
+      await page.keyboard.press("Escape");
+      for (const view of ["Levels", "Crowd"]) {
+        await page.getByRole("button", { name: view, exact: true }).click();
+        await page.locator(`[data-part="${view.toLowerCase()}"]`).waitFor();
+        assert.deepEqual(await broken(page), [], view);
+      }
       await page.close();
     });
 

@@ -92,11 +92,14 @@ test("a model that disappears is named, another is shown; one that is replaced i
 test("an answer that comes late does not overwrite a newer one, and none queue up", () =>
   on(async (page) => {
     await settled(page);
-    let asked = 0;
+    let [asked, open, most] = [0, 0, 0];
     await page.route(/pose.msgpack/, async (route) => {
       asked += 1;
+      open += 1;
+      most = Math.max(most, open);
       await new Promise((done) => setTimeout(done, asked === 1 ? 900 : 100));
       await route.continue();
+      open -= 1;
     });
     for (let at = 0; at <= 40; at++) await slider(page, "turn").fill(String(300 + 20 * at));
     const wanted = await typed(page, "turn").inputValue();
@@ -107,7 +110,8 @@ test("an answer that comes late does not overwrite a newer one, and none queue u
         ) < 1,
       "the address has the last",
     );
-    assert.ok(asked <= 10, `${asked} questions for 41 movements`);
+    assert.equal(most, 1, "never two at once");
+    assert.ok(asked <= 20, `${asked} questions for 41 movements`);
     await page.unroute(/pose.msgpack/);
     const last = await sigma(page);
     await page.waitForTimeout(1200);
@@ -137,6 +141,20 @@ test("an answer that breaks off leaves the picture, and is asked for again", () 
     assert.ok(before.equals(await picture(page)));
     await page.unroute(/msgpack/);
     await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("a service that is ready and fails all the same is asked ever more seldom", () =>
+  on(async (page) => {
+    await settled(page);
+    let looked = 0;
+    page.on("request", (request) => {
+      looked += Number(request.url().endsWith("/readyz"));
+    });
+    await page.route(/msgpack/, (route) => route.abort("connectionreset"));
+    await slider(page, "turn").fill("300");
+    await fault(page).waitFor();
+    await page.waitForTimeout(6000);
+    assert.ok(looked > 1 && looked < 7, `${looked} looks in six seconds`);
   }));
 
 test("a busy service is said to be busy", () =>

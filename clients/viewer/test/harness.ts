@@ -2,10 +2,11 @@
 
 import { type Browser, chromium, type Page } from "playwright-core";
 
+// As on a machine without a graphics card: the processor draws, and puts the page together by itself
+// (through SwiftShader too that took 60 ms a frame).
 const ARGUMENTS = [
   "--no-sandbox",
-  "--use-gl=angle",
-  "--use-angle=swiftshader",
+  "--disable-gpu",
   "--enable-unsafe-swiftshader",
   "--no-first-run",
   "--disable-quic",

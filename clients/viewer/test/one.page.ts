@@ -159,7 +159,7 @@ test("sticks, ghost, feet and level change the picture", () =>
       await page.getByRole("button", { name }).click();
       seen.push(await picture(page));
     }
-    await page.getByLabel("Level").selectOption("3");
+    await page.getByLabel("Level", { exact: true }).selectOption("3");
     seen.push(await picture(page));
     seen.forEach((one, i) => {
       seen.slice(0, i).forEach((other) => {

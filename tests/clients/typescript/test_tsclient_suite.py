@@ -17,32 +17,35 @@ PLACES = [[0, 0, 0], [3, 0, 1], [-2, 0, 5]]
 CROWD = {"time": [0.0, 0.2, 0.4], "heading": [0.0, 1.0, -2.0], "position": PLACES}
 
 
-def test_its_own_tests_pass_against_a_real_service(address, kinematics, expect_success):
-    said = expect_success(
-        "npm", "test", POSEFIELD_URL=address, POSEFIELD_KINEMATICS=str(kinematics)
-    )
+@pytest.fixture
+def run(in_package):
+    return in_package("typescript")
+
+
+def test_its_own_tests_pass_against_a_real_service(address, kinematics, run):
+    said = run("npm", "test", POSEFIELD_URL=address, POSEFIELD_KINEMATICS=str(kinematics))
     assert "\nℹ fail 0\n" in said
     assert "\nℹ skipped 0\n" in said
 
 
-def test_its_types_hold(expect_success):
-    expect_success(f"{TOOLS}/tsc", "--noEmit", "-p", ".")
+def test_its_types_hold(run):
+    run(f"{TOOLS}/tsc", "--noEmit", "-p", ".")
 
 
-def test_its_form_holds(expect_success):
-    expect_success(f"{TOOLS}/biome", "ci", ".")
+def test_its_form_holds(run):
+    run(f"{TOOLS}/biome", "ci", ".")
 
 
-def test_its_schema_is_what_the_contract_gives(expect_success, tmp_path):
+def test_its_schema_is_what_the_contract_gives(run, tmp_path):
     anew = tmp_path / "schema.ts"
-    expect_success("node", "generate.ts", str(anew))
+    run("node", "generate.ts", str(anew))
     assert anew.read_text() == (PACKAGE / "src/schema.ts").read_text()
     assert anew.read_text().startswith("// Generated from api/openapi.yaml by ")
 
 
-def test_a_failure_of_the_tools_is_one_of_this_suite(expect_success):
+def test_a_failure_of_the_tools_is_one_of_this_suite(run):
     with pytest.raises(AssertionError, match="not of this world"):
-        expect_success("node", "-e", "console.error('not of this world'); process.exit(1)")
+        run("node", "-e", "console.error('not of this world'); process.exit(1)")
 
 
 @pytest.fixture
