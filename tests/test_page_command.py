@@ -3,11 +3,15 @@
 import gzip
 import json
 import re
+import shlex
+from pathlib import Path
 
 import pytest
 
 from service import page
 from service.synthesis import session
+
+README = Path(__file__).parents[1] / "clients/viewer/README.md"
 
 
 @pytest.fixture
@@ -36,6 +40,15 @@ def test_the_folder_holds_the_page_its_parts_and_the_model(built, model_path, tm
     assert found["reaching.onnx"] == model_path.read_bytes()
     runtime = "ort-wasm-simd-threaded.wasm"
     assert found[runtime] == f"{runtime}.gz".encode()
+
+
+def test_the_readmes_example_runs(built, model_path, tmp_path, posefield, monkeypatch):
+    (command,) = re.findall(r"^posefield (page .*)$", README.read_text(), re.MULTILINE)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    Path("reaching.onnx").write_bytes(model_path.read_bytes())
+    assert posefield(*shlex.split(command))[0] == 0
+    assert Path("folder/index.html").exists()
 
 
 def test_the_page_names_its_model(built, model_path, tmp_path, posefield):

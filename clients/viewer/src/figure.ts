@@ -73,11 +73,14 @@ export class Figure {
   }
 }
 
+/** Where it coincides with the body, that is what one sees. */
+const BEHIND = { polygonOffset: true, polygonOffsetFactor: 6, polygonOffsetUnits: 6 };
+
 function pale(): MeshLambertMaterial {
-  return new MeshLambertMaterial({ transparent: true, opacity: 0.32 });
+  return new MeshLambertMaterial({ transparent: true, opacity: 0.32, ...BEHIND });
 }
 
 /** Fills the depth alone, so that what is pale shows its outside once and not its inside. */
 function hollow(): Material {
-  return new MeshLambertMaterial({ colorWrite: false });
+  return new MeshLambertMaterial({ colorWrite: false, ...BEHIND });
 }

@@ -37,9 +37,17 @@ export function address(hash: string): Address {
   return { model: plain(model) || null, entries };
 }
 
+/** Controls in the order in which they are worth a map: those of few values last. */
+function mapped({ controls }: ModelCard): readonly string[] {
+  const [few, many] = [true, false].map((is) =>
+    controls.filter(({ values }) => values.length > 0 === is),
+  );
+  return [...many!, ...few!].map(({ name }) => name);
+}
+
 /** What a model's page shows where nobody says otherwise. */
 export function initial(model: string, card: ModelCard): State {
-  const names = card.controls.map((control) => control.name);
+  const [across = "", along = ""] = mapped(card);
   return {
     model,
     controls: Object.fromEntries(card.controls.map(({ name, default: value }) => [name, value])),
@@ -54,8 +62,8 @@ export function initial(model: string, card: ModelCard): State {
     ghost: false,
     feet: false,
     view: "one",
-    across: names[0] ?? "",
-    along: names[1] ?? "",
+    across,
+    along,
     crowd: 300,
     pixels: 4,
   };

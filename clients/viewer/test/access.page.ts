@@ -59,7 +59,7 @@ for (const scheme of ["light", "dark"] as const)
       await page.keyboard.press("Escape");
       for (const view of ["Levels", "Crowd"]) {
         await page.getByRole("button", { name: view, exact: true }).click();
-        await page.locator(`[data-part="${view.toLowerCase()}"]`).waitFor();
+        await page.locator(`section.${view.toLowerCase()}`).waitFor();
         assert.deepEqual(await broken(page), [], view);
       }
       await page.close();

@@ -48,6 +48,13 @@ test("what is as at the start is not written, and the text is stable", () => {
   assert.equal(written(again, CARD), text);
 });
 
+test("a map begins with controls of many values", () => {
+  const controls = CARD.controls.map((each, i) => ({ ...each, values: i ? [] : [1, 2] }));
+  const { across, along } = initial("hop", { ...CARD, controls });
+  assert.deepEqual([across, along], ["time", "speed"]);
+  assert.equal(initial("hop", CARD).across, "speed");
+});
+
 test("a control may be called as a part of the state is", () => {
   const { state } = restored(address("#hop?time=5&~time=0.5"), "hop", CARD);
   assert.deepEqual([state.controls["time"], state.time], [5, 0.5]);

@@ -53,3 +53,30 @@ test("from a slider's movement to the pose", async (context) => {
   assert.ok(took.length > 40, `${took.length} movements of 90 were answered`);
   await page.close();
 });
+
+test("frames of a crowd of 300 that walks", async (context) => {
+  const { page } = await opened(chromium, "/#cmu_walk?~view=crowd&~crowd=300&~playing=yes");
+  await settled(page);
+  await page.waitForTimeout(4000);
+  const times = await page.evaluate(
+    () =>
+      new Promise<number[]>((done) => {
+        const found: number[] = [];
+        const step = (now: number) => {
+          found.push(now);
+          if (now - found[0]! < 5000) requestAnimationFrame(step);
+          else done(found);
+        };
+        requestAnimationFrame(step);
+      }),
+  );
+  const took = times.slice(1).map((time, i) => time - times[i]!);
+  took.sort((a, b) => a - b);
+  const rate = (1000 * took.length) / (times.at(-1)! - times[0]!);
+  const fine = await page.locator("#stage canvas").evaluate((it: HTMLCanvasElement) => it.width);
+  context.diagnostic(
+    `crowd: ${rate.toFixed(0)} frames a second, half of them within ${took[took.length >> 1]!.toFixed(0)} ms, ${fine} pixels wide`,
+  );
+  assert.ok(took.length > 5);
+  await page.close();
+});

@@ -1,0 +1,26 @@
+/** Writes the README's pictures of the page: `node test/screens.ts ../../docs` beside a service. */
+
+import { join } from "node:path";
+
+import { browser, opened } from "./harness.ts";
+import { settled } from "./look.ts";
+
+const SHOWN = {
+  "page-one":
+    "/#reaching?stature=1.75&hip_height=0.9&turn=35&target_height=1.6&~playing=no&~time=1.5&~ghost=yes",
+  "page-levels": "/#cmu_walk?speed=1.3&turn=0&stride_length=1.4&~playing=no&~time=0.2&~view=levels",
+  "page-crowd": "/#cmu_walk?speed=1.3&turn=0&stride_length=1.4&~playing=no&~view=crowd",
+};
+
+const [folder = "."] = process.argv.slice(2);
+const chromium = await browser();
+for (const [name, path] of Object.entries(SHOWN)) {
+  const { page } = await opened(chromium, path);
+  await settled(page);
+  if (name === "page-one")
+    await page.locator("#side section[data-part=map]").evaluate((map) => map.scrollIntoView());
+  await page.waitForTimeout(4000);
+  await page.screenshot({ path: join(folder, `${name}.png`) });
+  await page.close();
+}
+await chromium.close();
