@@ -30,7 +30,8 @@ COPY api api
 COPY service service
 # `make page` builds it, once for every machine: the image needs no Node.
 # hadolint ignore=SC2086
-RUN test -f service/web/viewer/index.html && uv sync --frozen --no-dev --no-editable ${EXTRAS}
+RUN { test -f service/web/viewer/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
+    uv sync --frozen --no-dev --no-editable ${EXTRAS}
 # What is in it, by what is installed: /opt/posefield/share/sbom.cdx.json (CycloneDX).
 RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
 

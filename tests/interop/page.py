@@ -21,9 +21,12 @@ def faults(node: Path) -> list[str]:
     if reason := debian.missing({"chromium": "chromium"}):
         print(f"no browser: {reason}")
         return []
+    real = trained.real(REAL)
+    if real is None:
+        return []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        models = _models(folder / "models")
+        models = _models(folder / "models", real)
         (port,) = running.ports(1)
         told = {"POSEFIELD_PORT": str(port), "POSEFIELD_LOG": "off"}
         posefield = Path(sys.executable).with_name("posefield")
@@ -33,11 +36,10 @@ def faults(node: Path) -> list[str]:
             return _clicked(node, address, models)
 
 
-def _models(folder: Path) -> Path:
+def _models(folder: Path, real: bytes) -> Path:
     folder.mkdir()
     (folder / "reaching.onnx").write_bytes(trained.family()[1])
-    if (content := trained.real(REAL)) is not None:
-        (folder / f"{REAL}.onnx").write_bytes(content)
+    (folder / f"{REAL}.onnx").write_bytes(real)
     return folder
 
 
@@ -49,7 +51,8 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
         "POSEFIELD_COMMAND": str(Path(sys.executable).with_name("posefield")),
     }
     # One after the other: they measure.
-    command = [node, "--test", "--test-concurrency=1", "--test-reporter=spec", *tests]
+    options = ("--test-concurrency=1", "--test-timeout=300000", "--test-reporter=spec")
+    command = [node, "--test", *options, *tests]
     done = subprocess.run(command, cwd=VIEWER, env=os.environ | told, text=True)
     return [f"page: {len(tests)} files of tests ended with {done.returncode}"] * bool(
         done.returncode
