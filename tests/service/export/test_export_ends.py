@@ -4,8 +4,8 @@ Each runs as a process of its own, by the command that a user types.
 """
 
 import os
-import re
 import random
+import re
 import resource
 import shutil
 import signal
