@@ -271,7 +271,7 @@ def test_what_nobody_makes_is_not_acceptable(ask, refuse, controls):
     assert ask("GET", asked, headers=headers).headers["vary"] == "Accept"
 
 
-@pytest.mark.parametrize("path", ["/v1/", "/v1", "/v1/models/", "/v1/models/reach/clip/", "/livez/"])
+@pytest.mark.parametrize("path", ["/v1/", "/v1", "/v1/models/", "/v1/models/reach/clip/"])
 def test_an_unknown_path_is_refused(path, refuse):
     refuse(404, "no-such-path", "GET", path)
 
