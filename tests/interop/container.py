@@ -22,6 +22,7 @@ from service.encode import ENCODERS, poses
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web.access import keys
+from service.web.pages import viewer
 
 # What the Dockerfile adds to its base: 334 MB were measured, 428 before anything was left out.
 BUDGET = 350_000_000
@@ -149,6 +150,8 @@ def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
         for path in ("/livez", "/readyz"):
             if (status := client.get(path).status_code) != httpx.codes.OK:
                 yield f"{path} answers {status}"
+        if client.get("/").content != viewer.BUILT.read_bytes():
+            yield "/ is not the page that was built here"
         for path, content in expected.items():
             answer = client.get(
                 path, params=controls | {"time": 0.5} if "pose" in path else controls
