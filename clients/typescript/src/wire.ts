@@ -75,7 +75,7 @@ export class Wire {
   async #begun(request: Request, headers: Lines, signal?: AbortSignal): Promise<Begun> {
     const patience = new Patience(this.#options.timeout, signal);
     const answer = await this.#fetched(request, headers, patience);
-    patience.renew();
+    patience.rest();
     if (answer.ok || answer.status === 304) return { answer, patience };
     throw await refusal({ answer, patience });
   }
@@ -128,13 +128,15 @@ async function next(
   patience: Patience,
   received: number,
 ): Promise<Uint8Array<ArrayBuffer> | undefined> {
+  patience.renew();
   try {
-    const { value } = await reader.read();
-    patience.renew();
-    return value;
+    return (await reader.read()).value;
   } catch (fault) {
     patience.throwIfCancelled();
     throw ending(fault, patience, received);
+  } finally {
+    // Until somebody asks for the next piece, which may be long after this one.
+    patience.rest();
   }
 }
 
