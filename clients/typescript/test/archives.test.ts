@@ -12,6 +12,7 @@ import {
   type NamedClipQuestion,
   type Progress,
   TimedOut,
+  Unexpected,
 } from "../src/index.ts";
 import { members } from "../src/zip.ts";
 import { defaults, type Handler, serving, URL_OF_SERVICE } from "./service.ts";
@@ -98,6 +99,20 @@ for (const as of FORMATS) {
   });
 }
 
+test("an archive with a file that its manifest does not name is broken", async () => {
+  const size = Number.parseInt(Buffer.from(whole.tar.subarray(124, 136)).toString("latin1"), 8);
+  const first = whole.tar.subarray(0, 512 + 512 * Math.ceil(size / 512));
+  const other = first.slice();
+  other[0] = "x".charCodeAt(0);
+  // The first clip once more, and under another name.
+  for (const more of [first, other]) {
+    await sent(Buffer.concat([more, whole.tar]), "tar", async (own) => {
+      const asked = own.archive("reach", "bvh", clips, { as: "tar" });
+      await assert.rejects(asked, { name: "Broken", message: /holds 4 files, .* names 3/ });
+    });
+  }
+});
+
 test("a zip whose records are none is broken", () => {
   for (const signature of ["PK\x01\x02", "PK\x03\x04", "PK\x05\x06"]) {
     const other = whole.zip.slice();
@@ -126,9 +141,7 @@ test("a stream that is let go lets the service go", async () => {
   let left = false;
   await serving(
     (_, answer) => {
-      answer.on("close", () => {
-        left = true;
-      });
+      answer.on("close", () => (left = true));
       head(answer, "zip").write("x".repeat(1000));
     },
     async (base) => {
@@ -141,6 +154,21 @@ test("a stream that is let go lets the service go", async () => {
       while (!left) await sleep(5);
     },
   );
+});
+
+test("a stream whose head cannot be read lets the service go", async () => {
+  let left = false;
+  const nonsense: Handler = ({ url }, answer) => {
+    if (url === "/livez") return answer.end();
+    answer.on("close", () => (left = true));
+    answer.setHeader("Posefield-Warning", "no JSON");
+    return head(answer, "zip").write("x".repeat(1000));
+  };
+  await serving(nonsense, async (base) => {
+    const own = new Client(base, { timeout: Infinity });
+    await assert.rejects(own.stream("reach", "bvh", clips), Unexpected);
+    while (!left) await sleep(5);
+  });
 });
 
 test("a stream that is read slowly is not one that comes slowly", async () => {
