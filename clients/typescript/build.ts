@@ -13,9 +13,15 @@ const DIST = new URL("dist/", HERE);
 const TSC = createRequire(import.meta.url).resolve("typescript/bin/tsc");
 
 function published(): object {
-  const own = JSON.parse(readFileSync(new URL("package.json", HERE), "utf8"));
+  const own = described(new URL("package.json", HERE));
   const { private: _, scripts: __, devDependencies: ___, ...kept } = own;
   return { ...kept, exports: { ".": entry("index"), "./three": entry("three") } };
+}
+
+function described(path: URL): Readonly<Record<string, unknown>> {
+  const found: unknown = JSON.parse(readFileSync(path, "utf8"));
+  if (typeof found === "object" && found && "dependencies" in found) return { ...found };
+  throw new Error(`${path.pathname} describes no package with dependencies`);
 }
 
 function entry(name: string): object {

@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 import serving
 
+# Seconds after which nobody waits for a command any more, however busy the machine.
+LONGEST = 600
+
 CLIENTS = Path(__file__).parents[2] / "clients"
 BIN = Path(sys.executable).parent
 
@@ -31,7 +34,9 @@ def in_package():
         path = f"{BIN}{os.pathsep}{os.environ['PATH']}"
         given = {**os.environ, "PATH": path, **environ}
         folder = CLIENTS / package
-        done = subprocess.run(words, cwd=folder, env=given, capture_output=True, text=True)
+        done = subprocess.run(
+            words, cwd=folder, env=given, capture_output=True, text=True, timeout=LONGEST
+        )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 

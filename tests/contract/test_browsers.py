@@ -56,6 +56,8 @@ def test_a_named_page_may_read_faults_too(method, path, status, reading):
     assert answer.status_code == status
     assert answer.headers["access-control-allow-origin"] == PAGE
     assert "Origin" in answer.headers["vary"]
+    shown = answer.headers["access-control-expose-headers"].split(", ")
+    assert {"Content-Encoding", "Content-Disposition", "ETag"} <= set(shown)
     other = reading(method, path, headers={"Origin": "https://b.example"})
     assert "access-control-allow-origin" not in other.headers
     assert "Origin" in other.headers["vary"]

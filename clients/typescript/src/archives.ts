@@ -27,6 +27,11 @@ export function opened(download: Download, format: ArchiveFormat, clips: number)
     throw new Broken(`the archive holds ${entries.length} clips, expected ${clips}`);
   }
   for (const entry of entries) expectFile(files, entry);
+  const named = new Set(entries.map(({ file }) => file));
+  // Once each: of two files of one name, or two entries, one would be lost.
+  if (named.size !== entries.length || members.length !== entries.length) {
+    throw new Broken(`the archive holds ${members.length} files, its manifest names ${named.size}`);
+  }
   return { ...download, entries, files };
 }
 

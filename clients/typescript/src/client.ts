@@ -2,10 +2,11 @@
 
 import { END, expectEnd, opened } from "./archives.ts";
 import { json, read } from "./documents.ts";
-import { Unexpected } from "./errors.ts";
+import { Unexpected, WrongQuestion } from "./errors.ts";
+import type { Whole } from "./memory.ts";
 import { named } from "./named.ts";
 import { crowd, motion, poses } from "./numbers.ts";
-import { get, link, post, type Request, request, under } from "./questions.ts";
+import { asFile, get, link, post, type Request, request, under } from "./questions.ts";
 import { streamed } from "./streams.ts";
 import type {
   Archive,
@@ -62,13 +63,16 @@ export class Client {
   readonly #longest: number;
   readonly #wire: Wire;
 
-  /** base: scheme, host and port of the service; empty for where the page comes from. */
+  /**
+   * base: scheme, host and port of the service; empty for where the page comes from. WrongQuestion
+   * where that is no address, or the key none that a header can hold.
+   */
   constructor(base = "", options: ClientOptions = {}) {
-    this.base = base.replace(/\/+$/, "");
+    this.base = addressOf(base).replace(/\/+$/, "");
     this.#longest = options.longestLink ?? 2000;
     this.#wire = new Wire({
       base: this.base,
-      headers: options.key ? { Authorization: `Bearer ${options.key}` } : {},
+      headers: options.key ? { Authorization: `Bearer ${printable(options.key)}` } : {},
       timeout: options.timeout ?? 30_000,
       retries: options.retries ?? 3,
       pause: options.pause ?? 200,
@@ -120,7 +124,7 @@ export class Client {
     signal?: AbortSignal,
   ): Promise<Download> {
     const asked = this.#request(model, `/clip.${format}`, question);
-    return this.#file(asked, `${model}.${format}`, { signal });
+    return this.#file(asFile(asked, format), `${model}.${format}`, { signal });
   }
 
   /** Characters that walk, as a file. */
@@ -130,7 +134,7 @@ export class Client {
     question: WalkQuestion,
     options: TransferOptions = {},
   ): Promise<Download> {
-    const asked = get(link(under(model, `/crowd.${format}`), question));
+    const asked = asFile(get(link(under(model, `/crowd.${format}`), question)), format);
     return this.#file(asked, `${model}.${format}`, options);
   }
 
@@ -141,7 +145,7 @@ export class Client {
     clips: readonly NamedClipQuestion[],
     { as = "zip", ...options }: ArchiveOptions = {},
   ): Promise<Archive> {
-    const asked = post(under(model, `/clips.${as}`), { format, clips });
+    const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
     const download = await this.#file(asked, `${model}.${as}`, options);
     return this.#explained(async () => opened(download, as, clips.length));
   }
@@ -153,10 +157,20 @@ export class Client {
     clips: readonly NamedClipQuestion[],
     { as = "zip", signal, onProgress }: ArchiveOptions = {},
   ): Promise<Transfer> {
-    const asked = post(under(model, `/clips.${as}`), { format, clips });
-    const begun = await this.#explained(() => this.#wire.begin(asked, signal));
-    const body = streamed(begun, END, (...end) => expectEnd(as, ...end), onProgress);
-    return { ...named(begun.answer.headers, `${model}.${as}`), body };
+    const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
+    return this.#explained(async () => {
+      const begun = await this.#wire.begin(asked, signal);
+      try {
+        const head = named(begun.answer.headers, `${model}.${as}`);
+        return {
+          ...head,
+          body: streamed(begun, END, (...end) => expectEnd(as, ...end), onProgress),
+        };
+      } catch (fault) {
+        begun.patience.leave();
+        throw fault;
+      }
+    });
   }
 
   /** The link to a clip's file, to be sent on. */
@@ -189,10 +203,8 @@ export class Client {
   }
 
   async #file(asked: Request, fallback: string, options: TransferOptions): Promise<Download> {
-    return this.#explained(async () => {
-      const { headers, content } = await this.#wire.whole(asked, options);
-      return { ...named(headers, fallback), content };
-    });
+    const look = ({ headers, content }: Whole) => ({ ...named(headers, fallback), content });
+    return this.#explained(() => this.#wire.whole(asked, look, options));
   }
 
   async #read<Answer>(
@@ -200,7 +212,8 @@ export class Client {
     as: (content: Content) => Answer,
     signal: AbortSignal | undefined,
   ): Promise<Answer> {
-    return this.#explained(async () => as((await this.#wire.whole(asked, { signal })).content));
+    const look = ({ content }: Whole) => as(content);
+    return this.#explained(() => this.#wire.whole(asked, look, { signal }));
   }
 
   /** An answer; what is unexpected in it is told with both versions, where they differ. */
@@ -213,4 +226,15 @@ export class Client {
       throw new Unexpected(fault.message, { cause: fault.cause, service });
     }
   }
+}
+
+function addressOf(base: string): string {
+  if (base === "" || (/^https?:\/\/[^?#@\s]+$/i.test(base) && URL.canParse(base))) return base;
+  throw new WrongQuestion("the address: expected http://host:port or https://host:port");
+}
+
+/** A key that a header can hold; the error does not say it. */
+function printable(key: string): string {
+  if (/^[\x21-\x7e]+$/.test(key)) return key;
+  throw new WrongQuestion("the key: expected printable ASCII without blanks");
 }

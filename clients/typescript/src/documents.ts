@@ -1,7 +1,7 @@
 /** JSON answers, looked at so far that what is read of them is there. */
 
 import { Unexpected } from "./errors.ts";
-import { type components, REQUIRED } from "./schema.ts";
+import { type components, LISTS, REQUIRED } from "./schema.ts";
 
 type Name = keyof typeof REQUIRED;
 export type Document<Of extends Name> = components["schemas"][Of];
@@ -22,14 +22,28 @@ export function json(content: Uint8Array): unknown {
   return parsed(new TextDecoder().decode(content));
 }
 
-function checked<Of extends Name>(of: Of, value: unknown): Document<Of> {
-  const missing = REQUIRED[of].filter((key) => !has(value, key));
+/** A document of which all keys are there, and lists are lists. */
+export function checked<Of extends Name>(of: Of, value: unknown): Document<Of> {
+  const found: Readonly<Record<string, unknown>> = isMap(value) ? value : {};
+  const missing = REQUIRED[of].filter((key) => !(key in found));
   if (missing.length) throw new Unexpected(`a ${of} without ${missing.join(", ")}`);
+  const lists: readonly string[] = LISTS[of];
+  const other = lists.filter((key) => !Array.isArray(found[key]));
+  if (other.length) throw new Unexpected(`a ${of} without a list as ${other.join(", ")}`);
   return value as Document<Of>;
 }
 
-function has(value: unknown, key: string): boolean {
-  return typeof value === "object" && value !== null && key in value;
+function isMap(value: unknown): value is Readonly<Record<string, unknown>> {
+  return typeof value === "object" && value !== null;
+}
+
+/** Whether something is a list of texts; what Array.isArray alone says is a list of anything. */
+export function isTexts(value: unknown): value is readonly string[] {
+  return isList(value) && value.every((each) => typeof each === "string");
+}
+
+export function isList(value: unknown): value is readonly unknown[] {
+  return Array.isArray(value);
 }
 
 /** A text of JSON; Unexpected where it is none. */

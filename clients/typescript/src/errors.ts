@@ -2,6 +2,7 @@
  * What can go wrong, as a closed tree:
  *
  *     PosefieldError
+ *     ├── WrongQuestion      nothing was sent: a number, key or address that cannot be
  *     ├── Problem            the service refuses, and says why
  *     ├── Unreachable        no answer came
  *     │   ├── TimedOut       nothing came for too long
@@ -30,6 +31,11 @@ export interface Place {
 
 export class PosefieldError extends Error {
   override readonly name: string = "PosefieldError";
+}
+
+/** Nothing was sent: what is asked for cannot be. */
+export class WrongQuestion extends PosefieldError {
+  override readonly name = "WrongQuestion";
 }
 
 /** The service refuses, and says why (RFC 9457). */

@@ -10,6 +10,7 @@ export {
   TimedOut,
   Unexpected,
   Unreachable,
+  WrongQuestion,
 } from "./errors.ts";
 export { CONTRACT } from "./schema.ts";
 export type {

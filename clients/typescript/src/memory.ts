@@ -26,9 +26,10 @@ export class Memory {
     return copied(found);
   }
 
-  /** Keeps an answer that has an entity tag. */
+  /** Keeps an answer that has an entity tag, if it may be kept. */
   keep(link: string, answer: Whole): void {
-    if (!answer.headers.has("ETag") || answer.content.length > this.#limit) return;
+    if (says(answer, "no-store") || !answer.headers.has("ETag")) return;
+    if (answer.content.length > this.#limit) return;
     this.#drop(link);
     this.#kept.set(link, copied(answer));
     this.#bytes += answer.content.length;
@@ -46,7 +47,11 @@ export class Memory {
 
 /** Whether an answer may be used for ever without asking: what the service says of name@hash. */
 export function immutable(answer: Whole): boolean {
-  return answer.headers.get("Cache-Control")?.includes("immutable") ?? false;
+  return says(answer, "immutable");
+}
+
+function says(answer: Whole, directive: string): boolean {
+  return answer.headers.get("Cache-Control")?.includes(directive) ?? false;
 }
 
 function copied({ headers, content }: Whole): Whole {

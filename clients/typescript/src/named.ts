@@ -1,6 +1,7 @@
 /** What the head of an answer says of the file in it. */
 
-import { parsed } from "./documents.ts";
+import { isTexts, parsed } from "./documents.ts";
+import { Unexpected } from "./errors.ts";
 import type { Named } from "./types.ts";
 
 /** fallback: a name for where the service gives none. */
@@ -21,5 +22,7 @@ function number(text: string | null): number | null {
 
 /** Each is a JSON string in ASCII; lines of one header are joined by commas. */
 function warnings(joined: string | null): readonly string[] {
-  return joined === null ? [] : (parsed(`[${joined}]`) as string[]);
+  const found = parsed(`[${joined ?? ""}]`);
+  if (isTexts(found)) return found;
+  throw new Unexpected(`Posefield-Warning: found ${joined}, expected texts`);
 }

@@ -8,8 +8,9 @@
 
 import { decode } from "@msgpack/msgpack";
 
+import { checked, isList, isTexts } from "./documents.ts";
 import { Unexpected } from "./errors.ts";
-import type { CrowdPoses, Motion, Poses, Trust } from "./types.ts";
+import type { CrowdPoses, Motion, Poses } from "./types.ts";
 
 type Packed = Readonly<Record<string, unknown>>;
 type Shape = readonly number[];
@@ -60,7 +61,7 @@ export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
 function posesOf(found: Packed): Poses {
   const [frames = 0, joints = 0] = array(found, "rotations").shape;
   return {
-    trust: record<Trust>(found, "trust"),
+    trust: checked("Trust", found["trust"]),
     times: float64(found, "times", [frames]),
     rotations: float32(found, "rotations", [frames, joints, 4]),
     rootPosition: float32(found, "root_position", [frames, 3]),
@@ -108,10 +109,9 @@ function bytes(
 }
 
 function array(found: Packed, name: string): PackedArray {
-  const { dtype, shape, data } = record<Partial<PackedArray>>(found, name);
-  if (typeof dtype === "string" && Array.isArray(shape) && data instanceof Uint8Array) {
+  const { dtype, shape, data } = record(found, name);
+  if (typeof dtype === "string" && isIntegers(shape) && isBytes(data))
     return { dtype, shape, data };
-  }
   throw new Unexpected(`${name}: found no array`);
 }
 
@@ -135,17 +135,23 @@ function number(found: Packed, name: string): number {
 
 function strings(found: Packed, name: string): readonly string[] {
   const value = found[name];
-  if (Array.isArray(value) && value.every((each) => typeof each === "string")) return value;
+  if (isTexts(value)) return value;
   throw unlike(name, value, "a list of texts");
 }
 
 function integers(found: Packed, name: string, length: number): readonly number[] {
   const value = found[name];
-  if (!Array.isArray(value) || !value.every(Number.isInteger)) {
-    throw unlike(name, value, "a list of whole numbers");
-  }
+  if (!isIntegers(value)) throw unlike(name, value, "a list of whole numbers");
   expectLength(name, value.length, length);
   return value;
+}
+
+function isIntegers(value: unknown): value is readonly number[] {
+  return isList(value) && value.every(Number.isInteger);
+}
+
+function isBytes(value: unknown): value is Uint8Array<ArrayBuffer> {
+  return value instanceof Uint8Array;
 }
 
 function unlike(name: string, value: unknown, expected: string): Unexpected {

@@ -24,17 +24,28 @@ export class Patience {
     return this.#ending.signal;
   }
 
-  /** Something has come. */
+  /** What comes next is waited for from now on. */
   renew(): void {
     clearTimeout(this.#timer);
     if (this.#milliseconds > LONGEST) return;
     this.#timer = setTimeout(this.#expire, this.#milliseconds);
   }
 
-  /** All has come, or nothing more is wanted. */
-  end(): void {
+  /** Nothing is waited for: it is not the service who is slow. */
+  rest(): void {
     clearTimeout(this.#timer);
+  }
+
+  /** All has come. */
+  end(): void {
+    this.rest();
     this.#caller?.removeEventListener("abort", this.#abort);
+  }
+
+  /** Nothing more is wanted: what still comes is ended, and the connection with it. */
+  leave(): void {
+    this.end();
+    this.#ending.abort();
   }
 
   /** Throws the caller's reason, if it is the caller who has ended this. */

@@ -1,10 +1,15 @@
 /** Questions as requests: a link where the question is short enough for one, else a body. */
 
+import { WrongQuestion } from "./errors.ts";
+import { MEDIA_TYPES } from "./schema.ts";
+
 export interface Request {
   readonly method: "GET" | "POST";
   /** With the query. */
   readonly path: string;
   readonly body: string | null;
+  /** What a file has to come as; a document's form is looked at when it is read. */
+  readonly mediaType?: string;
 }
 
 type Value = string | number | boolean | null | undefined;
@@ -24,7 +29,18 @@ export function get(path: string): Request {
 }
 
 export function post(path: string, question: object): Request {
-  return { method: "POST", path, body: JSON.stringify(question) };
+  return { method: "POST", path, body: JSON.stringify(question, finite) };
+}
+
+/** The same request, whose answer is a file. */
+export function asFile(asked: Request, format: keyof typeof MEDIA_TYPES): Request {
+  return { ...asked, mediaType: MEDIA_TYPES[format] };
+}
+
+/** JSON knows no NaN and no infinity: it would say null, which is another question. */
+function finite(name: string, value: unknown): unknown {
+  if (typeof value !== "number" || Number.isFinite(value)) return value;
+  throw new WrongQuestion(`${name}: found ${value}, expected a finite number`);
 }
 
 /** A path with a question as its query, as the contract spells it. */
@@ -42,19 +58,23 @@ export function under(model: string, rest: string): string {
 function pairs({ controls, times, camera, ...rest }: Question): string[][] {
   return [
     ...spelt((controls ?? {}) as Record<string, Value>),
-    ...((times ?? []) as number[]).map((time) => ["time", String(time)]),
+    ...((times ?? []) as number[]).map((time) => ["time", text("time", time)]),
     ...spelt(rest as Record<string, Value>),
-    ...(camera ? [["camera", (camera as number[]).map(plain).join(",")]] : []),
+    ...(camera ? [["camera", (camera as number[]).map(coordinate).join(",")]] : []),
   ];
 }
 
 function spelt(values: Readonly<Record<string, Value>>): string[][] {
   const given = Object.entries(values).filter(([, value]) => value !== undefined && value !== null);
-  return given.map(([name, value]) => [name, String(value)]);
+  return given.map(([name, value]) => [name, text(name, value)]);
+}
+
+function text(name: string, value: Value): string {
+  return String(finite(name, value));
 }
 
 /** A number without an exponent, which places in a query may not have. */
-function plain(value: number): string {
-  const text = String(value);
-  return text.includes("e") ? value.toFixed(20) : text;
+function coordinate(value: number): string {
+  const said = text("camera", value);
+  return said.includes("e") ? value.toFixed(20) : said;
 }

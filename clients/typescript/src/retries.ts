@@ -9,7 +9,7 @@ export interface Retries {
   readonly pause: number;
 }
 
-/** Longer than this, ms, nobody is kept waiting without a word. */
+/** Longer than this, ms, nobody waits by itself, nor because a service says so. */
 const LONGEST = 30_000;
 const FOR_NOW = new Set([429, 503]);
 
@@ -24,17 +24,19 @@ export async function retried<Answer>(
       return await ask();
     } catch (fault) {
       const wait = pause(fault, plan.pause * 2 ** again);
-      if (again >= plan.retries || wait > LONGEST) throw fault;
+      if (again >= plan.retries || wait === null) throw fault;
       await sleep(wait, signal);
     }
   }
 }
 
-/** Milliseconds to wait after a fault; for ever where it does not pass. */
-function pause(fault: unknown, own: number): number {
-  if (!passes(fault)) return Infinity;
+/** Milliseconds to wait after a fault; null where it does not pass, or not soon. */
+function pause(fault: unknown, own: number): number | null {
+  if (!passes(fault)) return null;
+  const told = 1000 * (fault.retryAfter ?? 0);
+  if (told > LONGEST) return null;
   // Half of it by chance, so that clients that were refused together do not come back together.
-  return Math.max(own * (0.5 + 0.5 * Math.random()), 1000 * (fault.retryAfter ?? 0));
+  return told + Math.min(own, LONGEST) * (0.5 + 0.5 * Math.random());
 }
 
 function passes(fault: unknown): fault is Problem | Unreachable {

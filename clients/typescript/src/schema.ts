@@ -6125,6 +6125,60 @@ export const REQUIRED = {
   ]
 } as const;
 
+/** Which of them are lists. */
+export const LISTS = {
+  "ManifestEntry": [
+    "warnings"
+  ],
+  "ModelCard": [
+    "controls",
+    "levels",
+    "durations",
+    "performers",
+    "examples",
+    "moved_by",
+    "feet",
+    "sources"
+  ],
+  "ModelList": [
+    "models"
+  ],
+  "Problem": [
+    "errors"
+  ],
+  "Readiness": [
+    "models"
+  ],
+  "Reasons": [
+    "warnings",
+    "nearest"
+  ],
+  "SigmaGrid": [
+    "across_values",
+    "along_values",
+    "sigma",
+    "inside"
+  ],
+  "Trust": [
+    "warnings"
+  ]
+} as const;
+
+/** What files of each format are sent as. */
+export const MEDIA_TYPES = {
+  "usda": "model/vnd.usda",
+  "usdc": "model/vnd.usdc",
+  "usdz": "model/vnd.usdz+zip",
+  "json": "application/json",
+  "bvh": "application/x-bvh",
+  "glb": "model/gltf-binary",
+  "npz": "application/x-npz",
+  "arrow": "application/vnd.apache.arrow.stream",
+  "msgpack": "application/vnd.msgpack",
+  "zip": "application/zip",
+  "tar": "application/x-tar"
+} as const;
+
 /** Everything that may be wrong. */
 export const PROBLEM_TYPES = [
   "urn:posefield:problem:bad-parameter",

@@ -30,6 +30,8 @@ export function streamed(
       stream.enqueue(value);
     },
     async cancel() {
+      // A piece that is still waited for would be waited for first.
+      begun.patience.leave();
       await source.return();
     },
   });

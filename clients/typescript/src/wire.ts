@@ -34,6 +34,14 @@ export interface Begun {
 
 type Lines = Readonly<Record<string, string>>;
 
+type Look<Found> = (answer: Whole) => Found;
+
+/**
+ * Node takes compressed content that is cut for whole, so files are asked for as they are. Browsers
+ * tell the two apart; they let no page set this header, and leave it out without a word.
+ */
+const PLAIN = { "Accept-Encoding": "identity" };
+
 export class Wire {
   readonly #options: WireOptions;
   readonly #memory: Memory;
@@ -43,9 +51,9 @@ export class Wire {
     this.#memory = new Memory(options.cacheBytes);
   }
 
-  /** The answer with all of its body, asked for again where a fault may pass. */
-  whole(request: Request, options: TransferOptions): Promise<Whole> {
-    return retried(() => this.#once(request, options), this.#options, options.signal);
+  /** What `look` finds in the answer with all of its body, asked for again where a fault may pass. */
+  whole<Found>(request: Request, look: Look<Found>, options: TransferOptions): Promise<Found> {
+    return retried(() => this.#once(request, look, options), this.#options, options.signal);
   }
 
   /** The answer to a request, asked for once. */
@@ -58,26 +66,37 @@ export class Wire {
     return retried(() => this.#begun(request, {}, signal), this.#options, signal);
   }
 
-  async #once(request: Request, { signal, onProgress }: TransferOptions): Promise<Whole> {
+  async #once<Found>(
+    request: Request,
+    look: Look<Found>,
+    { signal, onProgress }: TransferOptions,
+  ): Promise<Found> {
     const kept = request.method === "GET" ? this.#memory.find(request.path) : null;
-    if (kept && immutable(kept)) return kept;
+    if (kept && immutable(kept)) return look(kept);
     const tag = kept?.headers.get("ETag");
     const begun = await this.#begun(request, tag ? { "If-None-Match": tag } : {}, signal);
     if (kept && begun.answer.status === 304) {
       begun.patience.end();
-      return kept;
+      return look(kept);
     }
     const answer = await rest(begun, onProgress);
+    const found = look(answer);
+    // Only now: what is no answer would be one for as long as it is kept.
     if (request.method === "GET") this.#memory.keep(request.path, answer);
-    return answer;
+    return found;
   }
 
   async #begun(request: Request, headers: Lines, signal?: AbortSignal): Promise<Begun> {
     const patience = new Patience(this.#options.timeout, signal);
     const answer = await this.#fetched(request, headers, patience);
-    patience.renew();
-    if (answer.ok || answer.status === 304) return { answer, patience };
-    throw await refusal({ answer, patience });
+    patience.rest();
+    const unchanged = answer.status === 304 && "If-None-Match" in headers;
+    if (!answer.ok && !unchanged) throw await refusal({ answer, patience });
+    const mediaType = unchanged ? undefined : request.mediaType;
+    const said = (answer.headers.get("Content-Type") ?? "nothing").split(";")[0]!.trim();
+    if (mediaType === undefined || said.toLowerCase() === mediaType) return { answer, patience };
+    patience.leave();
+    throw new Unexpected(`the file's media type: found ${said}, expected ${mediaType}`);
   }
 
   async #fetched(request: Request, headers: Lines, patience: Patience): Promise<Response> {
@@ -93,10 +112,13 @@ export class Wire {
     }
   }
 
-  #init({ method, body }: Request, more: Lines, signal: AbortSignal): RequestInit {
-    const own = { ...this.#options.headers, ...more };
-    if (body === null) return { method, headers: own, signal };
-    return { method, body, headers: { ...own, "Content-Type": "application/json" }, signal };
+  #init({ method, body, mediaType }: Request, more: Lines, signal: AbortSignal): RequestInit {
+    const coding = mediaType === undefined ? {} : PLAIN;
+    const headers = { ...this.#options.headers, ...coding, ...more };
+    // Elsewhere than where one asks, nobody is to be told the key.
+    const init = { method, headers, signal, redirect: "manual" as const };
+    if (body === null) return init;
+    return { ...init, body, headers: { ...headers, "Content-Type": "application/json" } };
   }
 }
 
@@ -128,13 +150,15 @@ async function next(
   patience: Patience,
   received: number,
 ): Promise<Uint8Array<ArrayBuffer> | undefined> {
+  patience.renew();
   try {
-    const { value } = await reader.read();
-    patience.renew();
-    return value;
+    return (await reader.read()).value;
   } catch (fault) {
     patience.throwIfCancelled();
     throw ending(fault, patience, received);
+  } finally {
+    // Until somebody asks for the next piece, which may be long after this one.
+    patience.rest();
   }
 }
 
@@ -170,7 +194,8 @@ function ending(fault: unknown, patience: Patience, received: number): Posefield
 const OF_PROXIES = new Set([429, 502, 503, 504]);
 
 async function refusal(begun: Begun): Promise<PosefieldError> {
-  const { status, headers } = begun.answer;
+  const { status, headers, type } = begun.answer;
+  if (type === "opaqueredirect" || (status >= 300 && status < 400)) return redirection(begun);
   const { content } = await rest(begun);
   const retryAfter = secondsOf(headers.get("Retry-After"));
   const problem = problemOf(headers, content, retryAfter);
@@ -178,6 +203,13 @@ async function refusal(begun: Begun): Promise<PosefieldError> {
   if (problem) return problem.kind === "no-such-path" ? unknownPath(problem) : problem;
   const what = `status ${status} without a problem's description`;
   return OF_PROXIES.has(status) ? new Unreachable(what, { retryAfter }) : new Unexpected(what);
+}
+
+/** Browsers do not say where to. */
+function redirection({ answer, patience }: Begun): Unexpected {
+  patience.leave();
+  const to = answer.headers.get("Location");
+  return new Unexpected(`the answer is to be had elsewhere${to === null ? "" : `: ${to}`}`);
 }
 
 /** What the service says is wrong; null where it is not the service that speaks. */

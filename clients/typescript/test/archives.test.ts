@@ -1,7 +1,9 @@
 /** Archives of many clips: whole ones of the real service, and the same in pieces. */
 
 import assert from "node:assert/strict";
+import type { ServerResponse } from "node:http";
 import { before, test } from "node:test";
+import { setTimeout as sleep } from "node:timers/promises";
 
 import {
   type ArchiveFormat,
@@ -9,9 +11,11 @@ import {
   Client,
   type NamedClipQuestion,
   type Progress,
+  TimedOut,
+  Unexpected,
 } from "../src/index.ts";
 import { members } from "../src/zip.ts";
-import { defaults, serving, URL_OF_SERVICE } from "./service.ts";
+import { defaults, type Handler, serving, URL_OF_SERVICE } from "./service.ts";
 
 const client = new Client(URL_OF_SERVICE);
 const FORMATS: readonly ArchiveFormat[] = ["zip", "tar"];
@@ -55,7 +59,7 @@ for (const as of FORMATS) {
     const cuts = [0, 1, 21, 22, 511, 512, 513, 1024, length >> 1, length - 1024, length - 1];
     for (const cut of cuts.filter((each) => each < length)) {
       const cutAt = whole[as].subarray(0, cut);
-      await sent(cutAt, async (own) => {
+      await sent(cutAt, as, async (own) => {
         await assert.rejects(own.archive("reach", "bvh", clips, { as }), Broken, `at ${cut}`);
         const { body } = await own.stream("reach", "bvh", clips, { as });
         await assert.rejects(taken(body), Broken, `stream at ${cut}`);
@@ -64,7 +68,7 @@ for (const as of FORMATS) {
   });
 
   test(`a ${as} with clips too few or too many is broken`, async () => {
-    await sent(whole[as], async (own) => {
+    await sent(whole[as], as, async (own) => {
       assert.equal((await own.archive("reach", "bvh", clips, { as })).files.size, 3);
       const [first] = clips;
       await assert.rejects(own.archive("reach", "bvh", [first!], { as }), Broken);
@@ -81,7 +85,7 @@ for (const as of FORMATS) {
     ] as const) {
       const other = whole[as].slice();
       other[place] = digit.charCodeAt(0);
-      await sent(other, async (own) => {
+      await sent(other, as, async (own) => {
         await assert.rejects(own.archive("reach", "bvh", clips, { as }), Broken, digit);
       });
     }
@@ -94,6 +98,20 @@ for (const as of FORMATS) {
     assert.deepEqual(await taken(found.body), whole[as]);
   });
 }
+
+test("an archive with a file that its manifest does not name is broken", async () => {
+  const size = Number.parseInt(Buffer.from(whole.tar.subarray(124, 136)).toString("latin1"), 8);
+  const first = whole.tar.subarray(0, 512 + 512 * Math.ceil(size / 512));
+  const other = first.slice();
+  other[0] = "x".charCodeAt(0);
+  // The first clip once more, and under another name.
+  for (const more of [first, other]) {
+    await sent(Buffer.concat([more, whole.tar]), "tar", async (own) => {
+      const asked = own.archive("reach", "bvh", clips, { as: "tar" });
+      await assert.rejects(asked, { name: "Broken", message: /holds 4 files, .* names 3/ });
+    });
+  }
+});
 
 test("a zip whose records are none is broken", () => {
   for (const signature of ["PK\x01\x02", "PK\x03\x04", "PK\x05\x06"]) {
@@ -108,7 +126,7 @@ for (const as of FORMATS) {
     const at = whole[as].length - 10;
     await serving(
       (_, answer) => {
-        answer.write(whole[as].subarray(0, at));
+        head(answer, as).write(whole[as].subarray(0, at));
         setTimeout(() => answer.end(whole[as].subarray(at)), 20);
       },
       async (base) => {
@@ -123,30 +141,81 @@ test("a stream that is let go lets the service go", async () => {
   let left = false;
   await serving(
     (_, answer) => {
-      answer.on("close", () => {
-        left = true;
-      });
-      answer.writeHead(200).write("x".repeat(1000));
+      answer.on("close", () => (left = true));
+      head(answer, "zip").write("x".repeat(1000));
     },
     async (base) => {
-      const { body } = await new Client(base).stream("reach", "bvh", clips);
+      const { body } = await new Client(base, { timeout: Infinity }).stream("reach", "bvh", clips);
       const reader = body.getReader();
       await reader.read();
+      // By now the stream waits for a piece that never comes.
+      await sleep(50);
       await reader.cancel();
-      while (!left) await new Promise((done) => setTimeout(done, 5));
+      while (!left) await sleep(5);
     },
   );
+});
+
+test("a stream whose head cannot be read lets the service go", async () => {
+  let left = false;
+  const nonsense: Handler = ({ url }, answer) => {
+    if (url === "/livez") return answer.end();
+    answer.on("close", () => (left = true));
+    answer.setHeader("Posefield-Warning", "no JSON");
+    return head(answer, "zip").write("x".repeat(1000));
+  };
+  await serving(nonsense, async (base) => {
+    const own = new Client(base, { timeout: Infinity });
+    await assert.rejects(own.stream("reach", "bvh", clips), Unexpected);
+    while (!left) await sleep(5);
+  });
+});
+
+test("a stream that is read slowly is not one that comes slowly", async () => {
+  const piece = Buffer.alloc(1 << 20);
+  const all = [piece, piece, piece, piece, Buffer.from(whole.tar)];
+  const trickle: Handler = async (_, answer) => {
+    head(answer, "tar");
+    for (const each of all) await new Promise((done) => answer.write(each, done));
+    answer.end();
+  };
+  await serving(trickle, async (base) => {
+    const patient = new Client(base, { timeout: 500, retries: 0 });
+    const { body } = await patient.stream("reach", "bvh", clips, { as: "tar" });
+    await sleep(1000);
+    const reader = body.getReader();
+    await reader.read();
+    await sleep(1000);
+    let bytes = 0;
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      bytes += value.length;
+    }
+    assert.ok(bytes > 3 << 20);
+  });
+});
+
+test("a stream that stops coming has its time", async () => {
+  const begin: Handler = (_, answer) => head(answer, "zip").write("x".repeat(1000));
+  await serving(begin, async (base) => {
+    const { body } = await new Client(base, { timeout: 500 }).stream("reach", "bvh", clips);
+    await assert.rejects(taken(body), TimedOut);
+  });
 });
 
 test("a stream that its signal ends says the signal's reason", async () => {
   await serving(
     (_, answer) => {
-      answer.writeHead(200).write("x".repeat(1000));
+      head(answer, "zip").write("x".repeat(1000));
     },
     async (base) => {
-      const signal = AbortSignal.timeout(50);
-      const { body } = await new Client(base).stream("reach", "bvh", clips, { signal });
-      await assert.rejects(taken(body), (fault: unknown) => fault === signal.reason);
+      const signal = AbortSignal.timeout(500);
+      const ended = async () => {
+        const { body } = await new Client(base).stream("reach", "bvh", clips, { signal });
+        await taken(body);
+      };
+      await assert.rejects(ended, (fault: unknown) => fault === signal.reason);
     },
   );
 });
@@ -154,7 +223,7 @@ test("a stream that its signal ends says the signal's reason", async () => {
 test("a stream whose connection ends is broken, whatever has been handed on", async () => {
   await serving(
     (_, answer) => {
-      answer.writeHead(200).write("x".repeat(1000), () => answer.destroy());
+      head(answer, "zip").write("x".repeat(1000), () => answer.destroy());
     },
     async (base, asked) => {
       await assert.rejects(async () => {
@@ -185,11 +254,20 @@ test("a Zip64 says elsewhere how many files it has", () => {
 });
 
 /** Runs a test with a service that answers everything with some bytes, framed as a whole answer. */
-async function sent(content: Uint8Array, run: (client: Client) => Promise<void>): Promise<void> {
+async function sent(
+  content: Uint8Array,
+  as: ArchiveFormat,
+  run: (client: Client) => Promise<void>,
+): Promise<void> {
   await serving(
-    (_, answer) => answer.end(content),
+    (_, answer) => head(answer, as).end(content),
     (base) => run(new Client(base, { retries: 0 })),
   );
+}
+
+function head(answer: ServerResponse, as: ArchiveFormat): ServerResponse {
+  const kind = { zip: "application/zip", tar: "application/x-tar" }[as];
+  return answer.writeHead(200, { "Content-Type": kind });
 }
 
 async function taken(body: ReadableStream<Uint8Array<ArrayBuffer>>): Promise<Uint8Array> {

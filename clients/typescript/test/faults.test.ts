@@ -28,6 +28,11 @@ function json(answer: ServerResponse, content: string, status = 200): void {
   answer.writeHead(status, { "Content-Type": "application/json" }).end(content);
 }
 
+/** The head of a clip's file. */
+function file(answer: ServerResponse, more = {}): ServerResponse {
+  return answer.writeHead(200, { "Content-Type": "application/x-bvh", ...more });
+}
+
 function refuse(answer: ServerResponse, kind: string, status: number, more = {}): void {
   const document = {
     type: `urn:posefield:problem:${kind}`,
@@ -155,7 +160,7 @@ test("a service that says nothing has its time, once", async () => {
   await serving(
     () => {},
     async (base, asked) => {
-      await faultOf(TimedOut, new Client(base, { ...QUICK, timeout: 50 }).models());
+      await faultOf(TimedOut, new Client(base, { ...QUICK, timeout: 500 }).models());
       assert.equal(asked.length, 1);
     },
   );
@@ -169,9 +174,9 @@ test("who wants to wait for ever may", async () => {
 });
 
 test("a clip that stops coming has its time, once", async () => {
-  const begin: Handler = (_, answer) => answer.writeHead(200).write("BVH");
+  const begin: Handler = (_, answer) => file(answer).write("BVH");
   await serving(begin, async (base, asked) => {
-    const client = new Client(base, { ...QUICK, timeout: 50 });
+    const client = new Client(base, { ...QUICK, timeout: 500 });
     const found = await faultOf(TimedOut, client.file("reach", "bvh", CLIP));
     assert.match(found.message, /after 3 bytes/);
     assert.equal(asked.length, 1);
@@ -180,29 +185,30 @@ test("a clip that stops coming has its time, once", async () => {
 
 test("a clip that comes slowly is waited for", async () => {
   const trickle: Handler = (_, answer) => {
-    let left = 10;
+    let left = 12;
+    file(answer);
     const timer = setInterval(() => {
       if (left-- > 0) return answer.write("x");
       clearInterval(timer);
       return answer.end();
-    }, 20);
+    }, 100);
   };
   await serving(trickle, async (base) => {
-    const client = new Client(base, { ...QUICK, timeout: 100 });
+    const client = new Client(base, { ...QUICK, timeout: 1000 });
     const { content } = await client.file("reach", "bvh", CLIP);
-    assert.equal(content.length, 10);
+    assert.equal(content.length, 12);
   });
 });
 
 for (const framed of ["by its length", "in chunks"]) {
   test(`a clip that is cut in the middle, sent ${framed}, is broken`, async () => {
     const cut: Handler = (_, answer) => {
-      answer.writeHead(200, framed === "in chunks" ? {} : { "Content-Length": "1000" });
+      file(answer, framed === "in chunks" ? {} : { "Content-Length": "1000" });
       answer.write("x".repeat(100), () => answer.destroy());
     };
     await serving(cut, async (base, asked) => {
       const client = new Client(base, { ...QUICK, retries: 1 });
-      const found = await faultOf(Broken, client.file("reach", "usdc", CLIP));
+      const found = await faultOf(Broken, client.file("reach", "bvh", CLIP));
       assert.match(found.message, /ended after \d+ bytes/);
       assert.ok(found instanceof Unreachable);
       assert.equal(asked.length, 2);
@@ -244,21 +250,55 @@ function other(first: (answer: ServerResponse) => void, at: "/livez" | "/openapi
 const STRANGE: Record<string, (answer: ServerResponse) => void> = {
   "a page": (answer) => answer.writeHead(200, { "Content-Type": "text/html" }).end("<html>"),
   "another document": (answer) => json(answer, '{"modelle":[]}'),
+  "a number for a list": (answer) => json(answer, '{"models":5}'),
   "no path of the contract": (answer) => refuse(answer, "no-such-path", 404),
   "a status without a word": (answer) => answer.writeHead(418).end(),
 };
 
-for (const [what, first] of Object.entries(STRANGE)) {
-  for (const at of ["/livez", "/openapi.json"] as const) {
-    test(`an answer that is ${what} is told with both versions, as ${at} says`, async () => {
-      await serving(other(first, at), async (base) => {
-        const found = await faultOf(Unexpected, new Client(base, QUICK).models());
-        assert.deepEqual([found.service, found.client], ["9.1.0", CONTRACT]);
-        assert.match(found.message, /speaks version 9\.1\.0 of the contract, this client /);
+const ASKED: Record<string, (client: Client) => Promise<unknown>> = {
+  models: (client) => client.models(),
+  file: (client) => client.file("reach", "bvh", CLIP),
+  crowdFile: (client) => client.crowdFile("walk", "usda", {}),
+  archive: (client) => client.archive("reach", "bvh", [CLIP]),
+  stream: (client) => client.stream("reach", "bvh", [CLIP]),
+};
+
+for (const [name, ask] of Object.entries(ASKED)) {
+  for (const [what, first] of Object.entries(STRANGE)) {
+    for (const at of ["/livez", "/openapi.json"] as const) {
+      test(`${name}: an answer that is ${what} is told with both versions, by ${at}`, async () => {
+        await serving(other(first, at), async (base) => {
+          const found = await faultOf(Unexpected, ask(new Client(base, QUICK)));
+          assert.deepEqual([found.service, found.client], ["9.1.0", CONTRACT]);
+          assert.match(found.message, /speaks version 9\.1\.0 of the contract, this client /);
+        });
       });
-    });
+    }
   }
+
+  test(`${name}: who is sent elsewhere does not go there`, async () => {
+    await serving(
+      (_, answer) => answer.writeHead(307, { Location: "/elsewhere" }).end(),
+      async (base, asked) => {
+        const found = await faultOf(Unexpected, ask(new Client(base, { ...QUICK, key: "k" })));
+        assert.match(found.message, /elsewhere: \/elsewhere/);
+        assert.ok(!asked.includes("/elsewhere"));
+      },
+    );
+  });
 }
+
+test("a browser does not say where it is sent", async () => {
+  const opaque: typeof fetch = async () =>
+    Object.create(new Response(null), {
+      type: { value: "opaqueredirect" },
+      status: { value: 0 },
+      ok: { value: false },
+      headers: { value: new Headers() },
+    });
+  const asked = new Client("", { ...QUICK, fetch: opaque }).models();
+  assert.match((await faultOf(Unexpected, asked)).message, /elsewhere$/);
+});
 
 test("versions are not spoken of where they agree, or cannot be asked", async () => {
   for (const said of [`{"status":"live","contract":"${CONTRACT}"}`, "no JSON"]) {
@@ -274,13 +314,25 @@ function array(dtype: string, shape: number[], bytes: number): object {
   return { dtype, shape, data: new Uint8Array(bytes) };
 }
 
+const TRUST = {
+  model: "reach@0123456789abcdef",
+  controls: {},
+  performer: null,
+  level: 0,
+  duration: 1,
+  sigma: 0.01,
+  warnings: [],
+};
+
 const POSES = {
-  trust: {},
+  trust: TRUST,
   times: array("<f8", [2], 16),
   rotations: array("<f4", [2, 3, 4], 96),
   root_position: array("<f4", [2, 3], 24),
   bone_offsets: array("<f4", [3, 3], 36),
 };
+
+const { sigma: _, ...HALF } = TRUST;
 
 const MISMATCHED: Record<string, object> = {
   "too few bytes": { rotations: array("<f4", [2, 3, 4], 92) },
@@ -288,6 +340,8 @@ const MISMATCHED: Record<string, object> = {
   "another kind": { times: array("<f4", [2], 8) },
   "no array": { bone_offsets: [1, 2, 3] },
   nothing: { trust: null },
+  "half of the trust": { trust: HALF },
+  "a text for a list": { trust: { ...TRUST, warnings: "none" } },
 };
 
 test("poses are looked at before they are believed", async () => {
@@ -311,20 +365,22 @@ test("poses are looked at before they are believed", async () => {
 
 test("who asks may end the question, and the service sees it", async () => {
   let left = false;
-  const wait: Handler = (request) => request.on("close", () => (left = true));
+  const ending = new AbortController();
+  const wait: Handler = (request) => {
+    request.on("close", () => (left = true));
+    ending.abort(new Error("enough"));
+  };
   await serving(wait, async (base) => {
-    const ending = new AbortController();
     const asked = fault(new Client(base, { timeout: Infinity }).models(ending.signal));
-    setTimeout(() => ending.abort(new Error("enough")), 30);
     assert.equal(((await asked) as Error).message, "enough");
     while (!left) await new Promise((done) => setTimeout(done, 5));
   });
 });
 
 test("who asks may end the question while its answer comes", async () => {
-  const begin: Handler = (_, answer) => answer.writeHead(200).write("BVH");
+  const begin: Handler = (_, answer) => file(answer).write("BVH");
   await serving(begin, async (base, asked) => {
-    const signal = AbortSignal.timeout(50);
+    const signal = AbortSignal.timeout(500);
     const found = await fault(new Client(base, QUICK).file("reach", "bvh", CLIP, signal));
     assert.equal(found, signal.reason);
     assert.equal(asked.length, 1);
@@ -336,7 +392,8 @@ test("how much will come is said where it is known", async () => {
   for (const packed of [false, true]) {
     const sent = packed ? gzipSync(content) : content;
     const coding = packed ? { "Content-Encoding": "gzip" } : {};
-    const headers = { ...coding, "Content-Length": sent.length };
+    const kind = { "Content-Type": "model/vnd.usda; charset=utf-8" };
+    const headers = { ...kind, ...coding, "Content-Length": sent.length };
     await serving(
       (_, answer) => answer.writeHead(200, headers).end(sent),
       async (base) => {
@@ -352,7 +409,7 @@ test("how much will come is said where it is known", async () => {
 test("a question that is ended while it waits to be asked again is not asked again", async () => {
   const fail = (answer: ServerResponse) => refuse(answer, "late", 503, { "Retry-After": "20" });
   await serving(failing(9, fail), async (base, asked) => {
-    const signal = AbortSignal.timeout(50);
+    const signal = AbortSignal.timeout(500);
     const found = await fault(new Client(base, QUICK).models(signal));
     assert.equal(found, signal.reason);
     assert.equal(asked.length, 1);

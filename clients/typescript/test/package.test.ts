@@ -47,10 +47,11 @@ before(() => {
   run(PACKAGE, "build.ts");
   // What npm would send, and nothing that it would leave out.
   const words = ["pack", "--silent", "--pack-destination", folder];
-  execFileSync("npm", words, { cwd: `${PACKAGE}dist`, stdio: "pipe" });
+  // It says what it has written, whose name has the version in it.
+  const said = execFileSync("npm", words, { cwd: `${PACKAGE}dist`, encoding: "utf8" });
   const own = `${folder}/node_modules/@posefield/client`;
   mkdirSync(own, { recursive: true });
-  const packed = `${folder}/posefield-client-0.1.0.tgz`;
+  const packed = `${folder}/${said.trim()}`;
   execFileSync("tar", ["-xzf", packed, "-C", own, "--strip-components=1"]);
   for (const name of NEEDED) symlinkSync(MODULES + name, `${folder}/node_modules/${name}`);
 });

@@ -2,7 +2,15 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
+import {
+  existsSync,
+  mkdirSync,
+  mkdtempSync,
+  readFileSync,
+  rmSync,
+  statSync,
+  writeFileSync,
+} from "node:fs";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 
@@ -31,6 +39,7 @@ test("the examples of the README run", () => {
     assert.match(said, /^times? .*expected 0 to/m);
     assert.match(said, /^turn-20\.usdc \d+ /m);
     assert.ok(statSync(`${folder}/reach.tar`).size > 1024);
+    assert.ok(!existsSync(`${folder}/reach.tar.part`));
   } finally {
     rmSync(folder, { recursive: true });
   }

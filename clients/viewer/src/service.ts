@@ -14,8 +14,9 @@ export class Service implements Source {
 
   /** For this tab alone, and gone with it. */
   use(key: string): void {
-    sessionStorage.setItem(KEPT, key);
+    // First, for it refuses a key that none can be: kept, that would refuse the whole page.
     this.#client = new Client("", { ...ASKING, key });
+    sessionStorage.setItem(KEPT, key);
   }
 
   readonly models: Source["models"] = (...words) => this.#client.models(...words);
