@@ -49,7 +49,8 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
         "POSEFIELD_COMMAND": str(Path(sys.executable).with_name("posefield")),
     }
     # One after the other: they measure.
-    command = [node, "--test", "--test-concurrency=1", "--test-reporter=spec", *tests]
+    options = ["--test-concurrency=1", "--test-timeout=300000", "--test-reporter=spec"]
+    command = [node, "--test", *options, *tests]
     done = subprocess.run(command, cwd=VIEWER, env=os.environ | told, text=True)
     return [f"page: {len(tests)} files of tests ended with {done.returncode}"] * bool(
         done.returncode

@@ -14,7 +14,7 @@ export class Service implements Source {
 
   /** For this tab alone, and gone with it. */
   use(key: string): void {
-    sessionStorage.setItem(KEPT, key);
+    keep(key);
     this.#client = new Client("", { ...ASKING, key });
   }
 
@@ -55,7 +55,28 @@ export function differs({ contract }: { readonly contract?: string }): string | 
   return `The service is of another version: it speaks contract ${contract}, and ${page}. Reload the page; if that does not help, what it shows may be wrong.`;
 }
 
+/** Whether it can be sent in a header, as all keys can that a service gives out. */
+export function usable(key: string): boolean {
+  return /^[\x21-\x7e]+$/.test(key);
+}
+
+function keep(key: string): void {
+  try {
+    sessionStorage.setItem(KEPT, key);
+  } catch {
+    // Where nothing may be kept, it holds until the page is closed.
+  }
+}
+
 function kept(): ClientOptions {
-  const key = sessionStorage.getItem(KEPT);
-  return key ? { ...ASKING, key } : ASKING;
+  const key = stored();
+  return key && usable(key) ? { ...ASKING, key } : ASKING;
+}
+
+function stored(): string | null {
+  try {
+    return sessionStorage.getItem(KEPT);
+  } catch {
+    return null;
+  }
 }

@@ -6,11 +6,13 @@ import type { Locator, Page } from "playwright-core";
 export async function picture(page: Page): Promise<Buffer> {
   const box = (await page.locator("#stage").boundingBox())!;
   const clip = { x: box.x + 60, y: box.y + 60, width: box.width - 120, height: box.height - 150 };
-  let before = await page.screenshot({ clip });
+  let [before, same] = [await page.screenshot({ clip }), 0];
   for (let look = 0; look < 40; look++) {
-    await page.waitForTimeout(400);
+    await page.waitForTimeout(250);
     const now = await page.screenshot({ clip });
-    if (now.equals(before)) return now;
+    same = now.equals(before) ? same + 1 : 0;
+    // It is drawn once more, and finer, a while after it has stopped.
+    if (same === 2) return now;
     before = now;
   }
   throw new Error("the stage does not come to rest");
@@ -34,10 +36,10 @@ export async function sigma(page: Page): Promise<number> {
   return Number.parseFloat((await page.locator("[data-sigma]").textContent())!);
 }
 
-/** Until the body is there and nothing is on its way. */
+/** Until the body is there, and the clip that it plays. */
 export async function settled(page: Page): Promise<void> {
   await page.waitForFunction(() => performance.getEntriesByName("posefield:first-pose").length > 0);
-  await page.waitForLoadState("networkidle");
+  await page.locator("#stage[data-clip]").waitFor();
   await page.waitForFunction(() => document.querySelector(".nearest li"));
 }
 
