@@ -55,9 +55,11 @@ export class Watch {
     try {
       if (this.#down) await this.#again();
       else if (!document.hidden) await this.#look();
-    } finally {
-      this.#next();
+    } catch (fault) {
+      // As if nobody had caught it, but looking goes on.
+      reportError(fault);
     }
+    this.#next();
   }
 
   async #again(): Promise<void> {

@@ -18,6 +18,17 @@ before(async () => {
 });
 after(() => chromium.close());
 
+/** Seconds that the transport goes on in a second, looked at over so many seconds. */
+function rate(page: Page, seconds: number): Promise<number> {
+  return page.evaluate(async (seconds) => {
+    const now = () => Number.parseFloat(document.querySelector(".time")!.textContent!);
+    while (now() === 0) await new Promise(requestAnimationFrame);
+    const [since, from] = [performance.now(), now()];
+    while (performance.now() - since < 1000 * seconds) await new Promise(requestAnimationFrame);
+    return (1000 * (now() - from)) / (performance.now() - since);
+  }, seconds);
+}
+
 /** A page in which nothing may go wrong unnoticed. */
 async function on(
   path: string,
@@ -75,6 +86,59 @@ test("without a loop it stops at its end; slower is slower", () =>
     );
     await page.getByRole("button", { name: "Play (space)" }).waitFor();
     assert.match(page.url(), /~loop=no/);
+  }));
+
+test("at half the speed time goes half as fast", () =>
+  on(REACH, async (page) => {
+    await page.getByRole("button", { name: "Loop" }).click();
+    const rates: number[] = [];
+    for (const speed of ["0.5", "1"]) {
+      await page.getByLabel("Speed").fill(speed);
+      await page.getByLabel("Time", { exact: true }).fill("0");
+      await page.getByRole("button", { name: "Play (space)" }).click();
+      rates.push(await rate(page, 0.5));
+      await page.keyboard.press("Home");
+    }
+    const [half, whole] = rates;
+    assert.ok(half! / whole! > 0.35 && half! / whole! < 0.7, `${rates} seconds a second`);
+  }));
+
+test("a loop begins again at its end, and frames step around it", () =>
+  on(REACH, async (page) => {
+    await page.keyboard.press("End");
+    const end = await time(page);
+    assert.ok(end > 0.6);
+    await page.keyboard.press("ArrowRight");
+    assert.equal(await time(page), 0);
+    await page.keyboard.press("ArrowLeft");
+    assert.equal(await time(page), end);
+    await page.getByLabel("Time", { exact: true }).fill(String(end - 0.2));
+    await page.keyboard.press(" ");
+    await until(async () => (await time(page)) < end - 0.3, "it begins again");
+    await page.getByRole("button", { name: "Pause (space)" }).waitFor();
+  }));
+
+test("each example is a line beside its slider", () =>
+  on(REACH, async (page) => {
+    const { controls, examples } = await page.evaluate(async () =>
+      (await fetch("/v1/models/reaching")).json(),
+    );
+    for (const [column, { name }] of controls.entries()) {
+      const drawn = page.locator(`[data-control="${name}"] .ticks path`);
+      const marks = (await drawn.getAttribute("d"))!.match(/M/g)!.length;
+      const distinct = new Set(examples.map((row: number[]) => row[column]!.toFixed(5))).size;
+      assert.equal(marks, distinct, name);
+    }
+  }));
+
+test("all controls are reset at once", () =>
+  on(REACH, async (page) => {
+    await slider(page, "turn").fill("1200");
+    await slider(page, "target_height").fill("1200");
+    await page.getByRole("button", { name: "Reset all" }).click();
+    const reset = page.locator(".control button:disabled");
+    assert.equal(await reset.count(), await page.locator(".control").count());
+    assert.equal(await typed(page, "turn").inputValue(), "0");
   }));
 
 test("a slider moves the body, sigma and the address", () =>
@@ -175,18 +239,29 @@ test("sticks, ghost, feet and level change the picture", () =>
 
 test("root motion carries a walker on, and in place it stays", () =>
   on(WALK.replace("~playing=no", "~feet=yes"), async (page) => {
+    // The camera goes along, and the ground with it: it is another each time the body comes by.
+    const home = async () => {
+      await page.keyboard.press("Home");
+      return picture(page);
+    };
+    const begun = await home();
+    await page.keyboard.press(" ");
+    await page.waitForTimeout(2500);
+    const carried = await home();
+    assert.ok(!begun.equals(carried), "it has travelled");
     await page.getByRole("button", { name: "Root motion" }).click();
     await page.getByText("In place, every foot slides").waitFor();
     await until(async () => page.url().includes("~root=in_place"), "the address follows");
-    await slider(page, "speed").fill("600");
-    await until(async () => (await sigma(page)) > 0, "a pose in place is answered");
+    const still = await home();
+    await page.keyboard.press(" ");
+    await page.waitForTimeout(2500);
+    assert.ok(still.equals(await home()), "it has stayed");
   }));
 
 test("a point that is typed is reached within what was sampled", () =>
   on(REACH, async (page) => {
     const point = page.locator('[data-part="target"]');
     const y = point.locator('[data-axis="y"]');
-    const turn = await typed(page, "turn").inputValue();
     await y.fill(String(Number(await y.inputValue()) + 0.25));
     await y.press("Enter");
     const miss = () => point.locator("[data-miss]").textContent();
@@ -197,7 +272,6 @@ test("a point that is typed is reached within what was sampled", () =>
     await y.press("Enter");
     await until(async () => Number.parseFloat((await miss())!) > 100, "the ceiling is not");
     assert.equal(await page.locator(".control[data-outside]").count(), 0);
-    assert.ok(turn);
   }));
 
 test("the handle is dragged, and the controls follow", () =>
