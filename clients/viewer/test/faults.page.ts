@@ -118,6 +118,7 @@ test("an answer that comes late does not overwrite a newer one, and none queue u
     );
     assert.equal(most, 1, "never two at once");
     assert.ok(asked <= 3, `${asked} questions for 24 movements`);
+    await until(async () => open === 0, "all are answered");
     await page.unroute(/pose.msgpack/);
     const last = await sigma(page);
     await page.waitForTimeout(1200);

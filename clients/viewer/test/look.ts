@@ -6,14 +6,13 @@ import type { Locator, Page } from "playwright-core";
 export async function picture(page: Page): Promise<Buffer> {
   const box = (await page.locator("#stage").boundingBox())!;
   const clip = { x: box.x + 60, y: box.y + 60, width: box.width - 120, height: box.height - 150 };
-  let [before, same] = [await page.screenshot({ clip }), 0];
+  let before: Buffer = Buffer.of();
   for (let look = 0; look < 40; look++) {
-    await page.waitForTimeout(250);
+    await page.locator("#stage canvas[data-rest]").waitFor();
     const now = await page.screenshot({ clip });
-    same = now.equals(before) ? same + 1 : 0;
-    // It is drawn once more, and finer, a while after it has stopped.
-    if (same === 2) return now;
+    if (now.equals(before)) return now;
     before = now;
+    await page.waitForTimeout(200);
   }
   throw new Error("the stage does not come to rest");
 }
