@@ -84,7 +84,12 @@ async function tabbed(page: Page): Promise<ReadonlySet<string>> {
       const at = document.activeElement as HTMLElement;
       const again = "tabbed" in at.dataset;
       if (at !== document.body) at.dataset["tabbed"] = "";
-      return [at.closest("section")?.dataset["part"] ?? at.parentElement?.id ?? at.tagName, again];
+      return [
+        at.closest<HTMLElement>("[data-part]")?.dataset["part"] ??
+          at.parentElement?.id ??
+          at.tagName,
+        again,
+      ];
     });
     if (again) return reached;
     reached.add(part);

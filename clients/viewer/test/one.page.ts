@@ -123,22 +123,44 @@ test("each example is a line beside its slider", () =>
     const { controls, examples } = await page.evaluate(async () =>
       (await fetch("/v1/models/reaching")).json(),
     );
-    for (const [column, { name }] of controls.entries()) {
-      const drawn = page.locator(`[data-control="${name}"] .ticks path`);
-      const marks = (await drawn.getAttribute("d"))!.match(/M/g)!.length;
-      const distinct = new Set(examples.map((row: number[]) => row[column]!.toFixed(5))).size;
-      assert.equal(marks, distinct, name);
+    for (const [column, { name, minimum, maximum }] of controls.entries()) {
+      const [from, width, path] = await page
+        .locator(`[data-control="${name}"] .ticks`)
+        .evaluate((ticks) => {
+          const sampled = ticks.querySelector(".sampled")!;
+          const of = (key: string) => Number(sampled.getAttribute(key));
+          return [of("x"), of("width"), ticks.querySelector("path")!.getAttribute("d")!] as const;
+        });
+      const marks = [...path.matchAll(/M([\d.]+) /g)].map(([, x]) => Number(x));
+      const places = examples.map(
+        (row: number[]) => from + (width * (row[column]! - minimum)) / (maximum - minimum),
+      );
+      const near = (x: number, all: number[]) => all.some((each) => Math.abs(each - x) < 0.3);
+      assert.ok(marks.length > 1 && new Set(marks).size === marks.length, name);
+      assert.deepEqual(
+        places.filter((x: number) => !near(x, marks)),
+        [],
+        name,
+      );
+      assert.deepEqual(
+        marks.filter((x) => !near(x, places)),
+        [],
+        name,
+      );
     }
   }));
 
 test("all controls are reset at once", () =>
   on(REACH, async (page) => {
-    await slider(page, "turn").fill("1200");
-    await slider(page, "target_height").fill("1200");
+    for (const name of ["turn", "target_height"]) await slider(page, name).fill("1200");
     await page.getByRole("button", { name: "Reset all" }).click();
     const reset = page.locator(".control button:disabled");
     assert.equal(await reset.count(), await page.locator(".control").count());
-    assert.equal(await typed(page, "turn").inputValue(), "0");
+    const { controls } = await page.evaluate(async () =>
+      (await fetch("/v1/models/reaching")).json(),
+    );
+    for (const { name, default: value } of controls)
+      assert.ok(Math.abs(Number(await typed(page, name).inputValue()) - value) < 0.01, name);
   }));
 
 test("a slider moves the body, sigma and the address", () =>
