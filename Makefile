@@ -35,7 +35,7 @@ node: $(NODE) ## install into clients/node_modules what its lock file names
 # What the service answers `/` with: one file, made of the page's sources and of nothing else; and what
 # `posefield page` lays beside it for hosts without a service.
 PAGE := service/web/viewer/index.html
-$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.offline.ts
+$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.offline.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
 .PHONY: page

@@ -1,6 +1,6 @@
 /** The page as a whole: which model is shown, and what happens when the service does not answer. */
 
-import type { ModelCard, ModelSummary } from "@posefield/client";
+import { type ModelCard, type ModelSummary, Problem, Unexpected } from "@posefield/client";
 
 import { understood } from "./faults.ts";
 import { type Address, address, restored } from "./hash.ts";
@@ -37,6 +37,8 @@ export class App {
   );
   #scene: Scene | null = null;
   #open: Open | null = null;
+  /** What is asked for and not shown yet. */
+  #wanted: Address | null = null;
   #turn = 0;
 
   async start(): Promise<void> {
@@ -48,12 +50,29 @@ export class App {
       return;
     }
     void this.#go(address(location.hash));
-    if (this.#source === this.#service) {
-      void mismatch().then((words) => words && this.#notice.remark(words));
-    }
+    if (this.#source === this.#service) void this.#compare();
     addEventListener("popstate", () => void this.#restore(address(location.hash)));
     // What was asked for is on its way while this takes its time.
-    this.#scene = new Scene(at("#stage"));
+    try {
+      this.#scene = new Scene(at("#stage"));
+    } catch {
+      this.#blind();
+    }
+  }
+
+  /** Whether service and page speak the same contract. */
+  async #compare(): Promise<void> {
+    this.#notice.remark("version", await mismatch());
+  }
+
+  /** Without a stage there is nothing to show. */
+  #blind(): void {
+    this.#wanted = null;
+    this.#turn += 1;
+    this.#watch.end();
+    this.#fault(
+      "This browser shows no 3-D graphics (WebGL 2), and this page shows nothing without. Turn on hardware acceleration in its settings, or open the page in another browser.",
+    );
   }
 
   /** A step that one may go back. */
@@ -65,23 +84,35 @@ export class App {
   /** Shows that model as the address says, or says why not. A later call overtakes this one. */
   async #go(wanted: Address): Promise<void> {
     const turn = ++this.#turn;
+    this.#wanted = wanted;
     try {
       const [models, hoped] = await Promise.all([
         this.#source.models(),
-        wanted.model ? this.#source.card(wanted.model).catch(() => null) : null,
+        wanted.model ? this.#card(wanted.model) : null,
       ]);
-      const model = hoped ? wanted.model! : models[0]?.name;
-      if (!model) throw "This service has no models yet.";
-      const card = hoped ?? (await this.#source.card(model));
+      const found = hoped && listed(models, wanted.model!) ? hoped : null;
+      const model = found ? wanted.model! : models[0]?.name;
+      if (!model) throw none(wanted.model);
+      const card = found ?? (await this.#source.card(model));
       if (turn !== this.#turn) return;
-      const missing = wanted.model && !hoped ? gone(wanted.model, model) : "";
+      const missing = wanted.model && !found ? gone(wanted.model, model) : "";
       const { state, faults } = restored(missing ? { model, entries: [] } : wanted, model, card);
       this.#show(model, card, new Store(calm(state, wanted)), models);
+      this.#wanted = null;
       this.#notice.fault(null);
-      const remarks = [missing, ...faults].filter(Boolean);
-      if (remarks.length) this.#notice.remark(remarks.join(" · "));
+      this.#notice.remark("model", [missing, ...faults].filter(Boolean).join(" · ") || null);
     } catch (fault) {
-      this.#fault(fault);
+      if (turn === this.#turn) this.#fault(fault);
+    }
+  }
+
+  /** null where there is no such model; other faults do not say that. */
+  async #card(model: string): Promise<ModelCard | null> {
+    try {
+      return await this.#source.card(model);
+    } catch (fault) {
+      if (lacks(fault)) return null;
+      throw fault;
     }
   }
 
@@ -111,8 +142,12 @@ export class App {
   async #restore(wanted: Address): Promise<void> {
     const open = this.#open;
     if (!open || wanted.model !== open.model) return this.#go(wanted);
+    // Whatever was on its way is not wanted any more.
+    this.#turn += 1;
+    this.#wanted = null;
+    this.#header.choose(open.model);
     const { state, faults } = restored(wanted, open.model, open.card);
-    this.#notice.remark(faults.join(" · ") || null);
+    this.#notice.remark("model", faults.join(" · ") || null);
     const { controls } = open.store.state;
     const same = Object.entries(state.controls).every(([name, value]) => controls[name] === value);
     const playing = state.playing && !still();
@@ -121,13 +156,14 @@ export class App {
 
   /** Whether the model that is shown is still there, and the same. */
   async #look(): Promise<void> {
+    if (this.#wanted) return this.#go(this.#wanted);
     const open = this.#open;
-    if (!open) return this.#go(address(location.hash));
+    if (!open) return;
     try {
       const models = await this.#source.models();
-      if (open !== this.#open) return;
+      if (open !== this.#open || this.#wanted) return;
+      if (!listed(models, open.model)) return await this.#go({ model: open.model, entries: [] });
       const found = models.find(({ name }) => name === open.model);
-      if (!found && !open.model.includes("@")) return await this.#fallBack(open.model, models);
       this.#header.list(models, open.model);
       if (found && found.identity !== open.card.identity) await this.#renew(open, models);
     } catch (fault) {
@@ -135,8 +171,10 @@ export class App {
     }
   }
 
-  async #renew({ model, store }: Open, models: readonly ModelSummary[]): Promise<void> {
+  async #renew(open: Open, models: readonly ModelSummary[]): Promise<void> {
+    const { model, store } = open;
     const card = await this.#source.card(model);
+    if (open !== this.#open || this.#wanted) return;
     const known = new Set(card.controls.map(({ name }) => name));
     const entries = Object.entries(store.state.controls)
       .filter(([name]) => known.has(name))
@@ -145,24 +183,16 @@ export class App {
     const { playing, body, ghost, feet, loop, speed, view } = store.state;
     const kept = { playing, body, ghost, feet, loop, speed, view };
     this.#show(model, card, new Store({ ...state, ...kept }), models);
-    this.#notice.remark(`${model} has been replaced on the service: this is the new one.`);
-  }
-
-  async #fallBack(lost: string, models: readonly ModelSummary[]): Promise<void> {
-    const other = models.find(({ name }) => name !== lost);
-    if (!other) throw `${lost} is gone from the service, and there is no other model to show.`;
-    await this.#go({ model: other.name, entries: [] });
-    this.#notice.remark(gone(lost, other.name));
+    this.#notice.remark("model", `${model} has been replaced on the service: this is the new one.`);
   }
 
   /** The service answers again. */
   async #back(): Promise<void> {
-    void mismatch().then((words) => words && this.#notice.remark(words));
+    void this.#compare();
     const open = this.#open;
-    if (!open) return this.#go(address(location.hash));
     await this.#look();
     // As if somebody had moved them: every part asks anew.
-    if (open === this.#open) open.store.set({ controls: { ...open.store.state.controls } });
+    if (open && open === this.#open) open.store.set({ controls: { ...open.store.state.controls } });
   }
 
   #unlock(key: string): void {
@@ -178,7 +208,7 @@ export class App {
     }
     const found = understood(fault);
     if (!found) return;
-    this.#notice.fault(found.text);
+    this.#notice.fault(found.text, found.remedy === "key" ? this.#key.opener : null);
     if (found.remedy === "wait") this.#watch.failed();
     if (found.remedy === "key") this.#key.ask(found.text);
     if (found.remedy === "model") void this.#look();
@@ -187,6 +217,22 @@ export class App {
 
 function gone(lost: string, shown: string): string {
   return `${lost} is not on this service (any more): showing ${shown} instead.`;
+}
+
+function none(lost: string | null): string {
+  if (!lost) return "This service has no models yet.";
+  return `${lost} is not on this service (any more), and there is no other model to show.`;
+}
+
+/** By its name, or by that of one of its versions. */
+function listed(models: readonly ModelSummary[], model: string): boolean {
+  return models.some(({ name, versions }) => name === model || versions.includes(model));
+}
+
+/** Whether the service says that it has no such model; a name that cannot be is no path at all. */
+function lacks(fault: unknown): boolean {
+  const said = fault instanceof Unexpected ? fault.cause : fault;
+  return said instanceof Problem && ["unknown-model", "no-such-path"].includes(said.kind);
 }
 
 /** Nothing moves by itself for those who want it so, unless the address asks for it. */

@@ -1,6 +1,6 @@
 /** What went wrong, in words, and what the page does about it. */
 
-import { Problem, TimedOut, Unexpected, Unreachable } from "@posefield/client";
+import { PosefieldError, Problem, TimedOut, Unexpected, Unreachable } from "@posefield/client";
 
 /** wait: ask /readyz until it is well. key: ask for one. model: it is gone, show another. */
 export type Remedy = "wait" | "key" | "model" | "none";
@@ -19,6 +19,8 @@ export function understood(fault: unknown): Fault | null {
   if (fault instanceof Unreachable) return DOWN;
   if (fault instanceof Problem) return refused(fault);
   if (fault instanceof Unexpected) return { text: unexpected(fault), remedy: "wait" };
+  // What a model in the browser cannot be asked, or is not.
+  if (fault instanceof PosefieldError) return { text: fault.message, remedy: "none" };
   return { text: `Something in this page went wrong: ${fault}`, remedy: "none" };
 }
 

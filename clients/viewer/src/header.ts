@@ -60,6 +60,11 @@ export class Header {
     this.#about.textContent = found?.description ?? "";
   }
 
+  /** Says which model is shown, where another was chosen and never came. */
+  choose(shown: string): void {
+    this.#models.value = shown;
+  }
+
   follow(store: Store, signal: AbortSignal): void {
     this.#store = store;
     const show = () => this.#views.set(store.state.view);

@@ -20,8 +20,6 @@ import { Stopwatch } from "./stopwatch.ts";
 
 /** Milliseconds without a change until the whole clip is worth asking for. */
 const IDLE = 140;
-/** Milliseconds after which a question is given up. */
-const PATIENCE = 8000;
 
 /** A body in space: its pose, its bones (J × 3, m), and where laps have carried it. */
 export interface Shown extends Pose {
@@ -45,6 +43,7 @@ export class Player {
   #lap: Carried = NOWHERE;
   #carried: Carried = NOWHERE;
   #asked = 0;
+  #coming = new AbortController();
   #answered = 0;
   #idle: ReturnType<typeof setTimeout> | undefined;
   trust: Trust | null = null;
@@ -95,8 +94,8 @@ export class Player {
 
   /** Asks for a pose at once, and for the clip when nothing moves any more. */
   ask(): void {
-    this.#asked += 1;
-    this.#clip = null;
+    this.#next();
+    this.#hold(null);
     this.#stopwatch.asked(this.#asked);
     this.#poses.ask(this.#asked);
     this.#soon(this.#answered ? IDLE : 0);
@@ -105,6 +104,18 @@ export class Player {
   /** The body goes back to where its clip begins. */
   home(): void {
     this.#carried = NOWHERE;
+  }
+
+  /** What was asked before is not waited for any more, however slowly it comes. */
+  #next(): void {
+    this.#asked += 1;
+    this.#coming.abort();
+  }
+
+  /** What is held is marked on the stage, for who tests the page. */
+  #hold(clip: Motion | null): void {
+    this.#clip = clip;
+    document.querySelector("#stage")!.toggleAttribute("data-clip", clip !== null);
   }
 
   #soon(wait: number): void {
@@ -122,7 +133,7 @@ export class Player {
   /** The same motion as another clip: what is shown goes on meanwhile. */
   #replaced(): void {
     this.home();
-    this.#asked += 1;
+    this.#next();
     this.#soon(0);
   }
 
@@ -130,7 +141,7 @@ export class Player {
     const { card, source, store } = this.#page;
     const { duration } = this;
     const time = Math.min(store.state.time, duration);
-    const question = ask.pose(source, card, store.state, time, duration, this.#signal());
+    const question = ask.pose(source, card, store.state, time, duration, this.#page.signal);
     const answer = await this.#tried(question);
     if (!answer || asked < this.#answered) return;
     this.#pose.rotations.set(answer.rotations.subarray(0, this.#pose.rotations.length));
@@ -141,10 +152,12 @@ export class Player {
 
   async #askClip(asked: number): Promise<void> {
     const { card, source, store } = this.#page;
+    this.#coming = new AbortController();
+    const signal = AbortSignal.any([this.#page.signal, this.#coming.signal]);
     const { loop, root } = store.state;
-    const clip = await this.#tried(ask.clip(source, card, store.state, this.#signal()));
+    const clip = await this.#tried(ask.clip(source, card, store.state, signal));
     if (!clip || asked !== this.#asked) return;
-    this.#clip = clip;
+    this.#hold(clip);
     const travels = card.cyclic && loop && root === "travelling";
     this.#lap = travels ? carried(clip, card.skeleton.names.length) : NOWHERE;
     this.#take(asked, clip);
@@ -189,7 +202,7 @@ export class Player {
 
   #show(time: number): void {
     if (!this.#clip) {
-      this.#asked += 1;
+      this.#next();
       this.#poses.ask(this.#asked);
       this.#soon(IDLE);
       return;
@@ -201,10 +214,6 @@ export class Player {
   #told(): void {
     for (const watcher of this.#watchers) watcher(this.shown);
     this.#page.scene.redraw();
-  }
-
-  #signal(): AbortSignal {
-    return AbortSignal.any([this.#page.signal, AbortSignal.timeout(PATIENCE)]);
   }
 }
 

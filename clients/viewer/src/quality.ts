@@ -48,6 +48,8 @@ export class Quality {
       clearTimeout(this.#timer);
       this.#timer = setTimeout(() => this.#rest(), REST);
     }
+    // A mark for who tests the page: nothing has moved since.
+    this.#renderer.domElement.toggleAttribute("data-rest", this.#resting);
     this.#use(this.#resting ? Math.max(this.#own, this.#finest) : this.#moving);
     this.#resting = false;
   }

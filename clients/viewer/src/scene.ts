@@ -42,6 +42,8 @@ export class Scene {
     this.renderer.shadowMap.type = PCFShadowMap;
     const canvas = this.renderer.domElement;
     canvas.setAttribute("aria-hidden", "true");
+    // What the graphics card lost is made again by then, but not drawn.
+    canvas.addEventListener("webglcontextrestored", () => this.redraw());
     host.append(canvas);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.maxPolarAngle = 0.53 * Math.PI;

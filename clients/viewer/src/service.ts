@@ -16,7 +16,7 @@ export class Service implements Source {
   use(key: string): void {
     // First, for it refuses a key that none can be: kept, that would refuse the whole page.
     this.#client = new Client("", { ...ASKING, key });
-    sessionStorage.setItem(KEPT, key);
+    keep(key);
   }
 
   readonly models: Source["models"] = (...words) => this.#client.models(...words);
@@ -56,7 +56,28 @@ export function differs({ contract }: { readonly contract?: string }): string | 
   return `The service is of another version: it speaks contract ${contract}, and ${page}. Reload the page; if that does not help, what it shows may be wrong.`;
 }
 
+/** Whether it can be sent in a header, as all keys can that a service gives out. */
+export function usable(key: string): boolean {
+  return /^[\x21-\x7e]+$/.test(key);
+}
+
+function keep(key: string): void {
+  try {
+    sessionStorage.setItem(KEPT, key);
+  } catch {
+    // Where nothing may be kept, it holds until the page is closed.
+  }
+}
+
 function kept(): ClientOptions {
-  const key = sessionStorage.getItem(KEPT);
-  return key ? { ...ASKING, key } : ASKING;
+  const key = stored();
+  return key && usable(key) ? { ...ASKING, key } : ASKING;
+}
+
+function stored(): string | null {
+  try {
+    return sessionStorage.getItem(KEPT);
+  } catch {
+    return null;
+  }
 }

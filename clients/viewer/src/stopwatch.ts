@@ -5,6 +5,9 @@
  */
 
 let first = true;
+/** Measures of dragging: the oldest go, all at once. */
+const KEPT = 1000;
+let kept = 0;
 
 export class Stopwatch {
   readonly #open: { readonly asked: number; readonly since: number }[] = [];
@@ -28,8 +31,16 @@ export class Stopwatch {
     while (this.#open.length && this.#open[0]!.asked <= this.#answered) {
       const { since } = this.#open.shift()!;
       if (first) performance.measure("posefield:first-pose", { start: 0, end });
-      else performance.measure("posefield:drag", { start: since, end });
+      else dragged(since, end);
       first = false;
     }
   }
+}
+
+function dragged(start: number, end: number): void {
+  if (++kept > KEPT) {
+    performance.clearMeasures("posefield:drag");
+    kept = 1;
+  }
+  performance.measure("posefield:drag", { start, end });
 }

@@ -21,7 +21,8 @@ export function mount(host: HTMLElement, session: Session): void {
     step: "any",
     "aria-label": "Time",
   });
-  const time = el("output", { class: "time" });
+  // No output: nobody wants to be told of each frame.
+  const time = el("span", { class: "time" });
   scrubber.addEventListener("input", () =>
     store.set({ playing: false, time: Math.min(player.duration, Number(scrubber.value)) }),
   );
@@ -66,7 +67,7 @@ export function move({ card, player, store }: Session, frames: number): void {
 /** How fast, as a slider and a number. */
 function pace({ signal, store }: Session): HTMLElement {
   const range = el("input", { type: "range", min: 0.1, max: 2, step: 0.05, "aria-label": "Speed" });
-  const text = el("output");
+  const text = el("span");
   range.addEventListener("input", () => store.set({ speed: Number(range.value) }));
   const show = () => {
     const { speed } = store.state;

@@ -12,6 +12,7 @@ export class Watch {
   readonly #look: () => Promise<void>;
   readonly #back: () => Promise<void>;
   #down = false;
+  #ended = false;
   #wait = FIRST;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
@@ -38,14 +39,26 @@ export class Watch {
     if (!this.#down) this.#wait = FIRST;
   }
 
+  /** Nobody looks any more. */
+  end(): void {
+    this.#ended = true;
+    clearTimeout(this.#timer);
+  }
+
   #next(): void {
     clearTimeout(this.#timer);
+    if (this.#ended) return;
     this.#timer = setTimeout(() => void this.#turn(), this.#down ? this.#wait : CALM);
   }
 
   async #turn(): Promise<void> {
-    if (this.#down) await this.#again();
-    else if (!document.hidden) await this.#look();
+    try {
+      if (this.#down) await this.#again();
+      else if (!document.hidden) await this.#look();
+    } catch (fault) {
+      // As if nobody had caught it, but looking goes on.
+      reportError(fault);
+    }
     this.#next();
   }
 

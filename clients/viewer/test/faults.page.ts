@@ -8,6 +8,7 @@ import { after, before, test } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
+import { Between, cut, slowly } from "./between.ts";
 import { browser } from "./harness.ts";
 import { picture, settled, sigma, slider, typed, until } from "./look.ts";
 import { Serving } from "./serving.ts";
@@ -101,7 +102,12 @@ test("an answer that comes late does not overwrite a newer one, and none queue u
       await route.continue();
       open -= 1;
     });
-    for (let at = 0; at <= 40; at++) await slider(page, "turn").fill(String(300 + 20 * at));
+    await slider(page, "turn").evaluate((range: HTMLInputElement) => {
+      for (let at = 1; at <= 24; at++) {
+        range.value = String(300 + 40 * at);
+        range.dispatchEvent(new Event("input", { bubbles: true }));
+      }
+    });
     const wanted = await typed(page, "turn").inputValue();
     await until(
       async () =>
@@ -111,7 +117,8 @@ test("an answer that comes late does not overwrite a newer one, and none queue u
       "the address has the last",
     );
     assert.equal(most, 1, "never two at once");
-    assert.ok(asked <= 20, `${asked} questions for 41 movements`);
+    assert.ok(asked <= 3, `${asked} questions for 24 movements`);
+    await until(async () => open === 0, "all are answered");
     await page.unroute(/pose.msgpack/);
     const last = await sigma(page);
     await page.waitForTimeout(1200);
@@ -157,19 +164,23 @@ test("a service that is ready and fails all the same is asked ever more seldom",
     assert.ok(looked > 1 && looked < 7, `${looked} looks in six seconds`);
   }));
 
+const BUSY = {
+  status: 503,
+  contentType: "application/problem+json",
+  body: JSON.stringify({
+    type: "urn:posefield:problem:overloaded",
+    title: "Busy",
+    status: 503,
+    detail: "1000 requests",
+    instance: "0123456789abcdef",
+    errors: [],
+  }),
+};
+
 test("a busy service is said to be busy", () =>
   on(async (page) => {
     await settled(page);
-    const body = JSON.stringify({
-      type: "urn:posefield:problem:overloaded",
-      title: "Busy",
-      status: 503,
-      detail: "1000 requests",
-      instance: "0123456789abcdef",
-      errors: [],
-    });
-    const answer = { status: 503, contentType: "application/problem+json", body };
-    await page.route(/msgpack/, (route) => route.fulfill(answer));
+    await page.route(/msgpack/, (route) => route.fulfill(BUSY));
     await slider(page, "turn").fill("300");
     await fault(page)
       .getByText(/busy or restarting/)
@@ -177,6 +188,137 @@ test("a busy service is said to be busy", () =>
     await page.unroute(/msgpack/);
     await fault(page).waitFor({ state: "hidden" });
   }));
+
+test("a card that is refused once is asked for again, and no other model is shown", async () => {
+  const page = await chromium.newPage();
+  let refused = 0;
+  await page.route(/models\/reaching$/, (route) =>
+    refused++ ? route.continue() : route.fulfill(BUSY),
+  );
+  await page.goto(`${serving.address}/#reaching?turn=33`);
+  await fault(page).getByText("busy or restarting").waitFor();
+  await page.locator('[data-control="turn"]').waitFor();
+  assert.equal(await typed(page, "turn").inputValue(), "33");
+  assert.match(page.url(), /#reaching\?.*turn=33/);
+  assert.ok(!(await remark(page).isVisible()));
+  await page.close();
+});
+
+test("a name that cannot be is no model", () =>
+  on(async (page) => {
+    await remark(page).getByText("a/b is not on this service").waitFor();
+    await settled(page);
+  }, "/#a%2Fb"));
+
+test("a model chosen while nobody answers is shown when somebody does", () =>
+  on(async (page) => {
+    await settled(page);
+    await serving.stop();
+    await page.getByLabel("Model", { exact: true }).selectOption("cmu_walk");
+    await fault(page).getByText("The service does not answer").waitFor();
+    await serving.start();
+    await page.locator('[data-control="speed"]').waitFor();
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("a version that goes is missed like a model that goes", () =>
+  on(async (page) => {
+    await settled(page);
+    const pinned = await page.evaluate(async () => {
+      const answer = await (await fetch("/v1/models")).json();
+      return answer.models.find(({ name }: { name: string }) => name === "reaching").identity;
+    });
+    await page.goto(`${serving.address}/#${pinned}`);
+    await page.reload();
+    await settled(page);
+    assert.ok(!(await remark(page).isVisible()));
+    await page.route(/v1\/models$/, async (route) => {
+      const answer = await (await route.fetch()).json();
+      for (const model of answer.models)
+        if (model.name === "reaching")
+          Object.assign(model, { identity: "reaching@0", versions: [] });
+      await route.fulfill({ json: answer });
+    });
+    await remark(page).getByText(`${pinned} is not on this service`).waitFor();
+    await page.locator('[data-control="speed"]').waitFor();
+  }));
+
+test("who takes too long is said to be slow", () =>
+  on(async (page) => {
+    await settled(page);
+    await page.route(/msgpack/, () => {});
+    await slider(page, "turn").fill("300");
+    await fault(page).getByText("took too long").waitFor();
+    await page.unroute(/msgpack/);
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("a clip that comes slowly arrives; one that is cut is asked for again", async () => {
+  const between = await Between.make(serving.address);
+  try {
+    between.clips = slowly(10, 1000);
+    const page = await chromium.newPage();
+    await page.goto(between.address + REACH);
+    await page.locator("#stage[data-clip]").waitFor();
+    assert.ok(!(await fault(page).isVisible()));
+    between.clips = cut;
+    await slider(page, "turn").fill("300");
+    await fault(page).getByText("The last picture stays").waitFor();
+    assert.equal(await page.locator("#stage[data-clip]").count(), 0);
+    between.clips = slowly(1, 0);
+    await page.locator("#stage[data-clip]").waitFor();
+    await fault(page).waitFor({ state: "hidden" });
+    await page.close();
+  } finally {
+    await between.end();
+  }
+});
+
+test("a browser without WebGL is told so", () =>
+  on(async (page) => {
+    await page.addInitScript(() => {
+      HTMLCanvasElement.prototype.getContext = () => null;
+    });
+    await page.reload();
+    await fault(page).getByText("no 3-D graphics").waitFor();
+    await page.waitForTimeout(6000);
+    assert.match((await fault(page).textContent())!, /no 3-D graphics/);
+  }));
+
+test("a stage that the graphics card lost is drawn again", () =>
+  on(async (page) => {
+    await settled(page);
+    const before = await picture(page);
+    const lose = await page.locator("#stage canvas").evaluateHandle((it: HTMLCanvasElement) => {
+      return it.getContext("webgl2")!.getExtension("WEBGL_lose_context")!;
+    });
+    await lose.evaluate((it) => it.loseContext());
+    await page.waitForTimeout(300);
+    await lose.evaluate((it) => it.restoreContext());
+    await page.waitForTimeout(300);
+    assert.ok(before.equals(await picture(page)));
+  }));
+
+test("a page that may keep nothing opens all the same", () =>
+  on(async (page) => {
+    await page.addInitScript(() => {
+      const refuse = () => {
+        throw new DOMException("blocked", "SecurityError");
+      };
+      Object.defineProperty(window, "sessionStorage", { get: refuse });
+    });
+    await page.reload();
+    await settled(page);
+  }));
+
+test("a version and an address are remarked on side by side", async () => {
+  const page = await chromium.newPage();
+  await page.route("**/livez", (route) => route.fulfill({ json: { contract: "3.0.0" } }));
+  await page.goto(`${serving.address}/#reaching?height=2`);
+  await remark(page).getByText("another version").waitFor();
+  await remark(page).getByText("height: this model has no such control").waitFor();
+  await page.close();
+});
 
 for (const [contract, words] of [
   ["2.1.0", null],
@@ -205,6 +347,13 @@ test("a key is asked for, kept in this tab, and used", async () => {
       async (page) => {
         const dialog = page.getByRole("dialog", { name: "A key, please" });
         await dialog.waitFor();
+        await page.getByLabel("API key or token").fill("schlüssel");
+        await page.keyboard.press("Enter");
+        await dialog.getByText("This cannot be a key").waitFor();
+        await page.keyboard.press("Escape");
+        await page.waitForTimeout(6000);
+        assert.ok(!(await dialog.isVisible()), "who closes it is not asked again");
+        await fault(page).getByRole("button", { name: "Enter a key" }).click();
         await page.getByLabel("API key or token").fill("wrong");
         await page.keyboard.press("Enter");
         await dialog.waitFor();

@@ -6,12 +6,13 @@ import type { Locator, Page } from "playwright-core";
 export async function picture(page: Page): Promise<Buffer> {
   const box = (await page.locator("#stage").boundingBox())!;
   const clip = { x: box.x + 60, y: box.y + 60, width: box.width - 120, height: box.height - 150 };
-  let before = await page.screenshot({ clip });
+  let before: Buffer = Buffer.of();
   for (let look = 0; look < 40; look++) {
-    await page.waitForTimeout(400);
+    await page.locator("#stage canvas[data-rest]").waitFor();
     const now = await page.screenshot({ clip });
     if (now.equals(before)) return now;
     before = now;
+    await page.waitForTimeout(200);
   }
   throw new Error("the stage does not come to rest");
 }
@@ -34,10 +35,10 @@ export async function sigma(page: Page): Promise<number> {
   return Number.parseFloat((await page.locator("[data-sigma]").textContent())!);
 }
 
-/** Until the body is there and nothing is on its way. */
+/** Until the body is there, and the clip that it plays. */
 export async function settled(page: Page): Promise<void> {
   await page.waitForFunction(() => performance.getEntriesByName("posefield:first-pose").length > 0);
-  await page.waitForLoadState("networkidle");
+  await page.locator("#stage[data-clip]").waitFor();
   await page.waitForFunction(() => document.querySelector(".nearest li"));
 }
 

@@ -18,6 +18,24 @@ before(async () => {
 });
 after(() => chromium.close());
 
+/** Seconds that the transport goes on in one of the page's, looked at over so many of them. */
+function rate(page: Page, seconds: number): Promise<number> {
+  return page.evaluate(async (seconds) => {
+    const now = () => Number.parseFloat(document.querySelector(".time")!.textContent!);
+    while (now() === 0) await new Promise(requestAnimationFrame);
+    const frame = () => new Promise<number>(requestAnimationFrame);
+    const from = now();
+    let [last, passed] = [await frame(), 0];
+    while (passed < seconds) {
+      const next = await frame();
+      // Frames that take longer are no more to the page either, so that nothing jumps.
+      passed += Math.min(0.1, (next - last) / 1000);
+      last = next;
+    }
+    return (now() - from) / passed;
+  }, seconds);
+}
+
 /** A page in which nothing may go wrong unnoticed. */
 async function on(
   path: string,
@@ -75,6 +93,83 @@ test("without a loop it stops at its end; slower is slower", () =>
     );
     await page.getByRole("button", { name: "Play (space)" }).waitFor();
     assert.match(page.url(), /~loop=no/);
+  }));
+
+test("at half the speed time goes half as fast", () =>
+  on(REACH, async (page) => {
+    await page.getByRole("button", { name: "Loop" }).click();
+    const rates: number[] = [];
+    for (const speed of ["0.5", "1"]) {
+      await page.getByLabel("Speed").fill(speed);
+      await page.getByLabel("Time", { exact: true }).fill("0");
+      await page.getByRole("button", { name: "Play (space)" }).click();
+      rates.push(await rate(page, 0.5));
+      await page.keyboard.press("Home");
+    }
+    const [half, whole] = rates;
+    assert.ok(half! / whole! > 0.35 && half! / whole! < 0.7, `${rates} seconds a second`);
+  }));
+
+test("a loop begins again at its end, and frames step around it", () =>
+  on(REACH, async (page) => {
+    await page.keyboard.press("End");
+    const end = await time(page);
+    assert.ok(end > 0.6);
+    await page.keyboard.press("ArrowRight");
+    assert.equal(await time(page), 0);
+    await page.keyboard.press("ArrowLeft");
+    assert.equal(await time(page), end);
+    await page.getByLabel("Time", { exact: true }).fill(String(end - 0.2));
+    await page.keyboard.press(" ");
+    await until(async () => (await time(page)) < end - 0.3, "it begins again");
+    await page.getByRole("button", { name: "Pause (space)" }).waitFor();
+  }));
+
+test("each example is a line beside its slider", () =>
+  on(REACH, async (page) => {
+    const { controls, examples } = await page.evaluate(async () =>
+      (await fetch("/v1/models/reaching")).json(),
+    );
+    for (const [column, { name, minimum, maximum }] of controls.entries()) {
+      const [from, width, path] = await page
+        .locator(`[data-control="${name}"] .ticks`)
+        .evaluate((ticks) => {
+          const sampled = ticks.querySelector(".sampled")!;
+          const of = (key: string) => Number(sampled.getAttribute(key));
+          return [of("x"), of("width"), ticks.querySelector("path")!.getAttribute("d")!] as const;
+        });
+      const marks = [...path.matchAll(/M([\d.]+) /g)].map(([, x]) => Number(x));
+      const places = examples.map(
+        (row: number[]) => from + (width * (row[column]! - minimum)) / (maximum - minimum),
+      );
+      const near = (x: number, all: number[]) => all.some((each) => Math.abs(each - x) < 0.3);
+      assert.ok(marks.length > 1 && new Set(marks).size === marks.length, name);
+      assert.deepEqual(
+        places.filter((x: number) => !near(x, marks)),
+        [],
+        name,
+      );
+      assert.deepEqual(
+        marks.filter((x) => !near(x, places)),
+        [],
+        name,
+      );
+    }
+  }));
+
+test("all controls are reset at once", () =>
+  on(REACH, async (page) => {
+    for (const name of ["turn", "target_height"]) await slider(page, name).fill("1200");
+    await page.getByRole("button", { name: "Reset all" }).click();
+    const reset = page.locator(".control button:disabled");
+    assert.equal(await reset.count(), await page.locator(".control").count());
+    const { controls } = await page.evaluate(async () =>
+      (await fetch("/v1/models/reaching")).json(),
+    );
+    for (const { name, default: value, minimum, maximum } of controls) {
+      const off = Number(await typed(page, name).inputValue()) - value;
+      assert.ok(Math.abs(off) < 0.01 * (maximum - minimum), name);
+    }
   }));
 
 test("a slider moves the body, sigma and the address", () =>
@@ -175,18 +270,35 @@ test("sticks, ghost, feet and level change the picture", () =>
 
 test("root motion carries a walker on, and in place it stays", () =>
   on(WALK.replace("~playing=no", "~feet=yes"), async (page) => {
+    // The camera goes along, and the ground with it: it is another each time the body comes by.
+    const home = async () => {
+      await page.keyboard.press("Home");
+      return picture(page);
+    };
+    const begun = await home();
+    await page.keyboard.press(" ");
+    await page.waitForTimeout(2500);
+    const carried = await home();
+    assert.ok(!begun.equals(carried), "it has travelled");
     await page.getByRole("button", { name: "Root motion" }).click();
     await page.getByText("In place, every foot slides").waitFor();
     await until(async () => page.url().includes("~root=in_place"), "the address follows");
-    await slider(page, "speed").fill("600");
-    await until(async () => (await sigma(page)) > 0, "a pose in place is answered");
+    await page.keyboard.press("f");
+    const lap = async () => {
+      await page.keyboard.press(" ");
+      await page.waitForTimeout(2500);
+    };
+    // Within its leash the camera goes along here too, but once.
+    await lap();
+    const still = await home();
+    await lap();
+    assert.ok(still.equals(await home()), "it has stayed");
   }));
 
 test("a point that is typed is reached within what was sampled", () =>
   on(REACH, async (page) => {
     const point = page.locator('[data-part="target"]');
     const y = point.locator('[data-axis="y"]');
-    const turn = await typed(page, "turn").inputValue();
     await y.fill(String(Number(await y.inputValue()) + 0.25));
     await y.press("Enter");
     const miss = () => point.locator("[data-miss]").textContent();
@@ -197,7 +309,6 @@ test("a point that is typed is reached within what was sampled", () =>
     await y.press("Enter");
     await until(async () => Number.parseFloat((await miss())!) > 100, "the ceiling is not");
     assert.equal(await page.locator(".control[data-outside]").count(), 0);
-    assert.ok(turn);
   }));
 
 test("the handle is dragged, and the controls follow", () =>

@@ -1,4 +1,4 @@
-/** How long things take, printed; that they are measured, and that nothing queues up, is tested. */
+/** How long things take, printed; three times the goals is too long on any machine. */
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
@@ -26,7 +26,7 @@ test("from opening to the first pose", async (context) => {
     await page.close();
   }
   context.diagnostic(`first pose: ${found.join(", ")} ms`);
-  assert.equal(found.length, 3);
+  assert.ok(Math.min(...found) < 4500, `${found} ms`);
 });
 
 test("from a slider's movement to the pose", async (context) => {
@@ -50,7 +50,8 @@ test("from a slider's movement to the pose", async (context) => {
   context.diagnostic(
     `drag: ${took.length} movements, median ${at(0.5)} ms, nine in ten ${at(0.9)} ms`,
   );
-  assert.ok(took.length > 40, `${took.length} movements of 90 were answered`);
+  assert.ok(took.length > 10, `${took.length} movements of 90 were answered`);
+  assert.ok(Number(at(0.5)) < 150, `${at(0.5)} ms`);
   await page.close();
 });
 
@@ -77,6 +78,5 @@ test("frames of a crowd of 300 that walks", async (context) => {
   context.diagnostic(
     `crowd: ${rate.toFixed(0)} frames a second, half of them within ${took[took.length >> 1]!.toFixed(0)} ms, ${fine} pixels wide`,
   );
-  assert.ok(took.length > 5);
   await page.close();
 });
