@@ -158,24 +158,46 @@ def test_a_folder_that_cannot_be_written_warns_and_does_no_harm(tmp_path):
 @pytest.mark.parametrize("make", [Memory, lambda limit: None], ids=["memory", "disk"])
 def test_it_keeps_to_its_limit_and_what_was_used_last(make, tmp_path):
     cache = make(10_000) or Disk(tmp_path, 10_000)
-    for place in range(100):
-        cache.keep(f"{place:02}", Kept({}, bytes(500), 0.0))
-        assert cache.find("00") is not None or place == 0
+    names = [caches.name(b"", str(place)) for place in range(100)]
+    for place, name in enumerate(names):
+        cache.keep(name, Kept({}, bytes(500), 0.0))
+        assert cache.find(names[0]) is not None or place == 0
         time.sleep(0.002)
-    found = [place for place in range(100) if cache.find(f"{place:02}")]
+    found = [place for place, name in enumerate(names) if cache.find(name)]
     assert 0 in found
     assert 99 in found
     assert 5 < len(found) <= 20
 
 
 def test_what_a_killed_process_left_is_taken_away(tmp_path):
-    old, new = tmp_path / "a.1.part", tmp_path / "b.2.part"
+    name = caches.name(b"", "question")
+    old, new = tmp_path / f"{name}.{'0' * 12}.part", tmp_path / f"{name}.{'f' * 12}.part"
     for file in (old, new):
         file.write_bytes(b"half")
     os.utime(old, (0, 0))
-    Disk(tmp_path, 0).keep("name", Kept({}, b"content", 0.0))
+    Disk(tmp_path, 0).keep(name, Kept({}, b"content", 0.0))
     # Somebody may be writing the new one just now, however little may be kept.
     assert list(tmp_path.iterdir()) == [new]
+
+
+def test_files_of_others_in_the_folder_stay(tmp_path):
+    name = caches.name(b"", "question")
+    others = [tmp_path / called for called in ("thesis.txt", "half.part", f"{name}.txt", "a" * 39)]
+    for file in others:
+        file.write_bytes(b"mine")
+        os.utime(file, (0, 0))
+    Disk(tmp_path, 0).keep(name, Kept({}, b"content", 0.0))
+    assert sorted(tmp_path.iterdir()) == sorted(others)
+
+
+def test_what_cannot_be_marked_as_used_is_found_all_the_same(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise PermissionError("read-only")
+
+    cache = Disk(tmp_path)
+    cache.keep("name", Kept({}, b"content", 0.0))
+    monkeypatch.setattr(os, "utime", refuse)
+    assert cache.find("name") is not None
 
 
 def test_large_answers_are_not_kept(tmp_path, address, controls):
@@ -211,13 +233,13 @@ WRITERS = """
 import sys
 from pathlib import Path
 from posefield_client import Disk
-from posefield_client.cache import Kept
+from posefield_client.cache import Kept, name as called
 cache = Disk(Path(sys.argv[1]), 100_000)
 for turn in range(200):
-    name = str(turn % 40)
+    name = called(b"", str(turn % 40))
     found = cache.find(name)
-    assert found is None or found.content == name.encode() * 2000, name
-    cache.keep(name, Kept({}, name.encode() * 2000, 0.0))
+    assert found is None or found.content == name.encode() * 100, name
+    cache.keep(name, Kept({}, name.encode() * 100, 0.0))
 """
 
 
