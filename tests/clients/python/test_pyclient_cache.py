@@ -8,7 +8,7 @@ import time
 import pytest
 import scripted
 import serving
-from posefield_client import NEVER, NOTHING, Client, Disk, Memory
+from posefield_client import NEVER, NOTHING, Client, Disk, Memory, errors, questions, transport
 from posefield_client import cache as caches
 from posefield_client.cache import Kept
 from posefield_client.exchange import Copy
@@ -37,7 +37,7 @@ def cache(request, tmp_path):
     return Memory() if request.param == "memory" else Disk(tmp_path / "cache")
 
 
-def asked_twice(cache, *answers, key=None):
+def asked_twice(cache, *answers):
     """The counts that come of two questions, and the entity tags that were sent."""
     with scripted.serving(*answers) as server, Client(server.address, cache=cache) as client:
         found = [client.model("reach").why(turn=1).others.count for _ in range(2)]
@@ -88,6 +88,38 @@ def test_an_error_is_not_kept(cache):
             with pytest.raises(Exception, match="404"):
                 client.model("reach").why(turn=1)
             assert client.model("reach").why(turn=1).others.count == 7
+
+
+@pytest.mark.parametrize("wrong", [answer(b"{}", ETag=TAG), answer(b"x", "text/html", ETag=TAG)])
+def test_what_cannot_be_read_is_not_kept(cache, wrong):
+    wrong = wrong.replace(b"ETag", b"Cache-Control: max-age=60\r\nETag")
+    with scripted.serving(wrong, answer(b"{}"), answer(b"{}"), reasons(7)) as server:
+        with Client(server.address, cache=cache, retry=NEVER) as client:
+            with pytest.raises(errors.Unexpected):
+                client.model("reach").why(turn=1)
+            assert client.model("reach").why(turn=1).others.count == 7
+    assert [h.get("if-none-match") for _, h, _ in server.asked] == [None] * 4
+
+
+@pytest.mark.parametrize("until", [0.0, 2.0**40])
+def test_what_is_kept_and_cannot_be_read_is_asked_for_anew(cache, until):
+    with scripted.serving(reasons(7, IMMUTABLE)) as server:
+        with Client(server.address, cache=cache, retry=NEVER) as client:
+            target = questions.why("reach", turn=1).request.target
+            told = {"content-type": "application/json", "etag": TAG}
+            name = caches.name(client.core.scope, target)
+            cache.keep(name, Kept(told, b"{}", until))
+            found = [client.model("reach").why(turn=1).others.count for _ in range(2)]
+    assert found == [7, 7]
+    assert [h.get("if-none-match") for _, h, _ in server.asked] == [None]
+
+
+def test_what_another_contract_said_is_another_answer(monkeypatch):
+    place = transport.place("http://x", None, 1.0)
+    scope = transport.core(place, NEVER, NOTHING).scope
+    assert scope == transport.core(place, NEVER, NOTHING).scope
+    monkeypatch.setattr(transport, "CONTRACT", "9.9.9")
+    assert scope != transport.core(place, NEVER, NOTHING).scope
 
 
 def test_a_question_by_post_is_not_kept(cache):
