@@ -160,7 +160,7 @@ class OutsideSamples(Unanswerable, kind="outside-samples"):
 
 
 class Busy(Problem):
-    """The service cannot answer now."""
+    """The service, or what stands before it, cannot answer now."""
 
     again = True
 
