@@ -1,7 +1,8 @@
 """The client that others need not wait for: the same questions, awaited."""
 
 from collections.abc import Awaitable, Callable, Coroutine
-from functools import wraps
+from contextlib import closing
+from functools import partial, wraps
 from os import PathLike
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -103,25 +104,24 @@ class AsyncClient:
 
     async def run(self, steps: Steps[T]) -> T:
         """What comes of steps, each of which is taken. Raises PosefieldError."""
-        try:
-            wish = next(steps)
+        step = partial(steps.send, None)
+        with closing(steps):
             while True:
                 try:
-                    came = await self._do(wish)
+                    wish = step()
+                except StopIteration as end:
+                    found: T = end.value
+                    return found
+                try:
+                    step = partial(steps.send, await self._do(wish))
                 except PosefieldError as fault:
-                    wish = steps.throw(fault)
-                else:
-                    wish = steps.send(came)
-        except StopIteration as end:
-            found: T = end.value
-            return found
-        finally:
-            steps.close()
+                    step = partial(steps.throw, fault)
 
     async def _do(self, wish: Send | Sleep) -> Reply | None:
         if isinstance(wish, Sleep):
             await self._sleep(wish.seconds)
             return None
+        transport.opened(self._http)
         response = None
         try:
             response = await self._http.send(self._place.request(wish), stream=True)
@@ -135,8 +135,9 @@ class AsyncClient:
     async def _read(self, wish: Send, response: httpx.Response) -> Reply:
         take = transport.begin(wish, response)
         if take is None:
-            return transport.reply(wish, response, await response.aread())
-        async for chunk in response.aiter_bytes():
+            raw = b"".join([chunk async for chunk in response.aiter_raw()])
+            return transport.reply(wish, response, raw)
+        async for chunk in response.aiter_raw():
             take(chunk)
         return transport.reply(wish, response, b"")
 
@@ -203,7 +204,7 @@ class AsyncModel:
 
     @property
     def card(self) -> Later[ModelCard]:
-        """What the model says of itself, to be awaited; asked for once."""
+        """What the model says of itself, to be awaited; kept as soon as it has come."""
         return self._read_once()
 
     @property

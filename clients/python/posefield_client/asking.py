@@ -4,6 +4,7 @@ would be too long a line."""
 import math
 import re
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 from typing import Any
 from urllib.parse import quote_plus
 
@@ -29,7 +30,7 @@ def plain(operation: str, model: str, words: Mapping[str, Any] | None = None) ->
 
 def body(operation: str, model: str, question: Struct) -> Request:
     """Request by POST."""
-    content = msgspec.json.encode(question)
+    content = msgspec.json.encode(sayable(operation, question))
     return Request(OPERATIONS[operation], _target(operation, model, {}), content)
 
 
@@ -67,7 +68,13 @@ def _pairs(words: Mapping[str, Any]) -> Iterable[str]:
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    return quote_plus(value) if isinstance(value, str) else repr(value)
+    return quote_plus(value if isinstance(value, str) else digits(value))
+
+
+def digits(value: Any) -> str:
+    """A number without an exponent, whose + a query takes for a space."""
+    text = repr(value)
+    return format(Decimal(text), "f") if "e" in text else text
 
 
 def model_name(name: str) -> str:
@@ -80,26 +87,36 @@ def model_name(name: str) -> str:
 def number(name: str, value: Any) -> float:
     """A finite number as Python's own, a whole one whole; NumPy's are taken too."""
     found = value.item() if isinstance(value, np.generic) else value
-    if type(found) not in (int, float) or not math.isfinite(found):
+    if type(found) not in (int, float) or not _is_finite(found):
         raise WrongQuestion(f"{name} is {value!r}, expected a finite number")
     plain: float = found
     return plain
+
+
+def _is_finite(value: float) -> bool:
+    """Whether a number is finite, and within what floating point holds."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def numbers(name: str, values: Any) -> tuple[float, ...]:
     """Finite numbers of one, of a list or of an array."""
     if isinstance(values, list | tuple):
         return tuple([number(name, value) for value in values])
-    if np.ndim(values) == 0:
-        return (number(name, np.asarray(values).item()),)
-    return tuple(_finite(name, values).tolist())
+    found = _array(name, values)
+    if found.ndim > 1:
+        raise WrongQuestion(f"{name} has {found.ndim} axes, expected one")
+    return (number(name, found.item()),) if found.ndim == 0 else tuple(_finite(name, found))
 
 
 def column(name: str, values: Any) -> Any:
     """A number, or one for each character; a word stays as it is."""
     if isinstance(values, str):
         return values
-    return number(name, values) if np.ndim(values) == 0 else _finite(name, values).tolist()
+    found = _array(name, values)
+    return number(name, found.item()) if found.ndim == 0 else _finite(name, found)
 
 
 def columns(**given: Any) -> dict[str, Any]:
@@ -107,11 +124,18 @@ def columns(**given: Any) -> dict[str, Any]:
     return {name: column(name, values) for name, values in given.items() if values is not None}
 
 
-def _finite(name: str, values: Any) -> npt.NDArray[Any]:
-    found = np.asarray(values)
+def _array(name: str, values: Any) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise WrongQuestion(f"{name} holds lists of several lengths") from None
+
+
+def _finite(name: str, found: npt.NDArray[Any]) -> list[Any]:
     if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
         raise WrongQuestion(f"{name} holds what is no finite number")
-    return found
+    listed: list[Any] = found.tolist()
+    return listed
 
 
 def controls(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> dict[str, float]:
@@ -130,12 +154,19 @@ def together(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> Mappi
 
 def said(**words: Any) -> dict[str, Any]:
     """Those that are said: not None. NumPy's become Python's own; numbers are finite."""
-    return {name: _plain(name, value) for name, value in words.items() if value is not None}
+    return {name: sayable(name, value) for name, value in words.items() if value is not None}
 
 
-def _plain(name: str, value: Any) -> Any:
-    found = value.item() if isinstance(value, np.generic) else value
-    # In JSON it would be null, which means something else.
-    if isinstance(found, float) and not math.isfinite(found):
-        raise WrongQuestion(f"{name} is {value!r}, expected a finite number")
-    return found
+def sayable(name: str, value: Any) -> Any:
+    """A value of Python's own, and all in it, as JSON can say it; WrongQuestion where none does."""
+    if isinstance(value, Struct):
+        value = {key: getattr(value, key) for key in value.__struct_fields__}
+    found = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    if isinstance(found, Mapping):
+        return {key: sayable(key, each) for key, each in found.items() if each is not UNSET}
+    if isinstance(found, list | tuple):
+        return [sayable(name, each) for each in found]
+    if isinstance(found, bool | str | None):
+        return found
+    # What is not finite would be null, which means something else.
+    return number(name, found)

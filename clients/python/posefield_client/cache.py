@@ -45,7 +45,7 @@ class Cache(Protocol):
 
 
 def scope(*parts: str) -> bytes:
-    """Digest of all that makes the same question another one: the address and the key."""
+    """Digest of all that makes the same question another one: contract, address, key."""
     return blake2b("\0".join(parts).encode(), digest_size=32).digest()
 
 
@@ -74,7 +74,7 @@ def kept(headers: Mapping[str, str], content: bytes) -> Kept | None:
 
 
 class Memory:
-    """The answers used last, up to some bytes, for as long as the client lives."""
+    """The answers used last, up to some bytes of content, for as long as the client lives."""
 
     def __init__(self, limit: int = 16 * 2**20) -> None:
         self.limit = limit

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from contextlib import closing
-from functools import cached_property, wraps
+from functools import cached_property, partial, wraps
 from os import PathLike
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -104,25 +104,24 @@ class Client:
 
     def run(self, steps: Steps[T]) -> T:
         """What comes of steps, each of which is taken. Raises PosefieldError."""
-        try:
-            wish = next(steps)
+        step = partial(steps.send, None)
+        with closing(steps):
             while True:
                 try:
-                    came = self._do(wish)
+                    wish = step()
+                except StopIteration as end:
+                    found: T = end.value
+                    return found
+                try:
+                    step = partial(steps.send, self._do(wish))
                 except PosefieldError as fault:
-                    wish = steps.throw(fault)
-                else:
-                    wish = steps.send(came)
-        except StopIteration as end:
-            found: T = end.value
-            return found
-        finally:
-            steps.close()
+                    step = partial(steps.throw, fault)
 
     def _do(self, wish: Send | Sleep) -> Reply | None:
         if isinstance(wish, Sleep):
             self._sleep(wish.seconds)
             return None
+        transport.opened(self._http)
         response = None
         try:
             response = self._http.send(self._place.request(wish), stream=True)
@@ -134,8 +133,8 @@ class Client:
     def _read(self, wish: Send, response: httpx.Response) -> Reply:
         take = transport.begin(wish, response)
         if take is None:
-            return transport.reply(wish, response, response.read())
-        for chunk in response.iter_bytes():
+            return transport.reply(wish, response, b"".join(response.iter_raw()))
+        for chunk in response.iter_raw():
             take(chunk)
         return transport.reply(wish, response, b"")
 

@@ -1,6 +1,7 @@
 """Answers kept in a folder, which several processes may share."""
 
 import os
+import re
 import secrets
 import time
 import warnings
@@ -13,6 +14,8 @@ import msgspec
 from posefield_client.cache import Kept
 
 DIGEST = 16
+NAME = re.compile(r"[0-9a-f]{40}(\.[0-9a-f]{12}\.part)?")
+"""What our files are called, as cache.name does: the folder may hold others."""
 FORGOTTEN = 3600.0
 """Seconds after which what a process left half-written is taken away."""
 
@@ -37,10 +40,11 @@ class Disk:
         path = self.folder / name
         try:
             found = _read(path.read_bytes())
-            # What is used last is let go last.
-            os.utime(path)
         except (OSError, ValueError):
             return None
+        # What is used last is let go last, as far as the folder may be written.
+        with suppress(OSError):
+            os.utime(path)
         return found
 
     def keep(self, name: str, kept: Kept) -> None:
@@ -70,7 +74,8 @@ class Disk:
 
     def _tidy(self) -> None:
         """Take away what was not used for longest, down to seven eighths of the limit."""
-        found = sorted(filter(None, map(_looked_at, self.folder.iterdir())), reverse=True)
+        ours = (path for path in self.folder.iterdir() if NAME.fullmatch(path.name))
+        found = sorted(filter(None, map(_looked_at, ours)), reverse=True)
         size = 0
         for used, length, path in found:
             if path.suffix == ".part":

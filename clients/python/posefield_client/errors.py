@@ -21,7 +21,9 @@ PosefieldError
 └── Unexpected                 this is no answer of the contract that this client knows
 """
 
+import time
 from collections.abc import Mapping
+from email.utils import parsedate_to_datetime
 from typing import Any, ClassVar
 
 import msgspec
@@ -74,7 +76,7 @@ class Problem(PosefieldError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # From worker to caller: an exception is made anew from what it was made of.
-        return type(self), (self.said, self.retry_after)
+        return type(self), (self.said, self.retry_after), vars(self)
 
 
 class WrongRequest(Problem):
@@ -158,7 +160,7 @@ class OutsideSamples(Unanswerable, kind="outside-samples"):
 
 
 class Busy(Problem):
-    """The service cannot answer now."""
+    """The service, or what stands before it, cannot answer now."""
 
     again = True
 
@@ -223,7 +225,7 @@ class Unexpected(PosefieldError):
         self.service = service
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.found, self.service)
+        return type(self), (self.found, self.service), vars(self)
 
 
 _PROBLEM = msgspec.json.Decoder(generated.Problem)
@@ -233,25 +235,33 @@ def of_answer(
     status: int, headers: Mapping[str, str], content: bytes, asked: str
 ) -> PosefieldError:
     """Error that an answer other than a good one means; asked: for what, in words."""
-    after = _seconds(headers.get("retry-after", ""))
-    if headers.get("content-type", "").partition(";")[0] == MEDIA_TYPE:
-        return _of_problem(status, content, asked, after)
+    fault = _of_anything(status, headers, content, asked)
+    fault.retry_after = _seconds(headers)
+    return fault
+
+
+def _of_anything(
+    status: int, headers: Mapping[str, str], content: bytes, asked: str
+) -> PosefieldError:
+    problem = media_type(headers) == MEDIA_TYPE
+    try:
+        if problem:
+            return _of_problem(status, _PROBLEM.decode(content))
+    except msgspec.DecodeError as fault:
+        if status not in GATEWAYS:
+            told = f"{asked} was answered with {status} and no problem document: {fault}"
+            return Unexpected(told)
     if status in GATEWAYS:
-        missing = Unreachable(f"{asked} was answered with {status}, and not by the service")
-        missing.retry_after = after
-        return missing
+        return Unreachable(f"{asked} was answered with {status}, and not by the service")
     if "location" in headers:
         return Unexpected(f"{asked} was sent on to {headers['location']} ({status})")
     return Unexpected(f"{asked} was answered with {status} and {media_type(headers)}")
 
 
-def _of_problem(status: int, content: bytes, asked: str, after: float | None) -> PosefieldError:
-    try:
-        said = _PROBLEM.decode(content)
-    except msgspec.DecodeError as fault:
-        return Unexpected(f"{asked} was answered with {status} and no problem document: {fault}")
-    kind = Problem.kinds.get(said.type.removeprefix(TYPE_PREFIX), Problem)
-    return kind(said, after)
+def _of_problem(status: int, said: generated.Problem) -> Problem:
+    # Of a kind that is unknown, the status still says whether it may pass.
+    unknown = Busy if status in GATEWAYS else Problem
+    return Problem.kinds.get(said.type.removeprefix(TYPE_PREFIX), unknown)(said)
 
 
 def media_type(headers: Mapping[str, str]) -> str:
@@ -259,6 +269,17 @@ def media_type(headers: Mapping[str, str]) -> str:
     return headers.get("content-type", "").partition(";")[0].strip() or "no media type"
 
 
-def _seconds(text: str) -> float | None:
-    """Of a Retry-After header; a date is passed over, for clocks differ."""
-    return float(text) if text.isascii() and text.isdigit() else None
+def _seconds(headers: Mapping[str, str]) -> float | None:
+    """Of a Retry-After header; a date is held against the service's own, for clocks differ."""
+    text = headers.get("retry-after", "")
+    if text.isascii() and text.isdigit():
+        return float(text)
+    said, now = _moment(text), _moment(headers.get("date", ""))
+    return max(0.0, said - (time.time() if now is None else now)) if said is not None else None
+
+
+def _moment(text: str) -> float | None:
+    try:
+        return parsedate_to_datetime(text).timestamp()
+    except (ValueError, OverflowError):
+        return None

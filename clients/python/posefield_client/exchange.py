@@ -7,7 +7,7 @@ not, differ in nothing but how they do it.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -25,43 +25,71 @@ LIVENESS = Request(OPERATIONS["getLiveness"], "/livez")
 DOCUMENT = Request(OPERATIONS["getContractJson"], "/openapi.json")
 
 
+@dataclass(frozen=True, slots=True)
+class Held(Generic[T]):
+    """An answer that is kept, and what was read from it."""
+
+    kept: Kept
+    found: T
+
+
 @dataclass(frozen=True)
 class Core:
-    """What a client is but for its connections. scope: digest of the address and the key."""
+    """What a client is but for its connections. scope: digest of all that answers depend on."""
 
     cache: Cache
     retry: Retry
     scope: bytes
     clock: Callable[[], float] = time.monotonic
 
-    def answer(self, call: Call[T]) -> Steps[T]:
-        """The answer to a question, read. Raises PosefieldError."""
-        return (yield from self.with_versions(self._read(call)))
+    def answer(self, call: Call[T], sink: Sink | None = None) -> Steps[T]:
+        """The answer to a question, read; its content in the sink, where there is one.
 
-    def _read(self, call: Call[T]) -> Steps[T]:
-        reply = yield from self.reply(call.request)
-        return read(call, reply)
+        It is read before it is kept, and within what is asked again. Raises PosefieldError.
+        """
+        return (yield from self._with_versions(self._found(call, sink)))
 
-    def reply(self, request: Request, sink: Sink | None = None) -> Steps[Reply]:
-        """The answer as it came, or as it is kept; its content in the sink, where there is one."""
-        if request.body is not None:
-            return (yield from self._sent(Send(request, None, sink)))
-        name = caches.name(self.scope, request.target)
-        kept = self.cache.find(name)
-        if kept is not None and kept.holds:
-            return of_kept(kept, sink)
+    def _found(self, call: Call[T], sink: Sink | None) -> Steps[T]:
+        if call.request.body is None:
+            return (yield from self._got(call, sink))
+        _, found = yield from self._sent(Send(call.request, None, sink), lambda r: read(call, r))
+        return found
+
+    def _got(self, call: Call[T], sink: Sink | None) -> Steps[T]:
+        """The answer to a question by GET, which may be at hand."""
+        name = caches.name(self.scope, call.request.target)
+        held = self._held(name, call)
+        if held is not None and held.kept.holds:
+            pour(held.kept, sink)
+            return held.found
+
+        def look(reply: Reply) -> T:
+            return held.found if held and reply.status == 304 else read(call, reply)
+
         given = Copy(sink, self.cache.largest) if sink else None
-        reply = yield from self._sent(Send(request, kept.headers["etag"] if kept else None, given))
-        if kept is not None and reply.status == 304:
-            return of_kept(self._renewed(name, kept, reply), sink)
-        self._keep(name, reply, given)
-        return reply
+        tag = held.kept.headers["etag"] if held else None
+        reply, found = yield from self._sent(Send(call.request, tag, given), look)
+        if held and reply.status == 304:
+            self._renew(name, held.kept, reply)
+            pour(held.kept, sink)
+        else:
+            self._keep(name, reply, given)
+        return found
 
-    def _renewed(self, name: str, kept: Kept, reply: Reply) -> Kept:
+    def _held(self, name: str, call: Call[T]) -> Held[T] | None:
+        """What is at hand; None where it cannot be read, so that it is asked for anew."""
+        kept = self.cache.find(name)
+        if kept is None:
+            return None
+        try:
+            return Held(kept, read(call, Reply(200, kept.headers, kept.content)))
+        except Unexpected:
+            return None
+
+    def _renew(self, name: str, kept: Kept, reply: Reply) -> None:
         renewed = kept.renewed(reply.headers)
         if renewed.holds:
             self.cache.keep(name, renewed)
-        return renewed
 
     def _keep(self, name: str, reply: Reply, copy: "Copy | None") -> None:
         content = reply.content if copy is None else copy.content
@@ -70,31 +98,32 @@ class Core:
             if kept is not None:
                 self.cache.keep(name, kept)
 
-    def _sent(self, send: Send) -> Steps[Reply]:
-        """Ask until there is an answer, or no hope of one."""
+    def _sent(self, send: Send, look: Callable[[Reply], T]) -> Steps[tuple[Reply, T]]:
+        """Ask until there is an answer in which `look` finds no fault, or no hope of one."""
         began, asked = self.clock(), 0
         while True:
             asked += 1
             try:
-                return (yield from _once(send))
+                reply = yield from _once(send)
+                return reply, look(reply)
             except PosefieldError as fault:
                 wait = self.retry.wait(asked, fault, self.clock() - began)
                 if wait is None:
                     raise
             yield Sleep(wait)
 
-    def with_versions(self, steps: Steps[T]) -> Steps[T]:
+    def _with_versions(self, steps: Steps[T]) -> Steps[T]:
         """The same; where what came is not of our contract, the service is asked for its own."""
         try:
             return (yield from steps)
         except Unexpected as fault:
-            found = fault.found
+            found, cause = fault.found, fault.__cause__
         except NoSuchPath as fault:
             version = yield from contract()
             if version != CONTRACT:
                 fault.add_note(f"service: contract {version}; this client: {CONTRACT}")
             raise
-        raise Unexpected(found, (yield from contract()))
+        raise Unexpected(found, (yield from contract())) from cause
 
 
 def _once(send: Send) -> Steps[Reply]:
@@ -146,13 +175,11 @@ def named(operation: Operation) -> str:
     return f"{operation.method} {operation.path}"
 
 
-def of_kept(kept: Kept, sink: Sink | None) -> Reply:
-    """An answer that was kept, as if it came."""
-    if sink is None:
-        return Reply(200, kept.headers, kept.content)
-    sink.begin(len(kept.content))
-    sink.write(kept.content)
-    return Reply(200, kept.headers, b"")
+def pour(kept: Kept, sink: Sink | None) -> None:
+    """Into a sink, where there is one, what was kept."""
+    if sink is not None:
+        sink.begin(len(kept.content))
+        sink.write(kept.content)
 
 
 class Copy:

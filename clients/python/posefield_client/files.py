@@ -108,7 +108,8 @@ def clips(
 def _named(place: int, given: NamedClipQuestion | Mapping[str, Any]) -> NamedClipQuestion:
     if isinstance(given, NamedClipQuestion):
         return given
-    plain = {**given, "controls": asking.controls(given.get("controls"), {})}
+    controls = asking.controls(given.get("controls"), {})
+    plain = {**asking.sayable(f"clip {place}", given), "controls": controls}
     try:
         return msgspec.convert(plain, NamedClipQuestion)
     except msgspec.ValidationError as fault:
@@ -165,7 +166,9 @@ def walk(
     instancing: Instancing | None = None,
 ) -> Files:
     """A crowd that walks, each its own way; camera: x, y and z of where one looks from, m."""
-    place = None if camera is None else ",".join(map(repr, asking.numbers("camera", camera)))
+    place = (
+        None if camera is None else ",".join(map(asking.digits, asking.numbers("camera", camera)))
+    )
     words = {
         **asking.said(count=count, motions=motions, seconds=seconds, fps=fps, seed=seed),
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),

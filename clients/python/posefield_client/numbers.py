@@ -1,6 +1,6 @@
 """Numbers as NumPy arrays, read from binary answers; arrays are read-only views of what came."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -10,6 +10,7 @@ from msgspec import Struct
 from posefield_client.generated import Trust
 from posefield_client.wire import Reply
 
+T = TypeVar("T")
 Array = npt.NDArray[Any]
 KINDS = "fiub"
 
@@ -94,6 +95,52 @@ def _array(kind: type, found: Any) -> Array:
     return np.frombuffer(found["data"], dtype).reshape(found["shape"])
 
 
+SHAPES: dict[Any, dict[str, str]] = {
+    Pose: {"times": "S", "rotations": "SJ4", "root_position": "S3", "bone_offsets": "J3"},
+    ClipNumbers: {
+        "names": "J",
+        "parents": "J",
+        "times": "F",
+        "rotations": "FJ4",
+        "root_position": "F3",
+        "bone_offsets": "J3",
+    },
+    SigmaGrid: {"across_values": "C", "along_values": "R", "sigma": "RC", "inside": "RC"},
+    CrowdPoses: {
+        "names": "J",
+        "parents": "J",
+        "rotations": "NJ4",
+        "root_position": "N3",
+        "bone_offsets": "NJ3",
+        "duration": "N",
+        "sigma": "N",
+        "levels": "N",
+        "error_px": "N",
+    },
+}
+"""Axes of what answers hold: a letter is one length throughout an answer, a digit that length."""
+WHOLE = ("levels", "inside", "parents", "names")
+"""All others are of floating point."""
+
+
+def _checked(found: T) -> T:
+    """ValueError where arrays do not fit each other."""
+    sizes: dict[str, int] = {"3": 3, "4": 4}
+    for name, axes in SHAPES[type(found)].items():
+        each = getattr(found, name)
+        if each is None:
+            continue
+        shape = np.shape(each)
+        wanted = tuple(
+            sizes.setdefault(axis, size) for axis, size in zip(axes, shape, strict=False)
+        )
+        if len(shape) != len(axes) or shape != wanted:
+            raise ValueError(f"{name} has the shape {shape}, expected {', '.join(axes)} of {sizes}")
+        if isinstance(each, np.ndarray) and (each.dtype.kind == "f") == (name in WHOLE):
+            raise ValueError(f"{name} is of {each.dtype}")
+    return found
+
+
 _POSE = msgspec.msgpack.Decoder(Pose, dec_hook=_array)
 _CLIP = msgspec.msgpack.Decoder(ClipNumbers, dec_hook=_array)
 _GRID = msgspec.msgpack.Decoder(SigmaGrid, dec_hook=_array)
@@ -102,19 +149,19 @@ _CROWD = msgspec.msgpack.Decoder(CrowdPoses, dec_hook=_array)
 
 def pose(reply: Reply) -> Pose:
     """Poses of an answer in MessagePack; ValueError where it is none."""
-    return _POSE.decode(reply.content)
+    return _checked(_POSE.decode(reply.content))
 
 
 def clip(reply: Reply) -> ClipNumbers:
     """A clip of an answer in MessagePack; ValueError where it is none."""
-    return _CLIP.decode(reply.content)
+    return _checked(_CLIP.decode(reply.content))
 
 
 def grid(reply: Reply) -> SigmaGrid:
     """A grid of an answer in MessagePack; ValueError where it is none."""
-    return _GRID.decode(reply.content)
+    return _checked(_GRID.decode(reply.content))
 
 
 def crowd(reply: Reply) -> CrowdPoses:
     """Poses of a crowd of an answer in MessagePack; ValueError where it is none."""
-    return _CROWD.decode(reply.content)
+    return _checked(_CROWD.decode(reply.content))

@@ -1,6 +1,6 @@
 """What can be asked of a service and of a model: each question once, for both kinds of client.
 
-Controls are keywords, or a mapping `controls` where their names are no Python words. What is left
+Controls are keywords, or a mapping `controls` where Python keeps their names. What is left
 out is left to the service, whose contract says what it then is.
 """
 

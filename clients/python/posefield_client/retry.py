@@ -14,7 +14,7 @@ class Retry:
     attempts: how often a question is asked at most; first: seconds that the first wait is at most,
     each further one twice that, up to `longest`; patience: seconds since the question was first
     asked after which it is not asked again. Where the service says Retry-After it is not asked
-    before; where that is more than `longest`, or would end patience, not at all.
+    before, however long that is; where it would end patience, not at all.
     """
 
     attempts: int = 5
@@ -26,9 +26,9 @@ class Retry:
     def wait(self, asked: int, fault: PosefieldError, elapsed: float) -> float | None:
         """Seconds to wait after so many attempts that took so long; None: give up."""
         told = fault.retry_after or 0.0
-        if not fault.again or asked >= self.attempts or told > self.longest:
+        if not fault.again or asked >= self.attempts:
             return None
-        seconds = told + min(self.longest, self.first * 2.0 ** (asked - 1)) * self.chance()
+        seconds = told + min(self.longest, self.first * 2.0 ** min(asked - 1, 64)) * self.chance()
         return seconds if elapsed + seconds <= self.patience else None
 
 

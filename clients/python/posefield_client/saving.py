@@ -2,10 +2,12 @@
 
 import io
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from errno import EISDIR
 from pathlib import Path
+from stat import S_IMODE
 from types import TracebackType
 from typing import BinaryIO
 
@@ -13,10 +15,10 @@ import msgspec
 
 from posefield_client import archives
 from posefield_client.archives import Counter
-from posefield_client.exchange import Core, expect
+from posefield_client.exchange import Core
 from posefield_client.files import Files
 from posefield_client.generated import ManifestEntry
-from posefield_client.wire import Reply, Request, Steps
+from posefield_client.wire import Call, Reply, Steps
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,14 @@ class Part:
     """A file beside the one that is to be; renamed by `keep`, else gone at the end."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self._beside = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+        # What a link points to is written, and the link stays.
+        self.path = path.resolve()
+        self._beside = self.path.with_name(f".{secrets.token_hex(6)}.part")
         self.file: BinaryIO
 
     def __enter__(self) -> "Part":
+        if self.path.is_dir():
+            raise IsADirectoryError(EISDIR, "a folder, expected a file", str(self.path))
         self.file = self._beside.open("xb+")
         return self
 
@@ -74,6 +79,9 @@ class Part:
     def keep(self) -> None:
         """The file is whole: give it its name."""
         self.file.close()
+        # Whoever might not read the file that was there may not read this one.
+        with suppress(FileNotFoundError):
+            self._beside.chmod(S_IMODE(self.path.stat().st_mode))
         self._beside.replace(self.path)
 
 
@@ -115,25 +123,24 @@ def save(core: Core, files: Files, path: Path, watch: Watch | None) -> Steps[Sav
     ending = files.ending(path)
     request = files.request(ending)
     with Part(path) as part:
+
+        def look(reply: Reply) -> Saved:
+            return _saved(path, reply, _entries(part.file, ending, files.count))
+
         sink = Into(part.file, ending, files.count, watch)
-        reply = yield from core.with_versions(_whole(core, request, sink))
-        entries = _entries(part.file, ending, files.count)
+        saved = yield from core.answer(Call(request, look), sink)
         part.keep()
-        return _saved(path, sink.received, reply.headers, entries)
+        return replace(saved, bytes=sink.received)
 
 
 def content(core: Core, files: Files, ending: str) -> Steps[bytes]:
     """An answer in a format, as bytes."""
-    request = files.request(ending)
-    reply = yield from core.with_versions(_whole(core, request, None))
-    _entries(io.BytesIO(reply.content), ending, files.count)
-    return reply.content
 
+    def look(reply: Reply) -> bytes:
+        _entries(io.BytesIO(reply.content), ending, files.count)
+        return reply.content
 
-def _whole(core: Core, request: Request, sink: Into | None) -> Steps[Reply]:
-    reply = yield from core.reply(request, sink)
-    expect(request.operation, reply.headers.get("content-type", ""))
-    return reply
+    return (yield from core.answer(Call(files.request(ending), look)))
 
 
 def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEntry, ...]:
@@ -144,13 +151,13 @@ def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEn
     return archives.check(file, ending, count)
 
 
-def _saved(
-    path: Path, size: int, headers: Mapping[str, str], entries: tuple[ManifestEntry, ...]
-) -> Saved:
+def _saved(path: Path, reply: Reply, entries: tuple[ManifestEntry, ...]) -> Saved:
+    """What the headers say of a file; ValueError where they cannot be read."""
+    headers = reply.headers
     lines = f"[{headers.get('posefield-warning', '')}]".encode()
     return Saved(
         path,
-        size,
+        0,
         headers.get("posefield-model"),
         _number(headers.get("posefield-sigma")),
         _number(headers.get("posefield-duration")),

@@ -11,8 +11,14 @@ except ImportError:  # pragma: no cover
 
 
 def read(reply: Reply) -> Any:
-    """A pyarrow.Table of an answer; ImportError where pyarrow is not installed."""
+    """A pyarrow.Table of an answer; ImportError where pyarrow is not installed.
+
+    ValueError where it is none.
+    """
     if pyarrow is None:
         raise ImportError("tables need pyarrow: pip install posefield-client[arrow]")
-    with pyarrow.ipc.open_stream(reply.content) as reader:
-        return reader.read_all()
+    try:
+        with pyarrow.ipc.open_stream(reply.content) as reader:
+            return reader.read_all()
+    except (pyarrow.ArrowException, OSError) as fault:
+        raise ValueError(f"no Arrow stream, or one that breaks off: {fault}") from fault

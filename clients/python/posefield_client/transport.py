@@ -1,5 +1,7 @@
 """What both kinds of client share of HTTP: addresses, headers, and what httpx's errors mean."""
 
+import gzip
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -15,10 +17,12 @@ from posefield_client.errors import (
     IncompleteAnswer,
     PosefieldError,
     TimedOut,
+    Unexpected,
     Unreachable,
     WrongQuestion,
 )
 from posefield_client.exchange import Core, expect, named
+from posefield_client.generated import CONTRACT
 from posefield_client.retry import Retry
 from posefield_client.wire import Reply, Send
 
@@ -39,6 +43,9 @@ class Place:
         headers = self.headers
         if send.tag is not None:
             headers = {**headers, "If-None-Match": send.tag}
+        if send.sink is not None:
+            # A file is taken as it comes, so that its length says whether it is whole.
+            headers = {**headers, "Accept-Encoding": "identity"}
         if asked.body is not None:
             headers = {**headers, "Content-Type": "application/json"}
         return httpx.Request(
@@ -52,7 +59,7 @@ class Place:
 
 def place(base_url: str, key: str | None, timeout: float | httpx.Timeout) -> Place:
     """The service at an address; WrongQuestion where that is none."""
-    headers = {"User-Agent": AGENT, "Accept-Encoding": "gzip, deflate"}
+    headers = {"User-Agent": AGENT, "Accept-Encoding": "gzip"}
     if key is not None:
         headers["Authorization"] = f"Bearer {_printable(key)}"
     return Place(_address(base_url), headers, httpx.Timeout(timeout))
@@ -61,11 +68,13 @@ def place(base_url: str, key: str | None, timeout: float | httpx.Timeout) -> Pla
 def _address(base_url: str) -> str:
     try:
         found = httpx.URL(base_url)
-        whole = found.scheme in ("http", "https") and found.host and not found.query
-    except httpx.InvalidURL:
+        whole = found.scheme in ("http", "https") and found.host and not set("?#") & set(base_url)
+    except (httpx.InvalidURL, TypeError):
         whole = False
     if not whole:
-        raise WrongQuestion(f"address {base_url!r}, expected http:// or https:// and a host")
+        raise WrongQuestion(
+            f"address {base_url!r}, expected http:// or https://, a host, and neither ? nor #"
+        )
     return base_url.rstrip("/")
 
 
@@ -78,7 +87,7 @@ def _printable(key: str) -> str:
 
 def core(place: Place, retry: Retry, cache: Cache | Path | None) -> Core:
     """What decides for a client; cache None: a Memory of its own."""
-    scope = caches.scope(place.address, place.headers.get("Authorization", ""))
+    scope = caches.scope(CONTRACT, place.address, place.headers.get("Authorization", ""))
     kept = Disk(cache) if isinstance(cache, Path) else cache
     return Core(Memory() if kept is None else kept, retry, scope)
 
@@ -88,20 +97,48 @@ def begin(send: Send, response: httpx.Response) -> Callable[[bytes], None] | Non
     if send.sink is None or response.status_code != 200:
         return None
     expect(send.request.operation, response.headers.get("content-type", ""))
+    if (coding := _coding(response)) != "identity":
+        asked = named(send.request.operation)
+        raise Unexpected(f"{asked} was answered in {coding}, expected identity")
     length = response.headers.get("content-length", "")
-    plain = "content-encoding" not in response.headers
-    send.sink.begin(int(length) if plain and length.isdigit() else None)
+    send.sink.begin(int(length) if length.isdigit() else None)
     return send.sink.write
 
 
-def reply(send: Send, response: httpx.Response, content: bytes) -> Reply:
-    """The answer, which has come whole; IncompleteAnswer where nobody can know."""
+def _coding(response: httpx.Response) -> str:
+    said: str = response.headers.get("content-encoding", "identity")
+    return said.strip().lower()
+
+
+def reply(send: Send, response: httpx.Response, raw: bytes) -> Reply:
+    """The answer, whose bytes (raw) have come whole; IncompleteAnswer where nobody can know."""
     headers = response.headers
     endless = "content-length" not in headers and "transfer-encoding" not in headers
     if endless and response.status_code == 200:
         asked = named(send.request.operation)
         raise IncompleteAnswer(f"the answer to {asked} does not say where it ends")
-    return Reply(response.status_code, headers, content)
+    return Reply(response.status_code, headers, _decoded(send, _coding(response), raw))
+
+
+def _decoded(send: Send, coding: str, raw: bytes) -> bytes:
+    """What was coded; httpx would take what breaks off within its coding for whole."""
+    if not raw or coding == "identity":
+        return raw
+    asked = named(send.request.operation)
+    if coding != "gzip":
+        raise Unexpected(f"{asked} was answered in {coding}, expected gzip or identity")
+    try:
+        return gzip.decompress(raw)
+    except EOFError as found:
+        raise IncompleteAnswer(f"the answer to {asked} broke off: {found}") from found
+    except (OSError, zlib.error) as found:
+        raise Broken(f"the answer to {asked} is no gzip: {found}") from found
+
+
+def opened(http: httpx.Client | httpx.AsyncClient) -> None:
+    """WrongQuestion where the client was closed."""
+    if http.is_closed:
+        raise WrongQuestion("the client is closed")
 
 
 def fault(found: httpx.HTTPError, send: Send, began: bool) -> PosefieldError:

@@ -37,11 +37,13 @@ def serving(*answers: Sequence[Act] | bytes) -> Iterator[Scripted]:
         server = Scripted(f"http://127.0.0.1:{listener.getsockname()[1]}")
         thread = threading.Thread(target=_serve, args=(listener, server, answers), daemon=True)
         thread.start()
-        yield server
-        # Nothing ends an accept but a connection.
-        with suppress(OSError), socket.create_connection(listener.getsockname(), 1):
-            pass
-        thread.join(10)
+        try:
+            yield server
+        finally:
+            # Nothing ends an accept but a connection.
+            with suppress(OSError), socket.create_connection(listener.getsockname(), 1):
+                pass
+            thread.join(10)
 
 
 def _serve(listener, server, answers):

@@ -8,7 +8,7 @@ import time
 import pytest
 import scripted
 import serving
-from posefield_client import NEVER, NOTHING, Client, Disk, Memory
+from posefield_client import NEVER, NOTHING, Client, Disk, Memory, errors, questions, transport
 from posefield_client import cache as caches
 from posefield_client.cache import Kept
 from posefield_client.exchange import Copy
@@ -37,7 +37,7 @@ def cache(request, tmp_path):
     return Memory() if request.param == "memory" else Disk(tmp_path / "cache")
 
 
-def asked_twice(cache, *answers, key=None):
+def asked_twice(cache, *answers):
     """The counts that come of two questions, and the entity tags that were sent."""
     with scripted.serving(*answers) as server, Client(server.address, cache=cache) as client:
         found = [client.model("reach").why(turn=1).others.count for _ in range(2)]
@@ -88,6 +88,38 @@ def test_an_error_is_not_kept(cache):
             with pytest.raises(Exception, match="404"):
                 client.model("reach").why(turn=1)
             assert client.model("reach").why(turn=1).others.count == 7
+
+
+@pytest.mark.parametrize("wrong", [answer(b"{}", ETag=TAG), answer(b"x", "text/html", ETag=TAG)])
+def test_what_cannot_be_read_is_not_kept(cache, wrong):
+    wrong = wrong.replace(b"ETag", b"Cache-Control: max-age=60\r\nETag")
+    with scripted.serving(wrong, answer(b"{}"), answer(b"{}"), reasons(7)) as server:
+        with Client(server.address, cache=cache, retry=NEVER) as client:
+            with pytest.raises(errors.Unexpected):
+                client.model("reach").why(turn=1)
+            assert client.model("reach").why(turn=1).others.count == 7
+    assert [h.get("if-none-match") for _, h, _ in server.asked] == [None] * 4
+
+
+@pytest.mark.parametrize("until", [0.0, 2.0**40])
+def test_what_is_kept_and_cannot_be_read_is_asked_for_anew(cache, until):
+    with scripted.serving(reasons(7, IMMUTABLE)) as server:
+        with Client(server.address, cache=cache, retry=NEVER) as client:
+            target = questions.why("reach", turn=1).request.target
+            told = {"content-type": "application/json", "etag": TAG}
+            name = caches.name(client.core.scope, target)
+            cache.keep(name, Kept(told, b"{}", until))
+            found = [client.model("reach").why(turn=1).others.count for _ in range(2)]
+    assert found == [7, 7]
+    assert [h.get("if-none-match") for _, h, _ in server.asked] == [None]
+
+
+def test_what_another_contract_said_is_another_answer(monkeypatch):
+    place = transport.place("http://x", None, 1.0)
+    scope = transport.core(place, NEVER, NOTHING).scope
+    assert scope == transport.core(place, NEVER, NOTHING).scope
+    monkeypatch.setattr(transport, "CONTRACT", "9.9.9")
+    assert scope != transport.core(place, NEVER, NOTHING).scope
 
 
 def test_a_question_by_post_is_not_kept(cache):
@@ -158,24 +190,46 @@ def test_a_folder_that_cannot_be_written_warns_and_does_no_harm(tmp_path):
 @pytest.mark.parametrize("make", [Memory, lambda limit: None], ids=["memory", "disk"])
 def test_it_keeps_to_its_limit_and_what_was_used_last(make, tmp_path):
     cache = make(10_000) or Disk(tmp_path, 10_000)
-    for place in range(100):
-        cache.keep(f"{place:02}", Kept({}, bytes(500), 0.0))
-        assert cache.find("00") is not None or place == 0
+    names = [caches.name(b"", str(place)) for place in range(100)]
+    for place, name in enumerate(names):
+        cache.keep(name, Kept({}, bytes(500), 0.0))
+        assert cache.find(names[0]) is not None or place == 0
         time.sleep(0.002)
-    found = [place for place in range(100) if cache.find(f"{place:02}")]
+    found = [place for place, name in enumerate(names) if cache.find(name)]
     assert 0 in found
     assert 99 in found
     assert 5 < len(found) <= 20
 
 
 def test_what_a_killed_process_left_is_taken_away(tmp_path):
-    old, new = tmp_path / "a.1.part", tmp_path / "b.2.part"
+    name = caches.name(b"", "question")
+    old, new = tmp_path / f"{name}.{'0' * 12}.part", tmp_path / f"{name}.{'f' * 12}.part"
     for file in (old, new):
         file.write_bytes(b"half")
     os.utime(old, (0, 0))
-    Disk(tmp_path, 0).keep("name", Kept({}, b"content", 0.0))
+    Disk(tmp_path, 0).keep(name, Kept({}, b"content", 0.0))
     # Somebody may be writing the new one just now, however little may be kept.
     assert list(tmp_path.iterdir()) == [new]
+
+
+def test_files_of_others_in_the_folder_stay(tmp_path):
+    name = caches.name(b"", "question")
+    others = [tmp_path / called for called in ("thesis.txt", "half.part", f"{name}.txt", "a" * 39)]
+    for file in others:
+        file.write_bytes(b"mine")
+        os.utime(file, (0, 0))
+    Disk(tmp_path, 0).keep(name, Kept({}, b"content", 0.0))
+    assert sorted(tmp_path.iterdir()) == sorted(others)
+
+
+def test_what_cannot_be_marked_as_used_is_found_all_the_same(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise PermissionError("read-only")
+
+    cache = Disk(tmp_path)
+    cache.keep("name", Kept({}, b"content", 0.0))
+    monkeypatch.setattr(os, "utime", refuse)
+    assert cache.find("name") is not None
 
 
 def test_large_answers_are_not_kept(tmp_path, address, controls):
@@ -211,13 +265,13 @@ WRITERS = """
 import sys
 from pathlib import Path
 from posefield_client import Disk
-from posefield_client.cache import Kept
+from posefield_client.cache import Kept, name as called
 cache = Disk(Path(sys.argv[1]), 100_000)
 for turn in range(200):
-    name = str(turn % 40)
+    name = called(b"", str(turn % 40))
     found = cache.find(name)
-    assert found is None or found.content == name.encode() * 2000, name
-    cache.keep(name, Kept({}, name.encode() * 2000, 0.0))
+    assert found is None or found.content == name.encode() * 100, name
+    cache.keep(name, Kept({}, name.encode() * 100, 0.0))
 """
 
 

@@ -1,15 +1,17 @@
 """Every problem of the service is an error of its own class, and every fault of the network one."""
 
 import asyncio
+import gzip
 import json
 import pickle
 import re
 
 import httpx
+import msgspec
 import pytest
 import scripted
 import serving
-from posefield_client import NEVER, AsyncClient, Client, PosefieldError, Retry, errors
+from posefield_client import NEVER, AsyncClient, Client, PosefieldError, errors
 from posefield_client.errors import Problem, Unexpected
 from posefield_client.generated import CONTRACT
 from scripted import Pause, answer, chunked
@@ -21,7 +23,6 @@ from service.web.pages import problems as page
 from service.web.problems import KINDS
 
 LIST = b'{"models": []}'
-EAGER = Retry(first=0.001)
 
 
 def subclasses(kind):
@@ -145,7 +146,17 @@ def raised_at_the_door(address="http://127.0.0.1:1", **given):
 
 
 @pytest.mark.parametrize(
-    "address", ["localhost:8000", "", "ftp://x", "http://", "http://x:y", "http://x?a=b"]
+    "address",
+    [
+        "localhost:8000",
+        "",
+        "ftp://x",
+        "http://",
+        "http://x:y",
+        "http://x?a=b",
+        "http://x?",
+        "http://x/#y",
+    ],
 )
 def test_an_address_that_is_none(address):
     assert repr(address) in str(raised_at_the_door(address))
@@ -171,9 +182,12 @@ def test_nothing_that_is_http(said):
 @pytest.mark.parametrize("before", [b"", answer(LIST)[:-3]])
 def test_too_slow(before):
     slow = [before, Pause(1)]
-    with scripted.serving(slow, slow) as server:
-        assert type(raised(server.address, timeout=0.2)) is errors.TimedOut
-        assert type(raised_later(server.address, timeout=0.2)) is errors.TimedOut
+    # Each has a server of its own: the first one's still sleeps.
+    for ask in (raised, raised_later):
+        with scripted.serving(slow) as server:
+            fault = ask(server.address, timeout=0.2)
+        assert type(fault) is errors.TimedOut
+        assert len(server.asked) == 1
 
 
 @pytest.mark.parametrize(
@@ -226,6 +240,67 @@ def test_an_answer_of_another_version_says_of_which(said):
     assert str(fault) == str(later)
     assert f"speaks contract 9.1.0, this client was made for {CONTRACT}" in str(fault)
     assert [line for line in server.lines if line != "GET /v1/models"] == ["GET /livez"] * 2
+
+
+@pytest.mark.parametrize("status", errors.GATEWAYS)
+@pytest.mark.parametrize(
+    ("said", "kind"),
+    [
+        (b'{"title": "Busy"}', errors.Unreachable),
+        (json.dumps(page.example(KINDS[0]) | {"type": "about:blank"}).encode(), errors.Busy),
+    ],
+)
+def test_a_gateways_own_problem_is_asked_again(said, kind, status):
+    for media_type in (problems.MEDIA_TYPE, f"{problems.MEDIA_TYPE} ; charset=utf-8"):
+        with scripted.serving(answer(said, media_type, status, Retry_After="7")) as server:
+            fault = raised(server.address)
+        assert type(fault) is kind
+        assert fault.again
+        assert fault.retry_after == 7
+
+
+def test_what_cannot_be_read_says_why():
+    with scripted.serving(answer(b"[1,"), answer(b'{"contract": "9.1.0"}')) as server:
+        fault = raised(server.address)
+    assert isinstance(fault.__cause__, msgspec.DecodeError)
+
+
+@pytest.mark.parametrize("ask", [raised, raised_later])
+def test_a_coded_answer_that_was_cut_is_not_whole(ask):
+    whole = gzip.compress(LIST)
+    with scripted.serving(answer(whole[:-4], Content_Encoding="gzip")) as server:
+        assert type(ask(server.address)) is errors.IncompleteAnswer
+    with scripted.serving(answer(whole, Content_Encoding="gzip")) as server:
+        with Client(server.address) as client:
+            assert client.models() == ()
+
+
+def test_a_coding_that_was_not_asked_for():
+    with scripted.serving(
+        answer(LIST, Content_Encoding="br"), answer(b"{}"), answer(b"{}")
+    ) as server:
+        assert "in br, expected gzip" in str(raised(server.address))
+
+
+def test_a_client_that_was_closed():
+    def close(client):
+        client.close()
+        client.models()
+
+    async def close_later(client):
+        await client.close()
+        await client.models()
+
+    for fault in (raised("http://x", close), raised_later("http://x", close_later)):
+        assert type(fault) is errors.WrongQuestion
+        assert "closed" in str(fault)
+
+
+def test_notes_travel_between_processes():
+    version = answer(b'{"contract": "1.0.0"}')
+    with scripted.serving(refusal(problems.NO_SUCH_PATH), version) as server:
+        fault = raised(server.address)
+    assert pickle.loads(pickle.dumps(fault)).__notes__ == fault.__notes__
 
 
 def test_an_older_service_is_asked_for_its_document():

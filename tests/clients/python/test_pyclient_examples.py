@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
+import httpx
 import numpy as np
 import pytest
 from asking import listening
@@ -169,11 +170,55 @@ def test_it_is_asked_as_in_the_example_and_answered(name, ask, place, recorder, 
         monkeypatch.setattr(asking, "LONGEST", 0)
     request = read(name, "request")
     recorder.asked.clear()
-    assert ask(place, CALLS[name], request) is not None
+    found = ask(place, CALLS[name], request)
     (sent,) = recorder.asked
     assert alike(*sent) == alike(
         request["method"], request["path"], json.dumps(request.get("body", "")).encode()
     )
+
+    as_promised(name, request, found, place)
+
+
+def as_promised(name, request, found, place):
+    """What the client gives is the example's body, or for a file what the service sends."""
+    if isinstance(found, bytes):
+        sent = httpx.request(request["method"], place + request["path"], json=request.get("body"))
+        assert found == sent.content
+    elif name in SHOWN_BY_TABLES:
+        assert table_of(found) == SHOWN_BY_TABLES[name]
+    else:
+        # Of arrays the example of the same question in JSON says what is in them.
+        expected = read(name.replace("Msgpack", "Json"), "response")["body"]
+        whole = {"models": plain(found)} if name == "listModels" else plain(found)
+        assert contains(whole, expected)
+
+
+SHOWN_BY_TABLES = {"getClipMsgpack": (25.0, 13), "queryCrowdArrow": ["levels", 2]}
+
+
+def table_of(found):
+    """What is told of a clip's numbers, or of a table."""
+    if hasattr(found, "rate"):
+        return found.rate, len(found.times)
+    return ["levels" if "levels" in found.column_names else found.column_names, found.num_rows]
+
+
+def contains(whole, part):
+    """Whether `part` is an excerpt of `whole`: fewer keys, the same values."""
+    if isinstance(part, dict):
+        return all(key in whole and contains(whole[key], part[key]) for key in part)
+    if isinstance(part, list):
+        return len(whole) == len(part) and all(map(contains, whole, part))
+    return whole == part
+
+
+def test_another_answer_would_be_seen():
+    """Negative control of `contains`."""
+    whole = {"models": [{"name": "reach", "versions": []}]}
+    assert contains(whole, {"models": [{"name": "reach"}]})
+    assert not contains(whole, {"models": [{"name": "walk"}]})
+    assert not contains(whole, {"models": []})
+    assert not contains(whole, {"total": 1})
 
 
 def alike(method, target, body):
@@ -196,6 +241,8 @@ def plain(found):
     """As values that are equal or not."""
     if hasattr(found, "__struct_fields__"):
         return {name: plain(getattr(found, name)) for name in found.__struct_fields__}
+    if isinstance(found, tuple):
+        return [plain(each) for each in found]
     return found.tolist() if isinstance(found, np.ndarray) else found
 
 

@@ -15,6 +15,10 @@ from posefield_client.wire import Reply
 NOWHERE = Client("http://127.0.0.1:1")
 
 
+NAN = NamedClipQuestion(controls={}, end=float("nan"))
+AT_NAN = {"position": (0.0, float("nan"), 0.0), "fov": 1.0, "height": 10.0}
+
+
 def target(call):
     return call.request.target
 
@@ -44,6 +48,27 @@ def test_a_number_of_any_kind(one):
 def test_times_of_any_kind(many):
     shown = target(questions.pose("m", many, turn=np.int64(3)))
     assert shown.replace("0.0", "0").endswith("pose.msgpack?turn=3&time=0&time=0.5")
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(1e22, "1" + "0" * 22), (1e-7, "0.0000001"), (-2.5e-9, "-0.0000000025"), (0.1, "0.1")],
+)
+def test_no_number_has_an_exponent(value, said):
+    assert target(questions.pose("m", 0, turn=value)).endswith(f"?turn={said}&time=0")
+    seen = files.walk("m", camera=(value, 0, 0)).request("usda").target
+    assert seen.endswith(f"?camera={said}%2C0%2C0")
+
+
+def test_numbers_of_numpy_are_taken_everywhere():
+    clip = {"controls": {"a": np.float32(1)}, "fps": np.float32(30), "name": np.str_("x")}
+    body = msgspec.json.decode(files.clips("m", [clip], "glb").request("zip").body)
+    assert body["clips"] == [{"controls": {"a": 1}, "fps": 30, "name": "x"}]
+    camera = {"position": np.zeros(3), "fov": np.float32(1), "height": 10}
+    crowd = files.crowd("m", 0, performer=np.array(["p", "q"]), camera=camera)
+    body = msgspec.json.decode(crowd.request("npz").body)
+    assert body["performer"] == ["p", "q"]
+    assert body["camera"] == {"position": [0, 0, 0], "fov": 1, "height": 10}
 
 
 def test_a_long_question_goes_by_post():
@@ -86,6 +111,15 @@ def test_truths_are_said_as_the_contract_says_them():
         (lambda m: m.clips([{"controls": {}, "frames": 3}], "glb"), "clip 0: .*frames"),
         (lambda m: m.clips([{"controls": {"a": "x"}}], "glb"), "a is 'x'"),
         (lambda m: m.clip(a=1).content("fbx"), "format 'fbx'"),
+        (lambda m: m.clips([{"controls": {}, "end": float("nan")}], "glb"), "end is nan"),
+        (lambda m: m.clips([NAN], "glb").content("zip"), "end is nan"),
+        (lambda m: m.crowd(0, camera=AT_NAN).content("npz"), "position is nan"),
+        (lambda m: m.crowd(0, camera=Camera(**AT_NAN)).content("npz"), "position is nan"),
+        (lambda m: m.crowd([[0, 1], [2]], a=1), "time holds lists of several lengths"),
+        (lambda m: m.pose(np.zeros((2, 2)), a=1), "times has 2 axes"),
+        (lambda m: m.pose(0, a=10**400), "expected a finite number"),
+        (lambda m: m.crowd([0, 1], a=[10**400, 0]), "a holds"),
+        (lambda m: m.crowd(0, a=1, camera={"fov": {1}}), "fov is {1}"),
     ],
 )
 def test_what_cannot_be_asked_is_not(ask, said):
@@ -117,6 +151,47 @@ def test_an_array_that_is_none_is_refused(packed):
     whole = msgspec.msgpack.encode({**grid, "performer": None, **arrays})
     with pytest.raises((ValueError, TypeError)):
         numbers.grid(Reply(200, {}, whole))
+
+
+POSE = {
+    "trust": {
+        "model": "m",
+        "controls": {},
+        "performer": None,
+        "level": 0,
+        "sigma": 0.0,
+        "duration": 1.0,
+        "warnings": [],
+    },
+    "times": np.zeros(2, "f8"),
+    "rotations": np.zeros((2, 5, 4), "f4"),
+    "root_position": np.zeros((2, 3), "f4"),
+    "bone_offsets": np.zeros((5, 3), "f4"),
+}
+
+
+def packed(pose):
+    def map_of(found):
+        return {"dtype": found.dtype.str, "shape": found.shape, "data": found.tobytes()}
+
+    return Reply(200, {}, msgspec.msgpack.encode(pose, enc_hook=map_of))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"times": np.zeros(3)},
+        {"rotations": np.zeros((2, 5, 3), "f4")},
+        {"rotations": np.zeros((2, 4, 4), "f4")},
+        {"rotations": np.zeros((2, 5, 4), "i4")},
+        {"root_position": np.zeros((1, 2, 3), "f4")},
+        {"bone_offsets": np.zeros(15, "f4")},
+    ],
+)
+def test_arrays_that_do_not_fit_each_other_are_no_answer(wrong):
+    assert numbers.pose(packed(POSE)).rotations.shape == (2, 5, 4)
+    with pytest.raises(ValueError, match=r"has the shape|is of int32"):
+        numbers.pose(packed(POSE | wrong))
 
 
 def test_arrays_cannot_be_written_to(address, controls):

@@ -4,16 +4,18 @@ import re
 from pathlib import Path
 
 import pytest
+import serving
 from posefield_client import errors
 from posefield_client.errors import Problem
 from posefield_client.files import CLIP
 
-README = Path(__file__).parents[3] / "clients/python/README.md"
+ROOT = Path(__file__).parents[3]
+README = ROOT / "clients/python/README.md"
 ADDRESS = "http://localhost:8000"
 
 
-def examples():
-    return re.findall(r"^```python\n(.*?)^```", README.read_text(), re.DOTALL | re.MULTILINE)
+def examples(readme=README):
+    return re.findall(r"^```python\n(.*?)^```", readme.read_text(), re.DOTALL | re.MULTILINE)
 
 
 def test_every_example_runs(address, tmp_path, monkeypatch, capsys):
@@ -29,6 +31,19 @@ def test_every_example_runs(address, tmp_path, monkeypatch, capsys):
     assert "8 of 8 clips" in said
     assert "turn" in said
     assert "no answer" not in said
+
+
+def test_the_example_of_the_whole_projects_readme_runs(model_path, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = [e for e in examples(ROOT / "README.md") if "from posefield_client import" in e]
+    (example,) = given
+    assert "http://127.0.0.1:8000" in example
+    with serving.process(model_path) as child:
+        names = {}
+        told = example.replace("http://127.0.0.1:8000", serving.address(child))
+        exec(compile(told, "README.md", "exec"), names)
+        names["client"].close()
+    assert Path("reach.usdc").read_bytes().startswith(b"PXR-USDC")
 
 
 def test_an_example_that_fails_would_be_seen():

@@ -1,7 +1,9 @@
 """The real service goes away while it is asked, and comes back."""
 
-import socket
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import pytest
 import serving
@@ -10,9 +12,20 @@ from posefield_client import NEVER, Client, Retry, errors
 PATIENT = Retry(attempts=10_000, first=0.05, longest=0.05, patience=60.0)
 
 
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as held:
-        return str(held.getsockname()[1])
+@contextmanager
+def started(models, port="0", **environ):
+    """The service and its address; another may have taken the port meanwhile, and give it back."""
+    for _ in range(20):
+        with serving.process(models, POSEFIELD_PORT=port, **environ) as child:
+            if line := child.stdout.readline().decode():
+                yield child, line.split()[-1]
+                return
+        time.sleep(0.5)
+    raise AssertionError(f"port {port} stays taken")
+
+
+def port_of(address):
+    return address.rpartition(":")[2]
 
 
 def many(controls, count=200):
@@ -20,23 +33,23 @@ def many(controls, count=200):
 
 
 def test_whoever_waits_is_answered_by_the_next(models, controls):
-    port = free_port()
-    with serving.process(models, POSEFIELD_PORT=port) as first:
-        with Client(serving.address(first), retry=PATIENT) as client:
+    with started(models) as (first, address):
+        with Client(address, retry=PATIENT) as client:
             model = client.model("reach")
             before = model.pose(0.1, **controls)
             first.terminate()
             first.wait(20)
-            with serving.process(models, POSEFIELD_PORT=port):
+            with ThreadPoolExecutor(1) as other:
                 # Asked while the next one starts.
-                after = model.pose(0.2, **controls)
+                later = other.submit(model.pose, 0.2, **controls)
+                with started(models, port_of(address)):
+                    after = later.result()
     assert before.trust == after.trust
 
 
 def test_an_archive_that_is_cut_leaves_nothing_and_comes_whole_later(models, controls, tmp_path):
-    port = free_port()
-    with serving.process(models, POSEFIELD_PORT=port, POSEFIELD_WORKERS="1") as first:
-        address, once = serving.address(first), threading.Event()
+    with started(models, POSEFIELD_WORKERS="1") as (first, address):
+        once = threading.Event()
 
         def kill(progress):
             if not once.is_set():
@@ -49,7 +62,7 @@ def test_an_archive_that_is_cut_leaves_nothing_and_comes_whole_later(models, con
                 clips.save(tmp_path / "clips.zip", progress=kill)
         assert list(tmp_path.iterdir()) == []
         first.wait(20)
-    with serving.process(models, POSEFIELD_PORT=port):
+    with started(models, port_of(address)):
         with Client(address, retry=PATIENT) as client:
             clips = client.model("reach").clips(many(controls, 20), "usda")
             assert len(clips.save(tmp_path / "clips.zip").entries) == 20

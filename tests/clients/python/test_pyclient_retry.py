@@ -1,6 +1,8 @@
 """What is asked again, when, and when no more."""
 
 import asyncio
+import time
+from email.utils import formatdate
 
 import pytest
 import scripted
@@ -37,8 +39,13 @@ def test_the_service_is_not_asked_before_it_says():
     assert SURE.wait(1, busy(2.0), 0.0) == 3.0
 
 
-def test_not_at_all_where_it_wants_to_be_left_alone_for_long():
-    assert SURE.wait(1, busy(3.5), 0.0) is None
+def test_not_at_all_where_it_wants_to_be_left_alone_for_longer_than_patience():
+    assert SURE.wait(1, busy(3.5), 0.0) == 4.5
+    assert SURE.wait(1, busy(19.5), 0.0) is None
+
+
+def test_a_wait_is_the_longest_however_often_it_was_asked():
+    assert Retry(attempts=10**6, longest=3.0, chance=lambda: 1.0).wait(5000, busy(), 0.0) == 3.0
 
 
 def test_patience_ends():
@@ -125,6 +132,18 @@ def test_an_answer_that_was_cut_is_asked_for_again():
     assert waited(LIST[:-4], LIST) == ([1.0], 2)
 
 
-def test_a_date_is_passed_over():
-    told = answer(b"", "text/plain", 503, Retry_After="Sat, 21 Nov 2026 20:00:00 GMT")
-    assert waited(told, LIST) == ([1.0], 2)
+@pytest.mark.parametrize(("date", "seconds"), [("20:00:05", 6.0), ("19:00:00", 1.0)])
+def test_a_date_is_held_against_the_services_own_clock(date, seconds):
+    when = "Sat, 21 Nov 2026 {} GMT".format
+    told = answer(b"", "text/plain", 503, Retry_After=when(date), Date=when("20:00:00"))
+    assert waited(told, LIST) == ([seconds], 2)
+
+
+def test_a_date_without_a_clock_is_held_against_ones_own():
+    said = {"retry-after": formatdate(time.time() + 100), "content-type": "text/plain"}
+    assert 90 < errors.of_answer(503, said, b"", "x").retry_after <= 100
+
+
+@pytest.mark.parametrize("said", ["soon", "-1", "1.5", "Sat, 99 Nov 2026"])
+def test_what_is_neither_seconds_nor_a_date_is_passed_over(said):
+    assert waited(answer(b"", "text/plain", 503, Retry_After=said), LIST) == ([1.0], 2)

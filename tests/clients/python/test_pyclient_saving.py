@@ -1,9 +1,11 @@
 """Files are whole or not there, whatever happens to the network, and say how far they are."""
 
 import asyncio
+import gzip
 import io
 import json
 from concurrent.futures import ThreadPoolExecutor
+from stat import S_IMODE
 
 import numpy as np
 import pytest
@@ -234,6 +236,102 @@ def test_an_archive_without_a_manifest_leaves_nothing(save, archive, controls, t
                 lambda model: model.clips([{"controls": controls}] * 3, "bvh"),
             )
     assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+def test_an_archive_that_is_not_whole_is_asked_for_again(save, archive, controls, tmp_path):
+    ending, content = archive
+    media_type = {"zip": "application/zip", "tar": "application/x-tar"}[ending]
+    cut = content[: content.index(b"manifest.jsonl") - (30 if ending == "zip" else 0)]
+    path = tmp_path / f"x.{ending}"
+    said = [chunked(cut, kind=media_type), chunked(content, kind=media_type)]
+    with scripted.serving(*said) as server:
+        ask = lambda model: model.clips([{"controls": controls}] * 3, "bvh")  # noqa: E731
+        saved = save(server.address, path, ask, EAGER)
+    assert path.read_bytes() == content
+    assert (len(saved.entries), len(server.asked)) == (3, 2)
+
+
+@BOTH
+def test_a_file_in_a_coding_that_was_not_asked_for_is_not_kept(save, tmp_path):
+    cut = gzip.compress(bytes(100_000))[:-20]
+    said = answer(cut, USDC, Content_Encoding="gzip"), answer(b"{}"), answer(b"{}")
+    with scripted.serving(*said) as server, pytest.raises(errors.Unexpected, match="in gzip"):
+        save(server.address, tmp_path / "clip.usdc")
+    assert server.asked[0][1]["accept-encoding"] == "identity"
+    assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+@pytest.mark.parametrize("said", [{"Posefield_Warning": '"half'}, {"Posefield_Sigma": "much"}])
+def test_headers_that_cannot_be_read_leave_nothing(said, save, tmp_path):
+    said = answer(b"whole", USDC, **said), answer(b"{}"), answer(b"{}")
+    with (
+        scripted.serving(*said) as server,
+        pytest.raises(errors.Unexpected, match="cannot be read"),
+    ):
+        save(server.address, tmp_path / "clip.usdc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_whoever_watches_may_raise_anything(tmp_path):
+    def stop(progress):
+        raise StopIteration
+
+    with scripted.serving(answer(b"whole", USDC)) as server, pytest.raises(StopIteration):
+        by_waiting(server.address, tmp_path / "clip.usdc", progress=stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def saved_over(path):
+    with scripted.serving(answer(b"whole", USDC)) as server:
+        by_waiting(server.address, path)
+    return server
+
+
+def test_a_file_keeps_its_permissions(tmp_path):
+    path = tmp_path / "clip.usdc"
+    path.touch(0o600)
+    saved_over(path)
+    assert S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_a_link_stays_one(tmp_path):
+    (tmp_path / "there").mkdir()
+    link, path = tmp_path / "clip.usdc", tmp_path / "there/other.usdc"
+    link.symlink_to(path)
+    saved_over(link)
+    assert link.is_symlink()
+    assert path.read_bytes() == b"whole"
+
+
+def test_a_long_name_is_one(tmp_path):
+    path = tmp_path / f"{'x' * 240}.usdc"
+    saved_over(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_is_no_file_and_nothing_is_asked(tmp_path):
+    path = tmp_path / "clip.usdc"
+    path.mkdir()
+    with scripted.serving() as server, pytest.raises(IsADirectoryError):
+        by_waiting(server.address, path)
+    assert server.asked == []
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("end", [0, 1, 100, -300])
+def test_a_table_that_breaks_off_is_no_answer(end, address, controls):
+    with Client(address) as client:
+        content = client.model("reach").crowd([0.1] * 5, **controls).content("arrow")
+    said = (
+        answer(content[:end], "application/vnd.apache.arrow.stream"),
+        answer(b"{}"),
+        answer(b"{}"),
+    )
+    with scripted.serving(*said) as server, Client(server.address, retry=NEVER) as client:
+        with pytest.raises(errors.Unexpected, match="cannot be read"):
+            client.model("reach").crowd(0, a=1).table()
 
 
 def test_a_crowd_that_walks_is_a_file(address, tmp_path):
