@@ -85,7 +85,7 @@ FACTS: dict[str, Any] = {
     "another model, no fit": _holds("33 bones, the clip 7 joints"),
     "another model: unchanged": _is(True),
     "another model: taken": _is(["stroll", False]),
-    "another model, live": _is([None, 0, False]),
+    "another model, live": _is([[None, 0, False]]),
     "another model, live: controls": _is(True),
     "unforeseen": _holds("an error in the add-on: AttributeError"),
     "unforeseen: afterwards": _is([]),

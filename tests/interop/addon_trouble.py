@@ -108,15 +108,13 @@ def another_model(model, performer):
     wait()
     asked = []
     part("live").stop()
-    part("live")._asking = part("without_blender.latest").Latest(asked.append)
+    part("live")._asking = part("without_blender.latest").Latest(lambda _: None)
+    part("live")._asking.ask = asked.append
     settings().model = "reaching"
-    end = time.monotonic() + PATIENCE
-    while part("live")._asking._asking or part("live")._asking._waiting:
-        if time.monotonic() > end:
-            raise TimeoutError("nothing was asked")
     part("live").stop()
     newest = asked[-1].question
-    facts["another model, live"] = [newest.performer, newest.level, newest.loop]
+    chosen = {(each.question.performer, each.question.level, each.question.loop) for each in asked}
+    facts["another model, live"] = [list(each) for each in chosen]
     facts["another model, live: controls"] = newest.controls == card().defaults
 
 
