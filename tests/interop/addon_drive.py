@@ -77,6 +77,8 @@ if __name__ == "__main__":
         addon_motion.walking(*given)
     addon_trouble.undone()
     addon_trouble.refused()
+    addon_trouble.another_model(*json.loads(walks)[0][:2])
+    addon_trouble.unforeseen()
     addon_trouble.losses(Path(result).with_suffix(".blend"))
     panel()
     scripted(readme)

@@ -139,7 +139,21 @@ def said(call, **told):
 
 
 def snapshot():
-    """All that an import would change."""
+    """All that an import would change, the panel's settings too."""
+    own = bpy.context.scene
+    sliders = getattr(own, "posefield_controls", None)
+    return made(), values(own.posefield), values(sliders) if sliders else {}
+
+
+def values(group):
+    """What a group of properties holds, by name; of what it points to, the name."""
+    found = {name: getattr(group, name) for name in group.bl_rna.properties.keys()}
+    del found["rna_type"]
+    return {name: getattr(value, "name", value) for name, value in found.items()}
+
+
+def made():
+    """What an import makes, and the times of the scene."""
     scene = bpy.context.scene
     keys = {}
     for action in bpy.data.actions:

@@ -13,6 +13,7 @@ from addon_stage import (
     edit,
     facts,
     left,
+    made,
     part,
     preferences,
     record,
@@ -27,13 +28,16 @@ from addon_stage import (
 ELSEWHERE = "http://203.0.113.1:8000"
 """An address that is nobody's."""
 
+NOBODY = "no service answers at"
+
 
 def undone():
     """An import is one step back, and what the sliders did since is none."""
     afresh("reaching")
-    before = snapshot()
+    before = made()
     slide(stature=1.7)
-    facts["not live: unchanged"] = snapshot() == before
+    facts["not live: unchanged"] = made() == before
+    before = snapshot()
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.posefield.import_clip("EXEC_DEFAULT", True)
     settings().live = True
@@ -81,6 +85,51 @@ def refused():
     facts["elsewhere"] = said(bpy.ops.posefield.refresh)
     preferences().address = "somewhere"
     facts["no address"] = said(bpy.ops.posefield.refresh)
+
+
+def another_model(model, performer):
+    """Of another model nothing is left where it is refused, and nothing taken along where not."""
+    afresh("reaching")
+    bpy.ops.posefield.import_clip()
+    bpy.context.view_layer.objects.active = settings().character
+    slide(stature=1.7)
+    before = snapshot()
+    facts["another model, refused"] = said(
+        bpy.ops.posefield.import_clip, model=model, controls='{"veer": 1e9}'
+    )
+    facts["another model, no fit"] = said(bpy.ops.posefield.import_clip, model=model, onto="ACTIVE")
+    facts["another model: unchanged"] = snapshot() == before
+    bpy.ops.posefield.import_clip(model=model)
+    facts["another model: taken"] = [settings().model, snapshot() == before]
+    record("another model", {"root": "in_place"})
+    afresh(model, performer=performer, level="1", loop=True)
+    bpy.ops.posefield.import_clip()
+    settings().live = True
+    wait()
+    asked = []
+    part("live").stop()
+    part("live")._asking = part("without_blender.latest").Latest(lambda _: None)
+    part("live")._asking.ask = asked.append
+    settings().model = "reaching"
+    part("live").stop()
+    newest = asked[-1].question
+    chosen = {(each.question.performer, each.question.level, each.question.loop) for each in asked}
+    facts["another model, live"] = [list(each) for each in chosen]
+    facts["another model, live: controls"] = newest.controls == card().defaults
+
+
+def unforeseen():
+    """An error of our own is shown, and the next question answered."""
+    afresh("reaching")
+    bpy.ops.posefield.import_clip()
+    settings().live = True
+    wait()
+    part("live")._asking.ask(None)
+    wait()
+    facts["unforeseen"] = list(part("session").current.said)
+    slide(stature=1.7)
+    wait()
+    facts["unforeseen: afterwards"] = list(part("session").current.said)
 
 
 def card():
@@ -147,10 +196,10 @@ def switched():
     settings().live = True
     slide(stature=1.7)
     settings().character.animation_data.action = bpy.data.actions.new("Own")
-    before = snapshot()
+    before = made()
     wait()
     facts["another action"] = list(part("session").current.said)
-    facts["another action: unchanged"] = snapshot() == before
+    facts["another action: unchanged"] = made() == before
 
 
 def stopped(pid):
@@ -159,15 +208,17 @@ def stopped(pid):
     settings().live = True
     os.kill(pid, signal.SIGTERM)
     end = time.monotonic() + PATIENCE
-    while not said(bpy.ops.posefield.refresh) and time.monotonic() < end:
+    while NOBODY not in said(bpy.ops.posefield.refresh) and time.monotonic() < end:
         time.sleep(0.1)
     before = snapshot()
     facts["stopped"] = said(bpy.ops.posefield.import_clip)
+    facts["stopped: unchanged"] = snapshot() == before
+    before = made()
     slide(stature=1.7)
     wait()
     facts["stopped, live"] = list(part("session").current.said)
     facts["stopped: drawn"] = drawn()
-    facts["stopped: unchanged"] = snapshot() == before
+    facts["stopped, live: unchanged"] = made() == before
 
 
 def switched_off():

@@ -16,7 +16,10 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by Blender when it is switched off: no timer, handler or thread is left."""
+    """Called by Blender when it is switched off: no timer or handler is left.
+
+    A thread that still asks ends with its answer, which is dropped, or at the timeout.
+    """
     handlers.unregister()
     live.stop()
     sliders.remove()

@@ -1,5 +1,6 @@
 """The imported clip follows the sliders: asked in a thread, applied by a timer in Blender's own."""
 
+import traceback
 from dataclasses import dataclass
 
 import bpy
@@ -84,7 +85,8 @@ def _take(found) -> None:
     if isinstance(found, faults.Fault):
         session.current.tell(str(found), failed=True)
     elif isinstance(found, Exception):
-        raise found
+        session.current.tell(f"an error in the add-on: {found!r}", failed=True)
+        traceback.print_exception(found)
     else:
         _apply(*found)
     _redraw()

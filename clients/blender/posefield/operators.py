@@ -1,14 +1,17 @@
 """What the panel's buttons do, and scripts: `bpy.ops.posefield`."""
 
 import json
+import math
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from . import action, placing, preferences, questions, rig, session, sliders
+from .questions import Picked
 from .without_blender import bones, cards, clips, faults
 from .without_blender.cards import Card
 from .without_blender.clips import Clip
+from .without_blender.service import Service
 
 FINISHED, CANCELLED = {"FINISHED"}, {"CANCELLED"}
 
@@ -88,14 +91,19 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         """Ask first, then look whether the clip fits, and only then change anything."""
         try:
             armature = self._armature(context)
-            self._pick(context)
-            question = questions.question(context.scene, others := self._controls(context.scene))
-            clip = clips.ask(preferences.service(context), question)
-            said = self._put(context, armature, clip, question.loop)
+            asked = preferences.service(context).in_all()
+            picked = self._picked(asked, context.scene)
+            others = self._controls(picked.card)
+            question = questions.question_of(context.scene, picked, others)
+            clip = clips.ask(asked, question)
+            _check(armature, clip)
         except faults.Fault as fault:
             return _ended(self, [str(fault)], "ERROR")
+        if picked.card is not session.current.card:
+            questions.take(context.scene, picked)
+        said = self._put(context, armature, clip, question.loop)
         session.current.clip = clip
-        sliders.put(context.scene, questions.card_of(context.scene), others)
+        sliders.put(context.scene, picked.card, others)
         return _ended(self, said)
 
     def _armature(self, context):
@@ -110,15 +118,13 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             raise faults.Mismatch(f"{found.name} is being edited: leave edit mode first")
         return found
 
-    def _pick(self, context) -> None:
-        scene = context.scene
-        if self.model and self.model != scene.posefield.model_name:
-            asked = preferences.service(context)
-            questions.take(scene, self.model, cards.get(asked, self.model))
-        elif session.current.card is None:
-            questions.refresh(context, scene)
+    def _picked(self, asked: Service, scene) -> Picked:
+        known, name = session.current.card is not None, scene.posefield.model_name
+        if self.model and not (known and self.model == name):
+            return Picked(self.model, cards.get(asked, self.model))
+        return Picked(name, questions.card_of(scene)) if known else questions.found(asked, scene)
 
-    def _controls(self, scene) -> dict[str, float]:
+    def _controls(self, card: Card) -> dict[str, float]:
         try:
             given = {
                 name: float(value) for name, value in json.loads(self.controls or "{}").items()
@@ -127,7 +133,9 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             raise faults.Fault(
                 f"controls are {self.controls!r}, expected numbers by name"
             ) from fault
-        known = [control.name for control in questions.card_of(scene).controls]
+        if not all(map(math.isfinite, given.values())):
+            raise faults.Fault(f"controls are {self.controls!r}, expected finite numbers")
+        known = [control.name for control in card.controls]
         unknown = sorted(set(given) - set(known))
         if unknown:
             raise faults.Fault(f"no control is named {unknown[0]}; there are {', '.join(known)}")
@@ -139,7 +147,6 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         if armature is None:
             armature = rig.make(context, card, clip)
         else:
-            rig.check(armature, clip)
             keep_lengths = self.lengths == "ARMATURE"
             said = bones.differences(clip, rig.rest(armature, clip)) if keep_lengths else []
             said += rig.settle(armature)
@@ -149,6 +156,13 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         placing.put(scene, armature, clip, keep_lengths, loop)
         scene.posefield.character = armature
         return [_summary(card, armature, clip), *said, *placing.unrepeated(clip, loop)]
+
+
+def _check(armature, clip: Clip) -> None:
+    if armature is None:
+        bones.check_names(clip)
+    else:
+        rig.check(armature, clip)
 
 
 def _summary(card: Card, armature, clip: Clip) -> str:

@@ -24,7 +24,7 @@ class PosefieldPreferences(bpy.types.AddonPreferences):
     )
     seconds: FloatProperty(
         name="Timeout",
-        description="How long an answer may take, s; Blender waits that long at most",
+        description="How long answers may take, s; an import waits that long for all together",
         default=5.0,
         min=0.1,
         soft_max=60.0,

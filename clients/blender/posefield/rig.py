@@ -13,8 +13,7 @@ EVEN = 1e-4
 
 
 def make(context, card: Card, clip: Clip):
-    """A new armature in the active collection, whose bones are as long as the clip's."""
-    bones.check_names(clip)
+    """A new armature for a checked clip in the active collection, with bones of its lengths."""
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     armature = bpy.data.objects.new(card.name, bpy.data.armatures.new(card.name))

@@ -29,7 +29,7 @@ def remove() -> None:
 
 def reset(scene, card: Card) -> None:
     """Every slider to its control's default."""
-    put(scene, card, {control.name: control.default for control in card.controls})
+    put(scene, card, card.defaults)
 
 
 def put(scene, card: Card, values: dict[str, float]) -> None:

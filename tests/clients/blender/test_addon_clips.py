@@ -9,6 +9,7 @@ from without_blender import cards, clips, faults
 from without_blender.cards import Control
 
 UNITS = {"length": "metre", "up": "Y"}
+TRUST = {"model": "reach@0123", "controls": {"turn": 20.0}, "sigma": 0.017}
 
 
 def plain(**other):
@@ -18,7 +19,7 @@ def plain(**other):
         "parents": np.array([-1, 0], dtype=np.int32),
         "rate": np.array(30.0),
         "units": np.array(json.dumps(UNITS)),
-        "trust": np.array(json.dumps({"sigma": 0.017})),
+        "trust": np.array(json.dumps(TRUST)),
         "rotations": np.tile(np.array([1, 0, 0, 0], dtype=np.float32), (3, 2, 1)),
         "root_position": np.array([(1, 2, 3)] * 3, dtype=np.float32),
         "bone_offsets": np.array([(0, 0, 0), (0, 0.5, 0.1)], dtype=np.float32),
@@ -57,6 +58,15 @@ def test_neighbouring_quaternions_lie_close():
         ({"bone_offsets": np.zeros((3, 3))}, "arrays of shapes"),
         ({"names": np.array(["Hips"])}, "arrays of shapes"),
         ({"parents": np.array([-1], dtype=np.int32)}, "zip"),
+        ({"rate": np.array(0.0)}, "0 frames a second, expected more"),
+        ({"rate": np.array(np.nan)}, "nan frames a second, expected more"),
+        *(
+            ({"trust": np.array(json.dumps({k: TRUST[k] for k in TRUST if k != lacking}))}, lacking)
+            for lacking in TRUST
+        ),
+        ({"trust": np.array(json.dumps(TRUST | {"sigma": np.inf}))}, "finite sigma"),
+        ({"trust": np.array(json.dumps(TRUST | {"controls": None}))}, "its controls"),
+        ({"trust": np.array("[]")}, "cannot be read"),
         ({"names": np.array([object(), 1], dtype=object)}, "allow_pickle"),
     ],
 )

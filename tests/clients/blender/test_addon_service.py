@@ -2,6 +2,7 @@
 
 import json
 import socket
+import time
 
 import pytest
 from misbehaving import answer
@@ -28,10 +29,22 @@ def test_a_path_before_the_service_is_kept(scripted):
     assert server.requests[0].startswith(b"GET /motion/livez ")
 
 
-@pytest.mark.parametrize("address", ["", "somewhere", "ftp://host", "http://", "http://[::1"])
+@pytest.mark.parametrize(
+    "address",
+    [
+        *("", "somewhere", "ftp://host", "http://", "http://[::1", "http://host:x"),
+        *("http://127.0.0.1:8123/ü", "http://host/?a=1", "http://host/#a"),
+    ],
+)
 def test_what_is_no_address_is_refused(address):
     with pytest.raises(faults.BadAddress, match="the address is"):
         Service(address)
+
+
+@pytest.mark.parametrize("host", [".x", "x" * 64])
+def test_a_name_that_no_machine_can_have_is_no_address(host):
+    with pytest.raises(faults.BadAddress, match="the address is"):
+        service.fetch(Service(f"http://{host}"), "/livez")
 
 
 @pytest.mark.parametrize("key", ["a\nX-More: 1", "schlüssel"])
@@ -48,6 +61,8 @@ def test_a_key_that_cannot_be_one_is_refused(key):
         ("http://[::1]:8000", True, True),
         ("http://192.168.1.2", False, False),
         ("https://motion.example", False, True),
+        (" HTTPS://motion.example", False, True),
+        ("HTTP://motion.example", False, False),
     ],
 )
 def test_it_knows_what_runs_here_and_what_others_could_read(address, here, secret):
@@ -91,13 +106,28 @@ def test_nobody_listens():
     [
         [b""] * 40,
         [b"HTTP/1.1 200 OK\r\nContent-Length: 4000\r\n\r\n", *[b"x"] * 40],
+        [b"HTTP/1.1 200 OK\r\n", *[b"X-More: 1\r\n"] * 40, b"Content-Length: 0\r\n\r\n"],
+        [b"HTTP/1.1 404 Not Found\r\nContent-Length: 4000\r\n\r\n", *[b"x"] * 40],
     ],
-    ids=["never begins", "drop by drop"],
+    ids=["never begins", "drop by drop", "slow head", "slow refusal"],
 )
 def test_a_slow_answer_ends_in_time(scripted, pieces):
-    server = scripted(*pieces, pause=0.1)
+    server, begun = scripted(*pieces, pause=0.1), time.monotonic()
     with pytest.raises(faults.TimedOut, match=r"did not answer within 0\.4 s"):
         service.fetch(Service(server.address, seconds=0.4), "/livez")
+    assert time.monotonic() - begun < 2  # The server would go on for four.
+
+
+def test_several_answers_may_take_together_what_one_may(scripted):
+    said = answer(b'{"status": "live", "models": []}')
+    server = scripted(said[:20], said[20:], pause=0.5)
+    asked = Service(server.address, seconds=1.3)
+    assert service.models(asked) == ()
+    with pytest.raises(faults.TimedOut, match=r"did not answer within 1\.3 s"):
+        service.models(asked.in_all())
+    spent = Service(server.address, until=time.monotonic())
+    with pytest.raises(faults.TimedOut):
+        service.fetch(spent, "/livez")
 
 
 @pytest.mark.parametrize(
@@ -105,11 +135,13 @@ def test_a_slow_answer_ends_in_time(scripted, pieces):
     [
         b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\nonly this",
         b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n64\r\nonly this",
+        b"HTTP/1.1 200 OK\r\n\r\nonly this",
+        b"HTTP/1.1 200 OK\r\n",
     ],
-    ids=["by length", "in chunks"],
+    ids=["by length", "in chunks", "of no length", "in its head"],
 )
 def test_an_answer_that_breaks_off_is_none(scripted, sent):
-    with pytest.raises(faults.CutOff, match="broke off"):
+    with pytest.raises(faults.CutOff, match=r"broke off|does not say where it ends"):
         service.fetch(Service(scripted(sent).address), "/v1/models/reach/clip.npz", {})
 
 

@@ -76,6 +76,11 @@ class Card:
     performers: tuple[str, ...]
     errors: tuple[float, ...]
 
+    @property
+    def defaults(self) -> dict[str, float]:
+        """Of each control by name."""
+        return {control.name: control.default for control in self.controls}
+
     def warnings(self, values: dict[str, float]) -> list[str]:
         """A sentence for each control outside what was sampled."""
         return [

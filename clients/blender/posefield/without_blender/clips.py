@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import zipfile
 from dataclasses import dataclass, field
 from typing import Any
@@ -99,14 +100,16 @@ def _clip(found: Any) -> Clip:
     rotations = np.asarray(found["rotations"], dtype=float)
     path = np.asarray(found["root_position"], dtype=float)
     offsets = np.asarray(found["bone_offsets"], dtype=float)
+    rate, trust = float(found["rate"]), json.loads(str(found["trust"]))
     _check(json.loads(str(found["units"])), names, (rotations, path, offsets))
+    _check_said(rate, trust)
     return Clip(
         parents=parents_by_name(names, found["parents"].tolist()),
         rotations=axes.unrolled(axes.z_up_turns(rotations)),
         path=axes.z_up(path),
         offsets=axes.z_up(offsets),
-        rate=float(found["rate"]),
-        trust=json.loads(str(found["trust"])),
+        rate=rate,
+        trust=trust,
     )
 
 
@@ -124,3 +127,11 @@ def _check(units: dict[str, str], names: list[str], arrays: tuple[Floats, Floats
     furthest = np.abs(np.linalg.norm(rotations, axis=-1) - 1).max()
     if furthest > UNIT:
         raise ValueError(f"a quaternion whose length is {furthest:.2g} off one")
+
+
+def _check_said(rate: float, trust: dict[str, Any]) -> None:
+    if not (math.isfinite(rate) and rate > 0):
+        raise ValueError(f"{rate:g} frames a second, expected more than 0")
+    known = isinstance(trust["model"], str) and isinstance(trust["controls"], dict)
+    if not (known and math.isfinite(trust["sigma"])):
+        raise ValueError(f"trust is {trust}, expected a model, its controls and a finite sigma")

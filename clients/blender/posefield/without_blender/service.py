@@ -3,15 +3,16 @@
 import http.client
 import ipaddress
 import json
+import math
 import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from . import faults
+from . import faults, timely
 
 CONTRACT = "2"
 """Major version of the interface that this add-on speaks."""
@@ -27,16 +28,19 @@ class Service:
     """Where a service is and who asks it.
 
     address: http or https, without a path or with the one that it is mounted at. key: sent as
-    bearer, where there is one. seconds: that an answer may take. Raises BadAddress.
+    bearer, where there is one. seconds: that an answer may take. until: the moment of
+    time.monotonic() by which every answer must be there. Raises BadAddress.
     """
 
     address: str
     key: str = ""
     seconds: float = 5.0
+    until: float = math.inf
 
     def __post_init__(self) -> None:
         parts = _parts(self.address)
-        if parts.scheme not in ("http", "https") or not parts.hostname:
+        known = parts.scheme in ("http", "https") and parts.hostname and self.address.isascii()
+        if not known or parts.query or parts.fragment:
             raise faults.BadAddress(
                 f"the address is {self.address!r}, expected one like http://127.0.0.1:8000"
             )
@@ -57,7 +61,11 @@ class Service:
     @property
     def is_secret(self) -> bool:
         """Whether nobody on the way can read what is asked, the key for one."""
-        return self.is_here or self.address.startswith("https:")
+        return self.is_here or _parts(self.address).scheme == "https"
+
+    def in_all(self) -> "Service":
+        """The same, from now on: all answers together may take what one may."""
+        return replace(self, until=time.monotonic() + self.seconds)
 
 
 def check_version(service: Service) -> None:
@@ -90,14 +98,15 @@ def path_of(model: str) -> str:
 def fetch(service: Service, path: str, body: Mapping[str, Any] | None = None) -> bytes:
     """A whole answer to a GET, or where there is a body to a POST of it as JSON.
 
-    Raises Unreachable, TimedOut, CutOff, or Refused as the service says.
+    Raises BadAddress, Unreachable, TimedOut, CutOff, or Refused as the service says.
     """
-    until = time.monotonic() + service.seconds
+    request, begun = _request(service, path, body), time.monotonic()
+    until = min(service.until, begun + service.seconds)
+    if until <= begun:
+        raise _slow(service)
     try:
-        with _opener(service).open(
-            _request(service, path, body), timeout=service.seconds
-        ) as answer:
-            return _whole(answer, until, service)
+        with _opener(service, until).open(request, timeout=until - begun) as answer:
+            return _whole(answer, service)
     except urllib.error.HTTPError as refusal:
         with refusal:
             raise _refused(refusal, service) from None
@@ -107,6 +116,9 @@ def fetch(service: Service, path: str, body: Mapping[str, Any] | None = None) ->
         raise faults.CutOff(f"the answer of {service.address} broke off") from fault
     except (OSError, http.client.HTTPException) as fault:
         raise _unreachable(service, fault) from fault
+    except ValueError as fault:
+        # Names that no machine can have, such as labels of more than 63 letters.
+        raise faults.BadAddress(f"the address is {service.address!r}: {fault}") from fault
 
 
 class _Stay(urllib.request.HTTPRedirectHandler):
@@ -116,10 +128,10 @@ class _Stay(urllib.request.HTTPRedirectHandler):
         return None
 
 
-def _opener(service: Service) -> urllib.request.OpenerDirector:
+def _opener(service: Service, until: float) -> urllib.request.OpenerDirector:
     """Whoever is told of a proxy by the environment need not except this machine from it."""
     proxies = urllib.request.ProxyHandler({} if service.is_here else None)
-    return urllib.request.build_opener(_Stay, proxies)
+    return timely.opener(until, _Stay, proxies)
 
 
 def _request(service: Service, path: str, body: Mapping[str, Any] | None) -> urllib.request.Request:
@@ -134,17 +146,17 @@ def _request(service: Service, path: str, body: Mapping[str, Any] | None) -> url
     return urllib.request.Request(address + path, data, headers)
 
 
-def _whole(answer: Any, until: float, service: Service) -> bytes:
+def _whole(answer: http.client.HTTPResponse, service: Service) -> bytes:
     """All bytes of an answer; http.client does not tell by itself when some are missing."""
-    expected = answer.headers.get("Content-Length")
+    expected = answer.length
+    if expected is None and not answer.chunked:
+        raise faults.CutOff(f"the answer of {service.address} does not say where it ends")
     content = bytearray()
     while piece := answer.read1(PIECE):
         content += piece
         if len(content) > LARGEST:
             raise faults.Unintelligible(f"an answer of more than {LARGEST} bytes: not read on")
-        if time.monotonic() > until:
-            raise _slow(service)
-    if expected is not None and len(content) != int(expected):
+    if expected is not None and len(content) != expected:
         raise faults.CutOff(
             f"the answer of {service.address} broke off after {len(content)} of {expected} bytes"
         )
@@ -158,6 +170,8 @@ def _refused(refusal: urllib.error.HTTPError, service: Service) -> faults.Fault:
         )
     try:
         return faults.of_problem(refusal.code, refusal.read(PIECE))
+    except TimeoutError:
+        return _slow(service)
     except (OSError, http.client.HTTPException):
         return faults.of_problem(refusal.code, b"")
 
@@ -184,6 +198,8 @@ def _object(content: bytes, service: Service) -> dict[str, Any]:
 
 def _parts(address: str) -> urllib.parse.SplitResult:
     try:
-        return urllib.parse.urlsplit(address.strip())
+        parts = urllib.parse.urlsplit(address.strip())
+        _ = parts.port  # Looked at for what it raises.
+        return parts
     except ValueError as fault:
         raise faults.BadAddress(f"the address is {address!r}: {fault}") from fault
