@@ -32,6 +32,11 @@ export class Ghost {
     this.lines.material.color.set(property("--ink", "#222"));
   }
 
+  dispose(): void {
+    this.lines.geometry.dispose();
+    this.lines.material.dispose();
+  }
+
   place({ positions }: Placed, shift: Vector3): void {
     if (!this.lines.visible) return;
     this.lines.position.copy(shift);

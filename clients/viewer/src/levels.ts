@@ -5,6 +5,7 @@ import {
   Color,
   Group,
   InstancedMesh,
+  type LatheGeometry,
   MeshStandardMaterial,
   type PerspectiveCamera,
   Vector3,
@@ -33,7 +34,7 @@ export const mount: Mount = (host, page) => new Levels(host, page).begin();
 
 /** One level's character, and where its joints are now. */
 interface Figure {
-  readonly mesh: InstancedMesh;
+  readonly mesh: InstancedMesh<LatheGeometry, MeshStandardMaterial>;
   readonly ghost: Ghost;
   readonly joints: Placed;
   readonly note: Note;
@@ -80,7 +81,12 @@ class Levels {
       if (this.#group.visible) scene.camera.clearViewOffset();
       this.#host.remove();
       this.#group.removeFromParent();
-      for (const { mesh } of this.#figures) mesh.dispose();
+      for (const { mesh, ghost } of this.#figures) {
+        mesh.dispose();
+        mesh.geometry.dispose();
+        mesh.material.dispose();
+        ghost.dispose();
+      }
     });
     onTheme(() => this.#paint(), signal);
     this.#paint();
@@ -100,7 +106,7 @@ class Levels {
 
   #paint(): void {
     this.#figures.forEach(({ mesh, ghost }, level) => {
-      (mesh.material as MeshStandardMaterial).color = new Color(levelColour(level));
+      mesh.material.color = new Color(levelColour(level));
       ghost.paint();
     });
     this.#page.scene.redraw();

@@ -175,7 +175,7 @@ class Map2 {
       const grid = await source.sigma(this.#state.model || card.name, question, signal);
       if (key === this.#asked) this.#show(grid);
     } catch (fault) {
-      this.#asked = "";
+      if (key === this.#asked) this.#asked = "";
       if (!signal.aborted) notice(fault);
     }
   }

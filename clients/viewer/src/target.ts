@@ -71,7 +71,11 @@ class Target {
     signal.addEventListener("abort", () => {
       leave();
       stop();
+      // Who drags while the model is replaced has let go of it.
+      scene.orbit.enabled = true;
       this.#gizmo.dispose();
+      this.#ball.geometry.dispose();
+      this.#ball.material.dispose();
       this.#gizmo.getHelper().removeFromParent();
       this.#handle.removeFromParent();
     });
