@@ -4,7 +4,6 @@ import type { ModelCard, SigmaGrid } from "@posefield/client";
 
 import { type Control, extent } from "./chart.ts";
 import { viridis } from "./colours.ts";
-import { leftOut } from "./examples.ts";
 import { centimetres, element, figure } from "./markup.ts";
 
 interface Legend {
@@ -37,7 +36,7 @@ function fill(numbers: HTMLElement, rings: HTMLElement, grid: SigmaGrid, card: M
     element("span", {}, `sigma ${middle}`),
     element("span", {}, `${most} cm and more`),
   );
-  const worst = Math.max(0, ...leftOut(card));
+  const worst = Math.max(0, ...(card.left_out ?? []));
   const ring = worst
     ? `, a ring as wide as its error when left out, up to ${centimetres(worst)}`
     : "";

@@ -22,7 +22,7 @@ export function short(value: number, range: number): string {
   return Number(text) === 0 ? (0).toFixed(digits) : text;
 }
 
-/** A length in centimetres; millimetres where it is small. */
+/** A length in centimetres, with a digit after the point where that is worth reading. */
 export function centimetres(metres: number): string {
   const found = 100 * metres;
   return `${found.toFixed(Math.abs(found) < 10 ? 1 : 0)} cm`;
