@@ -13,7 +13,7 @@ import {
 } from "three";
 
 import "./crowd.css";
-import { levelColour, onTheme, property } from "./colours.ts";
+import { levelColour } from "./colours.ts";
 import { type Library, library } from "./crowd-library.ts";
 import { CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
@@ -23,6 +23,7 @@ import { understood } from "./faults.ts";
 import { SIZE } from "./rig.ts";
 import type { Session } from "./session.ts";
 import type { State } from "./state.ts";
+import * as theme from "./theme.ts";
 
 export const MOST = 1000;
 /** Metres between lines of the ground, and seconds between two readings of numbers. */
@@ -74,7 +75,7 @@ class CrowdView {
       this.#mesh?.dispose();
       this.#bare();
     });
-    onTheme(() => this.#paint(), signal);
+    theme.listen(() => this.#paint(), signal);
     this.#paint();
     this.#changed(store.state, new Set(["view"]));
   }
@@ -171,7 +172,7 @@ class CrowdView {
 
   #paint(): void {
     this.#mesh?.paint(this.#page.card.levels.map((_, level) => levelColour(level)));
-    this.#ground?.material.color.set(property("--line", "#c5c9d2"));
+    this.#ground?.material.color.set(theme.colour("--line"));
     this.#page.scene.redraw();
   }
 

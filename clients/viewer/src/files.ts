@@ -4,9 +4,10 @@ import { type Client, type ClipFormat, type ClipQuestion, PosefieldError } from 
 
 import "./files.css";
 import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
-import { chooser, element, figure, labelled } from "./markup.ts";
+import { chooser, el, labelled } from "./dom.ts";
 import { type Mount, type Page, served } from "./page.ts";
 import type { State } from "./state.ts";
+import { figure } from "./written.ts";
 
 const FORMATS = [
   ["usdc", "USD, binary (.usdc)"],
@@ -49,17 +50,17 @@ interface Choice {
 
 export const mount: Mount = (host, page) => {
   if (served(page.source)) new Files(host, page, page.source).begin();
-  else host.append(titled(element("p", { className: "files-said" }, NONE)));
+  else host.append(titled(el("p", { class: "files-said" }, NONE)));
 };
 
 const NONE =
   "Files, and texts that ask for them, need a service: this page runs without one, on the model file alone.";
 
 function titled(...content: readonly HTMLElement[]): HTMLElement {
-  return element(
+  return el(
     "section",
-    { className: "files", ariaLabel: "Files" },
-    element("h2", {}, "Take it away"),
+    { class: "files", "aria-label": "Files" },
+    el("h2", {}, "Take it away"),
     ...content,
   );
 }
@@ -68,9 +69,9 @@ class Files {
   readonly #page: Page;
   readonly #service: Pick<Client, "file">;
   readonly #choice: Choice;
-  readonly #get = element("button", { type: "button", className: "files-get" });
-  readonly #said = element("p", { className: "files-said" });
-  readonly #code = element("pre", { tabIndex: 0 });
+  readonly #get = el("button", { type: "button", class: "files-get" });
+  readonly #said = el("p", { class: "files-said" });
+  readonly #code = el("pre", { tabindex: 0 });
   readonly #shows: (() => void)[] = [];
   #asked: AbortController | null = null;
 
@@ -90,13 +91,13 @@ class Files {
     this.#said.setAttribute("role", "status");
     this.#code.setAttribute("aria-label", "Text to copy");
     const texts = (["curl", "python", "link"] as const).map((text) => this.#tab(text));
-    const copy = element("button", { type: "button" }, "Copy");
+    const copy = el("button", { type: "button" }, "Copy");
     copy.addEventListener("click", () => void this.#copy());
-    const kinds = element("div", { className: "files-kinds", role: "group" }, ...texts, copy);
+    const kinds = el("div", { class: "files-kinds", role: "group" }, ...texts, copy);
     kinds.setAttribute("aria-label", "Ask for it by");
     host.append(
       titled(
-        element("div", { className: "files-fields" }, ...this.#rows()),
+        el("div", { class: "files-fields" }, ...this.#rows()),
         this.#get,
         this.#said,
         kinds,
@@ -237,7 +238,7 @@ class Files {
   }
 
   #rate(): HTMLElement {
-    const field = element("input", { type: "number", min: "1", max: "1000", step: "any" });
+    const field = el("input", { type: "number", min: "1", max: "1000", step: "any" });
     const show = () => {
       field.value = String(this.#choice.fps);
     };
@@ -251,14 +252,14 @@ class Files {
   }
 
   #cycle(): HTMLElement {
-    const box = element("input", { type: "checkbox" });
+    const box = el("input", { type: "checkbox" });
     box.addEventListener("change", () => this.#take({ loop: box.checked }));
     return labelled("closed loop", box);
   }
 
   #tab(text: Text): HTMLButtonElement {
     const name = { curl: "curl", python: "Python", link: "Link" }[text];
-    const button = element("button", { type: "button" }, name);
+    const button = el("button", { type: "button" }, name);
     button.dataset["text"] = text;
     button.addEventListener("click", () => this.#take({ text }));
     return button;
@@ -321,7 +322,7 @@ const size = (bytes: number): string =>
 
 function save(name: string, content: Blob): void {
   const address = URL.createObjectURL(content);
-  const anchor = element("a", { href: address, download: name });
+  const anchor = el("a", { href: address, download: name });
   anchor.click();
   // The browser has read it by then.
   setTimeout(() => URL.revokeObjectURL(address), 60_000);

@@ -12,16 +12,17 @@ import {
 } from "three";
 
 import "./levels.css";
-import { levelColour, onTheme } from "./colours.ts";
+import { levelColour } from "./colours.ts";
 import { type Ladder, ladder, lens } from "./detail.ts";
+import { el } from "./dom.ts";
 import { Ghost } from "./ghost-lines.ts";
 import { Latest } from "./latest.ts";
 import { type Apart, Note } from "./level-notes.ts";
-import { element } from "./markup.ts";
 import type { Mount, Page } from "./page.ts";
 import { boneShape, Rig, SIZE } from "./rig.ts";
 import { type Placed, place, placed } from "./skeleton.ts";
 import type { State } from "./state.ts";
+import * as theme from "./theme.ts";
 
 /** Frames a second of the clips: what a screen shows. */
 const RATE = 60;
@@ -44,10 +45,10 @@ interface Figure {
 
 class Levels {
   readonly #page: Page;
-  readonly #host = element("section", {
-    className: "levels",
+  readonly #host = el("section", {
+    class: "levels",
     hidden: true,
-    ariaLabel: "Levels of detail",
+    "aria-label": "Levels of detail",
   });
   readonly #group = new Group();
   readonly #rig: Rig;
@@ -88,7 +89,7 @@ class Levels {
         ghost.dispose();
       }
     });
-    onTheme(() => this.#paint(), signal);
+    theme.listen(() => this.#paint(), signal);
     this.#paint();
     this.#show(store.state);
   }

@@ -4,13 +4,14 @@ import type { SigmaGrid } from "@posefield/client";
 
 import "./map.css";
 import { type Control, type Dot, draw, Frame, heat, MARGIN, rounded } from "./chart.ts";
-import { onTheme } from "./colours.ts";
+import { chooser, el, labelled } from "./dom.ts";
 import { clips, distance, mover, nearestTo, others } from "./examples.ts";
 import { Latest } from "./latest.ts";
 import { legend, said, table } from "./map-words.ts";
-import { centimetres, chooser, element, figure, labelled } from "./markup.ts";
 import type { Mount, Page } from "./page.ts";
 import type { State } from "./state.ts";
+import * as theme from "./theme.ts";
+import { figure, precise } from "./written.ts";
 
 const [COLUMNS, ROWS] = [48, 36];
 /** Milliseconds that other controls rest before the map is asked for anew. */
@@ -24,9 +25,7 @@ const CALM = 400;
 
 export const mount: Mount = (host, page) => {
   if (page.card.controls.length < 2) {
-    host.append(
-      element("p", { className: "map-none" }, "A map needs two controls; this model has one."),
-    );
+    host.append(el("p", { class: "map-none" }, "A map needs two controls; this model has one."));
     return;
   }
   new Map2(host, page).begin();
@@ -34,13 +33,13 @@ export const mount: Mount = (host, page) => {
 
 class Map2 {
   readonly #page: Page;
-  readonly #canvas = element("canvas", { tabIndex: 0, className: "map-canvas" });
-  readonly #tip = element("div", { className: "map-tip", hidden: true });
-  readonly #here = element("p", { className: "map-here" });
-  readonly #aloud = element("p", { className: "unseen" });
-  readonly #words = element("p", { className: "map-words", id: "map-words" });
+  readonly #canvas = el("canvas", { tabindex: 0, class: "map-canvas" });
+  readonly #tip = el("div", { class: "map-tip", hidden: true });
+  readonly #here = el("p", { class: "map-here" });
+  readonly #aloud = el("p", { class: "unseen" });
+  readonly #words = el("p", { class: "map-words", id: "map-words" });
   readonly #legend = legend();
-  readonly #table = element("table");
+  readonly #table = el("table");
   readonly #across: HTMLSelectElement;
   readonly #along: HTMLSelectElement;
   readonly #asking: Latest<string>;
@@ -60,19 +59,19 @@ class Map2 {
     const names = page.card.controls.map(({ name }) => [name, name] as const);
     this.#across = chooser(names, "", (value) => this.#take("across", value));
     this.#along = chooser(names, "", (value) => this.#take("along", value));
-    const axes = element(
+    const axes = el(
       "div",
-      { className: "map-axes" },
+      { class: "map-axes" },
       labelled("across", this.#across),
       labelled("up", this.#along),
     );
-    const tables = element("details", {}, element("summary", {}, "Sigma as a table"), this.#table);
-    const frame = element("div", { className: "map-frame" }, this.#canvas, this.#tip);
+    const tables = el("details", {}, el("summary", {}, "Sigma as a table"), this.#table);
+    const frame = el("div", { class: "map-frame" }, this.#canvas, this.#tip);
     host.append(
-      element(
+      el(
         "section",
-        { className: "map", ariaLabel: "Map of two controls" },
-        element("h2", {}, "Map"),
+        { class: "map", "aria-label": "Map of two controls" },
+        el("h2", {}, "Map"),
         axes,
         frame,
         this.#legend.host,
@@ -92,7 +91,7 @@ class Map2 {
     const { store, signal } = this.#page;
     const stop = store.listen((_, changed) => this.#changed(changed));
     signal.addEventListener("abort", stop);
-    onTheme(() => this.#redraw(), signal);
+    theme.listen(() => this.#redraw(), signal);
     const watch = new ResizeObserver(() => this.#redraw());
     watch.observe(this.#canvas);
     signal.addEventListener("abort", () => {
@@ -335,10 +334,10 @@ class Map2 {
     const dot = this.#dots[index]!;
     const left = this.#page.card.left_out?.[index];
     const lines = [this.#name(index)];
-    if (left !== undefined) lines.push(`left out: ${centimetres(left)} away`);
+    if (left !== undefined) lines.push(`left out: ${precise(left)} away`);
     const apart = distance(this.#page.card, this.#state.controls, index);
     if (apart > 0.02) lines.push(`other controls: ${figure(100 * apart)} % of a range away`);
-    this.#tip.replaceChildren(...lines.map((line) => element("div", {}, line)));
+    this.#tip.replaceChildren(...lines.map((line) => el("div", {}, line)));
     const [x, y] = [this.#frame.x(dot.at[0]), this.#frame.y(dot.at[1])];
     this.#tip.style.left = `${Math.min(x + 12, this.#canvas.clientWidth - 190)}px`;
     this.#tip.style.top = `${y + 12}px`;

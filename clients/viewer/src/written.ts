@@ -31,3 +31,15 @@ export function centimetres(metres: number): string {
 export function seconds(value: number): string {
   return `${value.toFixed(2)} s`;
 }
+
+const SHORT = new Intl.NumberFormat("en", { maximumSignificantDigits: 3, useGrouping: false });
+const WHOLE = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
+
+/** Three digits of a number. */
+export const figure = (value: number): string => SHORT.format(value).replace("-", "−");
+
+/** A whole number with its thousands apart. */
+export const whole = (value: number): string => WHOLE.format(value);
+
+/** A length in centimetres to three digits, where one is compared with others. */
+export const precise = (metres: number): string => `${figure(100 * metres)} cm`;
