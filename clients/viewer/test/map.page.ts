@@ -27,7 +27,7 @@ describe("the map", () => {
     await page.locator(".map").getByLabel("across", { exact: true }).selectOption("turn");
     await page.locator(".map").getByLabel("up", { exact: true }).selectOption("target_height");
     await page.locator(".map-words", { hasText: "Within" }).waitFor();
-    await settled(page, "turn");
+    await settled(page, "turn, rows: target_height");
   });
   after(() => from.close());
 
@@ -207,7 +207,7 @@ describe("the map", () => {
     await page.keyboard.press("ArrowDown");
     assert.equal(await across.inputValue(), before);
     await page.locator(".map").getByLabel("up", { exact: true }).selectOption("target_height");
-    await settled(page, "turn");
+    await settled(page, "turn, rows: target_height");
   });
 
   it("says aloud where one is once that rests", async () => {
