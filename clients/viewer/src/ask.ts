@@ -4,6 +4,7 @@ import {
   type CrowdPoses,
   type ModelCard,
   type Motion,
+  PosefieldError,
   type Poses,
   Problem,
 } from "@posefield/client";
@@ -48,9 +49,14 @@ export async function pose(
       ? await travelling(source, state, time, signal)
       : await inPlace(source, state, time, signal);
   } catch (fault) {
-    if (!(fault instanceof Problem && /^times?\b/.test(fault.detail))) throw fault;
+    if (!(fault instanceof PosefieldError && /^times?\b/.test(detail(fault)))) throw fault;
     return whole();
   }
+}
+
+/** What was found and what was expected: a service says before that what kind of fault it is. */
+function detail(fault: PosefieldError): string {
+  return fault instanceof Problem ? fault.detail : fault.message;
 }
 
 function travelling(source: Source, state: State, time: number, signal: AbortSignal) {

@@ -2,8 +2,9 @@
 
 import type { ModelCard, SigmaGrid } from "@posefield/client";
 
-import { property, viridis } from "./colours.ts";
-import { figure } from "./markup.ts";
+import { viridis } from "./colours.ts";
+import * as theme from "./theme.ts";
+import { figure } from "./written.ts";
 
 export type Control = ModelCard["controls"][number];
 
@@ -120,7 +121,7 @@ export function draw(pen: CanvasRenderingContext2D, it: Drawing): void {
   pen.save();
   pen.beginPath();
   pen.rect(frame.left, frame.top, frame.width, frame.height);
-  pen.fillStyle = property("--line", "#8884");
+  pen.fillStyle = theme.colour("--line");
   pen.fill();
   pen.clip();
   if (it.picture) stretch(pen, it.picture, frame);
@@ -215,7 +216,7 @@ function circle(pen: CanvasRenderingContext2D, x: number, y: number, radius: num
 }
 
 function axes(pen: CanvasRenderingContext2D, { frame, controls }: Drawing): void {
-  pen.fillStyle = property("--soft", "#667");
+  pen.fillStyle = theme.colour("--soft");
   pen.font = "11px system-ui, sans-serif";
   const [across, along] = controls;
   const below = frame.top + frame.height + 14;

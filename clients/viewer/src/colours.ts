@@ -1,24 +1,10 @@
 /** Colours of the page's own, for what is drawn and not written. */
 
-const LEVELS = ["#2f6fde", "#1f9d6b", "#d08a12", "#c8452f"] as const;
-
-/** A custom property of the page, or what stands for it where there is none. */
-export function property(name: string, otherwise: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim() || otherwise;
-}
+import * as theme from "./theme.ts";
 
 /** The colour of a level of detail; those beyond the fourth share its colour. */
 export function levelColour(level: number): string {
-  const place = Math.min(level, LEVELS.length - 1);
-  return property(`--level-${place}`, LEVELS[place]!);
-}
-
-/** Calls when the page turns dark or light, by the system's wish or by its own. */
-export function onTheme(changed: () => void, signal: AbortSignal): void {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed, { signal });
-  const watch = new MutationObserver(changed);
-  watch.observe(document.documentElement, { attributes: true });
-  signal.addEventListener("abort", () => watch.disconnect());
+  return theme.colour(`--level-${Math.min(level, 3)}`);
 }
 
 // Viridis (van der Walt and Smith, 2015): even steps look even, to the colour-blind too.

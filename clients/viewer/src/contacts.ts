@@ -1,6 +1,7 @@
 /** Feet on the ground: when and where, and how fast they slide there.
  *
- * As the service reckons it (service/motion/ground.py), so that both say the same number.
+ * As the service reckons it (service/motion/ground.py), of the clip that is shown: each foot's lowest
+ * is that of this clip, at its frames.
  */
 
 /** A foot within this of its lowest in the clip is on the ground, m. */
@@ -31,13 +32,6 @@ export function ground(tracks: readonly Float32Array[], rate: number): Ground {
     frames += last - first;
   }
   return { contacts, slide: frames ? (way * rate) / frames : 0 };
-}
-
-/** Whether that foot is on the ground in that frame. */
-export function planted(found: Ground, foot: number, frame: number): boolean {
-  return found.contacts.some(
-    (contact) => contact.foot === foot && contact.first <= frame && frame <= contact.last,
-  );
 }
 
 function stays(track: Float32Array, foot: number): Contact[] {

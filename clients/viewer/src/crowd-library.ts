@@ -2,6 +2,7 @@
 
 import type { CrowdPoses, CrowdQuestion, ModelCard } from "@posefield/client";
 
+import { mover } from "./examples.ts";
 import type { Source } from "./page.ts";
 import { Rig, SIZE } from "./rig.ts";
 import { place, placed } from "./skeleton.ts";
@@ -79,10 +80,7 @@ export async function library(
 }
 
 function rows(card: ModelCard): Row[] {
-  const all = card.examples.map((controls, i) => {
-    const who = card.moved_by[i];
-    return { controls, performer: who === undefined ? null : (card.performers[who] ?? null) };
-  });
+  const all = card.examples.map((controls, i) => ({ controls, performer: mover(card, i) }));
   return spread(all, TRIED);
 }
 

@@ -1,40 +1,36 @@
 /** What the crowd is asked to be, and what it costs: sliders, counts and times. */
 
-import { element, figure, labelled } from "./markup.ts";
+import { el, labelled } from "./dom.ts";
 import type { Page } from "./page.ts";
 import type { State } from "./state.ts";
+import { figure } from "./written.ts";
 
 const [FEWEST, MOST] = [50, 1000];
 /** Powers of two between which the limit in pixels lies. */
 const [SHARP, COARSE] = [-2, 4];
 
 export class Panel {
-  readonly #host = element("section", { className: "crowd", hidden: true, ariaLabel: "Crowd" });
-  readonly #said = element("p", { className: "crowd-said" });
-  readonly #time = element("p", { className: "crowd-time" });
-  readonly #seen = element("p", { className: "crowd-time" });
+  readonly #host = el("section", { class: "crowd", hidden: true, "aria-label": "Crowd" });
+  readonly #said = el("p", { class: "crowd-said" });
+  readonly #time = el("p", { class: "crowd-time" });
+  readonly #seen = el("p", { class: "crowd-time" });
   readonly #counts: readonly HTMLElement[];
 
   constructor(host: HTMLElement, page: Page) {
-    this.#counts = page.card.levels.map(() => element("b", {}, "–"));
+    this.#counts = page.card.levels.map(() => el("b", {}, "–"));
     const levels = page.card.levels.map((_, level) =>
-      element(
-        "li",
-        { className: `crowd-${Math.min(level, 3)}` },
-        `level ${level}`,
-        this.#counts[level]!,
-      ),
+      el("li", { class: `crowd-${Math.min(level, 3)}` }, `level ${level}`, this.#counts[level]!),
     );
     const walks = page.card.cyclic && page.card.root === "travelling";
     const what = walks
       ? "Everybody walks a straight or gently bent way, and comes back at the field's other side."
       : "This model does not walk: everybody stays, and goes through a captured clip's controls there and back.";
     this.#host.append(
-      element("h2", {}, "Crowd"),
-      element("p", { className: "crowd-said" }, what),
+      el("h2", {}, "Crowd"),
+      el("p", { class: "crowd-said" }, what),
       people(page),
       limit(page),
-      element("ul", {}, ...levels),
+      el("ul", {}, ...levels),
       this.#seen,
       this.#time,
       this.#said,
@@ -94,7 +90,7 @@ function slider(
   valued: (place: number) => number,
   placed: (value: number) => number,
 ): HTMLElement {
-  const input = element("input", { type: "range" });
+  const input = el("input", { type: "range" });
   Object.assign(input, {
     min: String(range.min),
     max: String(range.max),

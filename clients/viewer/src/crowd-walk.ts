@@ -27,7 +27,7 @@ export class Crowd {
   constructor(library: Library, count: number) {
     this.#library = library;
     this.count = count;
-    this.half = Math.sqrt(count * ROOM) / 2;
+    this.half = half(count);
     [this.x, this.z] = [new Float32Array(count), new Float32Array(count)];
     [this.heading, this.#phase] = [new Float32Array(count), new Float32Array(count)];
     this.#motion = new Uint16Array(count);
@@ -108,6 +108,11 @@ export class Crowd {
       out[part + 2] = cos * z - sin * x + (origin ? this.z[i]! : 0);
     }
   }
+}
+
+/** Half of the side, m, of the field of so many. */
+export function half(count: number): number {
+  return Math.sqrt(count * ROOM) / 2;
 }
 
 /** Even numbers from 0 to 1 of a seed (mulberry32). */

@@ -13,15 +13,17 @@ import {
 } from "three";
 
 import "./crowd.css";
-import { levelColour, onTheme, property } from "./colours.ts";
+import { levelColour } from "./colours.ts";
 import { type Library, library } from "./crowd-library.ts";
 import { CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
-import { Crowd, REACH } from "./crowd-walk.ts";
+import { Crowd, half, REACH } from "./crowd-walk.ts";
 import { type Ladder, ladder, lens } from "./detail.ts";
-import type { Mount, Page } from "./page.ts";
+import { understood } from "./faults.ts";
 import { SIZE } from "./rig.ts";
+import type { Session } from "./session.ts";
 import type { State } from "./state.ts";
+import * as theme from "./theme.ts";
 
 export const MOST = 1000;
 /** Metres between lines of the ground, and seconds between two readings of numbers. */
@@ -29,10 +31,12 @@ const [GROUND, READING] = [5, 0.25];
 /** Metres from which on small bones are left out. */
 const FAR = 12;
 
-export const mount: Mount = (host, page) => new CrowdView(host, page).begin();
+export function mount(host: HTMLElement, session: Session): void {
+  new CrowdView(host, session).begin();
+}
 
 class CrowdView {
-  readonly #page: Page;
+  readonly #page: Session;
   readonly #panel: Panel;
   readonly #group = new Group();
   readonly #ladder: Ladder;
@@ -50,7 +54,7 @@ class CrowdView {
   #spent = 0;
   #begun = 0;
 
-  constructor(host: HTMLElement, page: Page) {
+  constructor(host: HTMLElement, page: Session) {
     this.#page = page;
     this.#ladder = ladder(page.card);
     this.#panel = new Panel(host, page);
@@ -69,8 +73,9 @@ class CrowdView {
       this.#leave();
       this.#group.removeFromParent();
       this.#mesh?.dispose();
+      this.#bare();
     });
-    onTheme(() => this.#paint(), signal);
+    theme.listen(() => this.#paint(), signal);
     this.#paint();
     this.#changed(store.state, new Set(["view"]));
   }
@@ -81,6 +86,9 @@ class CrowdView {
       else this.#leave();
     }
     if (changed.has("crowd") && this.#library) this.#people();
+    // The page says so when the service is back, and one may move a control to try again.
+    if (changed.has("controls")) this.#want();
+    if (changed.has("playing") && changed.has("time")) this.#goOn(state);
     if (this.#group.visible) this.#page.scene.redraw();
   }
 
@@ -90,7 +98,17 @@ class CrowdView {
     this.#group.visible = true;
     this.#panel.show(true);
     this.#look();
-    if (!this.#library && !this.#loading) void this.#load();
+    this.#want();
+  }
+
+  #want(): void {
+    if (this.#group.visible && !this.#library && !this.#loading) void this.#load();
+  }
+
+  /** The clip of one body ends where it does not loop; a crowd does not. */
+  #goOn({ playing, time }: State): void {
+    const ended = !playing && time >= this.#page.player.duration;
+    if (this.#group.visible && ended) this.#page.store.set({ playing: true, time: 0 });
   }
 
   #leave(): void {
@@ -106,10 +124,11 @@ class CrowdView {
 
   /** From a corner, so that near and far are both in view. */
   #look(): void {
-    const half = this.#crowd?.half ?? 25;
-    const { camera, orbit } = this.#page.scene;
-    camera.position.set(half * 0.35, 4.5, half * 1.02);
-    orbit.target.set(-half * 0.05, 0.5, half * 0.1);
+    const { scene, store } = this.#page;
+    const { camera, orbit } = scene;
+    const far = half(Math.min(MOST, store.state.crowd));
+    camera.position.set(far * 0.35, 4.5, far * 1.02);
+    orbit.target.set(-far * 0.05, 0.5, far * 0.1);
     orbit.update();
   }
 
@@ -120,11 +139,10 @@ class CrowdView {
       this.#panel.say("The motions are being made …");
       this.#library = await library(source, store.state.model, card, signal);
       this.#panel.say("");
-      this.#people();
-      this.#look();
+      if (!signal.aborted) this.#people();
     } catch (fault) {
       if (signal.aborted) return;
-      this.#panel.say("The motions could not be had; choose the view again to try again.");
+      this.#panel.say(`The motions could not be had. ${understood(fault)?.text ?? ""}`);
       notice(fault);
     } finally {
       this.#loading = false;
@@ -140,16 +158,21 @@ class CrowdView {
       this.#laid = new Float32Array(SIZE * bones);
       this.#group.add(this.#mesh.mesh);
     }
-    this.#ground?.geometry.dispose();
-    this.#ground?.removeFromParent();
+    this.#bare();
     this.#ground = ground(this.#crowd.half);
     this.#group.add(this.#ground);
     this.#paint();
   }
 
+  #bare(): void {
+    this.#ground?.geometry.dispose();
+    this.#ground?.material.dispose();
+    this.#ground?.removeFromParent();
+  }
+
   #paint(): void {
     this.#mesh?.paint(this.#page.card.levels.map((_, level) => levelColour(level)));
-    this.#ground?.material.color.set(property("--line", "#c5c9d2"));
+    this.#ground?.material.color.set(theme.colour("--line"));
     this.#page.scene.redraw();
   }
 

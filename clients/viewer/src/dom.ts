@@ -72,6 +72,24 @@ export function choice<Value extends string>(
   });
 }
 
+/** A word and the field that it names, for everybody; the word may change. */
+export function labelled(word: string, field: HTMLElement): HTMLDivElement {
+  field.id ||= id();
+  return el("div", { class: "field" }, el("label", { for: field.id }, word), field);
+}
+
+/** A list to choose from; values and what they are called. */
+export function chooser(
+  options: readonly (readonly [string, string])[],
+  chosen: string,
+  taken: (value: string) => void,
+): HTMLSelectElement {
+  const made = el("select", {}, ...options.map(([value, name]) => el("option", { value }, name)));
+  made.value = chosen;
+  made.addEventListener("change", () => taken(made.value));
+  return made;
+}
+
 let made = 0;
 
 /** An id that nothing else on the page has. */

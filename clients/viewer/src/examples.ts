@@ -6,9 +6,9 @@ import type { Control, Dot } from "./chart.ts";
 
 type Controls = Readonly<Record<string, number>>;
 
-/** How far each captured clip lies from what the others predict, m; empty in older models. */
-export function leftOut(card: ModelCard): readonly number[] {
-  return (card as { left_out?: readonly number[] }).left_out ?? [];
+/** Who moved a captured clip; null where nobody is told apart. */
+export function mover({ moved_by, performers }: ModelCard, index: number): string | null {
+  return performers[moved_by[index] ?? -1] ?? null;
 }
 
 /** Values of the controls that are none of those. */
@@ -20,7 +20,7 @@ export function others(controls: Controls, axes: readonly Control[]): Record<str
 /** Every captured clip on the map of two controls. */
 export function clips(card: ModelCard, axes: readonly [Control, Control], now: Controls): Dot[] {
   const [x, y] = axes.map((axis) => card.controls.indexOf(axis)) as [number, number];
-  const left = leftOut(card);
+  const left = card.left_out ?? [];
   const most = Math.max(...left, 0) || 1;
   return card.examples.map((values, index) => ({
     index,

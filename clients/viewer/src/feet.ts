@@ -8,6 +8,7 @@ import { el } from "./dom.ts";
 import { step } from "./playback.ts";
 import type { Session } from "./session.ts";
 import { place, placed } from "./skeleton.ts";
+import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
 
 export function mount(host: HTMLElement, session: Session): void {
@@ -18,6 +19,8 @@ export function mount(host: HTMLElement, session: Session): void {
   const about = el("p", { class: "about" });
   host.append(el("div", { class: "title" }, el("h2", {}, "Feet"), el("span", {}, meter)), about);
   scene.root.add(marks.group);
+  /** What the clip that is there was asked as; where that has changed, another is on its way. */
+  let answered: State["root"] | null = null;
   const judge = () => {
     const { feet: wanted, root, view } = store.state;
     const clip = player.clip;
@@ -26,7 +29,7 @@ export function mount(host: HTMLElement, session: Session): void {
     const why = unjudged(feet, session);
     about.textContent = why ?? HOW;
     meter.textContent = why ? "" : "…";
-    if (!clip || why) return marks.of(null);
+    if (!clip || why || answered !== root) return marks.of(null);
     const tracks = trodden(session.card, clip, feet);
     const found = contacts.ground(tracks, 1 / step(clip));
     meter.textContent = `${(100 * found.slide).toFixed(1)} cm/s`;
@@ -40,7 +43,10 @@ export function mount(host: HTMLElement, session: Session): void {
     marks.press(Math.round(store.state.time / step(clip)));
   };
   judge();
-  player.onClip(judge);
+  player.onClip(() => {
+    answered = store.state.root;
+    judge();
+  });
   player.watch(press);
   theme.listen(() => marks.tint(), signal);
   const leave = store.listen((_, changed) => {
@@ -51,7 +57,7 @@ export function mount(host: HTMLElement, session: Session): void {
   });
   signal.addEventListener("abort", () => {
     leave();
-    marks.group.removeFromParent();
+    marks.dispose();
   });
 }
 
@@ -117,6 +123,11 @@ class Marks {
     this.#found?.contacts.forEach(({ first, last }, i) => {
       this.group.children[i]!.children[0]!.visible = first <= frame && frame <= last;
     });
+  }
+
+  dispose(): void {
+    this.group.removeFromParent();
+    this.#material.dispose();
   }
 
   tint(): void {

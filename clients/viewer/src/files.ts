@@ -4,9 +4,10 @@ import { type Client, type ClipFormat, type ClipQuestion, PosefieldError } from 
 
 import "./files.css";
 import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
-import { chooser, element, figure, labelled } from "./markup.ts";
-import type { Mount, Page, Source } from "./page.ts";
+import { chooser, el, labelled } from "./dom.ts";
+import { type Mount, type Page, served } from "./page.ts";
 import type { State } from "./state.ts";
+import { figure } from "./written.ts";
 
 const FORMATS = [
   ["usdc", "USD, binary (.usdc)"],
@@ -24,7 +25,13 @@ const NAMES = [
   ["vrm", "VRM"],
   ["humanik", "HumanIK"],
 ] as const;
+const WAYS = [
+  ["travelling", "travels"],
+  ["in_place", "stays in place"],
+] as const;
 const USUAL = ["", "as usual"] as const;
+const UNITS = [USUAL, ["m", "metres"], ["cm", "centimetres"]] as const;
+const UPS = [USUAL, ["y", "Y"], ["z", "Z"]] as const;
 const TEXTS = { curl, python, link } as const;
 
 type Text = keyof typeof TEXTS;
@@ -41,19 +48,36 @@ interface Choice {
   text: Text;
 }
 
-export const mount: Mount = (host, page) => new Files(host, page).begin();
+export const mount: Mount = (host, page) => {
+  if (served(page.source)) new Files(host, page, page.source).begin();
+  else host.append(titled(el("p", { class: "files-said" }, NONE)));
+};
+
+const NONE =
+  "Files, and texts that ask for them, need a service: this page runs without one, on the model file alone.";
+
+function titled(...content: readonly HTMLElement[]): HTMLElement {
+  return el(
+    "section",
+    { class: "files", "aria-label": "Files" },
+    el("h2", {}, "Take it away"),
+    ...content,
+  );
+}
 
 class Files {
   readonly #page: Page;
+  readonly #service: Pick<Client, "file">;
   readonly #choice: Choice;
-  readonly #fields = element("div", { className: "files-fields" });
-  readonly #get = element("button", { type: "button", className: "files-get" });
-  readonly #said = element("p", { className: "files-said" });
-  readonly #code = element("pre", { tabIndex: 0 });
+  readonly #get = el("button", { type: "button", class: "files-get" });
+  readonly #said = el("p", { class: "files-said" });
+  readonly #code = el("pre", { tabindex: 0 });
+  readonly #shows: (() => void)[] = [];
   #asked: AbortController | null = null;
 
-  constructor(host: HTMLElement, page: Page) {
+  constructor(host: HTMLElement, page: Page, service: Pick<Client, "file">) {
     this.#page = page;
+    this.#service = service;
     const fps = page.card.rate >= 1 && page.card.rate <= 60 ? page.card.rate : 30;
     this.#choice = {
       format: "usdc",
@@ -67,16 +91,13 @@ class Files {
     this.#said.setAttribute("role", "status");
     this.#code.setAttribute("aria-label", "Text to copy");
     const texts = (["curl", "python", "link"] as const).map((text) => this.#tab(text));
-    const copy = element("button", { type: "button" }, "Copy");
+    const copy = el("button", { type: "button" }, "Copy");
     copy.addEventListener("click", () => void this.#copy());
-    const kinds = element("div", { className: "files-kinds", role: "group" }, ...texts, copy);
+    const kinds = el("div", { class: "files-kinds", role: "group" }, ...texts, copy);
     kinds.setAttribute("aria-label", "Ask for it by");
     host.append(
-      element(
-        "section",
-        { className: "files", ariaLabel: "Files" },
-        element("h2", {}, "Take it away"),
-        this.#fields,
+      titled(
+        el("div", { class: "files-fields" }, ...this.#rows()),
         this.#get,
         this.#said,
         kinds,
@@ -134,7 +155,7 @@ class Files {
   }
 
   #draw(): void {
-    this.#fields.replaceChildren(...this.#rows());
+    for (const show of this.#shows) show();
     for (const button of this.#host("[data-text]")) {
       button.setAttribute("aria-pressed", String(button.dataset["text"] === this.#choice.text));
     }
@@ -145,81 +166,100 @@ class Files {
     return [...(this.#code.parentElement?.querySelectorAll<HTMLElement>(what) ?? [])];
   }
 
+  /** A list to choose from, which follows what is chosen elsewhere. */
+  #list<Value extends string>(
+    word: string,
+    options: readonly (readonly [Value, string])[],
+    now: () => string,
+    take: (value: Value) => void,
+  ): HTMLElement {
+    const list = chooser(options, now(), (value) => take(value as Value));
+    this.#shows.push(() => {
+      list.value = now();
+    });
+    return labelled(word, list);
+  }
+
   #rows(): HTMLElement[] {
     const { card, store } = this.#page;
-    const { format, fps, loop, names, unit, up } = this.#choice;
-    const { root, level } = store.state;
+    const choice = this.#choice;
     const levels = card.levels.map((_, i) => [String(i), `${i}`] as const);
-    const ways = [
-      ["travelling", "travels"],
-      ["in_place", "stays in place"],
-    ] as const;
-    const rows: HTMLElement[] = [
-      labelled(
+    const rows = [
+      this.#list(
         "format",
-        chooser(FORMATS, format, (value) => this.#take({ format: value as ClipFormat })),
+        FORMATS,
+        () => choice.format,
+        (format) => this.#take({ format }),
       ),
-      labelled("frames a second", this.#rate(fps)),
-      labelled(
+      this.#rate(),
+      this.#list(
         "root",
-        chooser(ways, root, (value) => store.set({ root: value as State["root"] })),
+        WAYS,
+        () => store.state.root,
+        (root) => store.set({ root }),
       ),
-      labelled(
+      this.#list(
         "level",
-        chooser(levels, String(level), (value) => store.set({ level: Number(value) })),
+        levels,
+        () => String(store.state.level),
+        (level) => store.set({ level: Number(level) }),
       ),
     ];
-    if (Object.keys(card.roles).length) {
+    if (Object.keys(card.roles).length)
       rows.push(
-        labelled(
+        this.#list(
           "joint names",
-          chooser(NAMES, names, (value) => this.#take({ names: value as Names })),
+          NAMES,
+          () => choice.names,
+          (names) => this.#take({ names }),
         ),
       );
-    }
-    if (format !== "glb") {
-      const units = [USUAL, ["m", "metres"], ["cm", "centimetres"]] as const;
-      const ups = [USUAL, ["y", "Y"], ["z", "Z"]] as const;
-      rows.push(
-        labelled(
-          "unit",
-          chooser(units, unit, (value) => this.#take({ unit: value as Choice["unit"] })),
-        ),
-        labelled(
-          "up",
-          chooser(ups, up, (value) => this.#take({ up: value as Choice["up"] })),
-        ),
-      );
-    }
-    if (card.cyclic) rows.push(this.#cycle(loop));
+    const measures = [
+      this.#list(
+        "unit",
+        UNITS,
+        () => choice.unit,
+        (unit) => this.#take({ unit }),
+      ),
+      this.#list(
+        "up",
+        UPS,
+        () => choice.up,
+        (up) => this.#take({ up }),
+      ),
+    ];
+    // glTF says itself what its units and its up are.
+    this.#shows.push(() => {
+      for (const row of measures) row.hidden = choice.format === "glb";
+    });
+    rows.push(...measures);
+    if (card.cyclic) rows.push(this.#cycle());
     return rows;
   }
 
-  #rate(fps: number): HTMLInputElement {
-    const field = element("input", {
-      type: "number",
-      min: "1",
-      max: "1000",
-      step: "any",
-      value: String(fps),
-    });
+  #rate(): HTMLElement {
+    const field = el("input", { type: "number", min: "1", max: "1000", step: "any" });
+    const show = () => {
+      field.value = String(this.#choice.fps);
+    };
     field.addEventListener("change", () => {
       const value = Number(field.value);
       if (value >= 1 && value <= 1000) this.#take({ fps: value });
-      else field.value = String(this.#choice.fps);
+      else show();
     });
-    return field;
+    show();
+    return labelled("frames a second", field);
   }
 
-  #cycle(loop: boolean): HTMLElement {
-    const box = element("input", { type: "checkbox", checked: loop });
+  #cycle(): HTMLElement {
+    const box = el("input", { type: "checkbox" });
     box.addEventListener("change", () => this.#take({ loop: box.checked }));
     return labelled("closed loop", box);
   }
 
   #tab(text: Text): HTMLButtonElement {
     const name = { curl: "curl", python: "Python", link: "Link" }[text];
-    const button = element("button", { type: "button" }, name);
+    const button = el("button", { type: "button" }, name);
     button.dataset["text"] = text;
     button.addEventListener("click", () => this.#take({ text }));
     return button;
@@ -244,18 +284,14 @@ class Files {
 
   /** Asks for the whole file and only then hands it to the browser. */
   async #download(): Promise<void> {
-    const { source, signal } = this.#page;
+    const { signal } = this.#page;
     const wanted = this.#wanted;
-    if (!gives(source)) {
-      this.#say("Files need a service: this page runs without one, on the model file alone.");
-      return;
-    }
     this.#asked = new AbortController();
     this.#say(`Asking for ${fileName(wanted)} …`);
     this.#tell();
     try {
       const both = AbortSignal.any([signal, this.#asked.signal]);
-      const { content, mediaType } = await source.file(
+      const { content, mediaType } = await this.#service.file(
         wanted.model,
         wanted.format,
         wanted.question,
@@ -276,11 +312,6 @@ class Files {
   }
 }
 
-/** A service gives files too; a model in the browser does not. */
-function gives(source: Source): source is Source & Pick<Client, "file"> {
-  return "file" in source;
-}
-
 function failed(fault: unknown): string {
   const said = fault instanceof PosefieldError ? fault.message : String(fault);
   return `Nothing was saved: ${said}`;
@@ -291,7 +322,7 @@ const size = (bytes: number): string =>
 
 function save(name: string, content: Blob): void {
   const address = URL.createObjectURL(content);
-  const anchor = element("a", { href: address, download: name });
+  const anchor = el("a", { href: address, download: name });
   anchor.click();
   // The browser has read it by then.
   setTimeout(() => URL.revokeObjectURL(address), 60_000);

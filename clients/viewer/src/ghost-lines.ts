@@ -8,9 +8,8 @@ import {
   LineSegments,
   type Vector3,
 } from "three";
-
-import { property } from "./colours.ts";
 import type { Placed } from "./skeleton.ts";
+import * as theme from "./theme.ts";
 
 export class Ghost {
   readonly lines: LineSegments<BufferGeometry, LineBasicMaterial>;
@@ -29,7 +28,12 @@ export class Ghost {
   }
 
   paint(): void {
-    this.lines.material.color.set(property("--ink", "#222"));
+    this.lines.material.color.set(theme.colour("--ink"));
+  }
+
+  dispose(): void {
+    this.lines.geometry.dispose();
+    this.lines.material.dispose();
   }
 
   place({ positions }: Placed, shift: Vector3): void {

@@ -6,6 +6,7 @@ import * as ask from "./ask.ts";
 import { el } from "./dom.ts";
 import { Figure } from "./figure.ts";
 import { Latest } from "./latest.ts";
+import { served } from "./page.ts";
 import { NOWHERE, type Pose, pose, sample } from "./playback.ts";
 import type { Session } from "./session.ts";
 import * as theme from "./theme.ts";
@@ -51,8 +52,9 @@ class Ghost {
   }
 
   get #wanted(): boolean {
-    const { ghost, view } = this.#session.store.state;
-    return ghost && view === "one";
+    const { source, store } = this.#session;
+    // Only a service says which example is the nearest.
+    return store.state.ghost && store.state.view === "one" && served(source);
   }
 
   #appear(): void {

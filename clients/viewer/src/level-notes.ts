@@ -3,7 +3,8 @@
 import type { ModelCard } from "@posefield/client";
 
 import { farEnough, type Ladder, type Lens } from "./detail.ts";
-import { element, figure, whole } from "./markup.ts";
+import { el } from "./dom.ts";
+import { figure, whole } from "./written.ts";
 
 /** Pixels between joints of two poses: the greatest, and the root mean square. */
 export interface Apart {
@@ -14,26 +15,26 @@ export interface Apart {
 export class Note {
   readonly host: HTMLElement;
   readonly #level: number;
-  readonly #now = element("dd", { className: "levels-now" });
-  readonly #from = element("dd");
+  readonly #now = el("dd", { class: "levels-now" });
+  readonly #from = el("dd");
 
   constructor(level: number, card: ModelCard) {
     this.#level = level;
     const { bytes, operations, rms, pose, ranks } = card.levels[level]!;
     const rows: [string, HTMLElement][] = [
-      ["size", element("dd", {}, `${figure(bytes / 1000)} kB`)],
-      ["cost", element("dd", {}, `${whole(operations)} multiply-adds`)],
-      ["off by", element("dd", {}, `${short(rms)} cm, worst pose ${short(pose)}`)],
+      ["size", el("dd", {}, `${figure(bytes / 1000)} kB`)],
+      ["cost", el("dd", {}, `${whole(operations)} multiply-adds`)],
+      ["off by", el("dd", {}, `${short(rms)} cm, worst pose ${short(pose)}`)],
       ["now", this.#now],
       ["≤ 1 px", this.#from],
     ];
-    const title = element("h3", {}, `Level ${level}`, element("small", {}, ranks.join(" × ")));
-    const list = rows.flatMap(([term, value]) => [element("dt", {}, term), value]);
-    this.host = element(
+    const title = el("h3", {}, `Level ${level}`, el("small", {}, ranks.join(" × ")));
+    const list = rows.flatMap(([term, value]) => [el("dt", {}, term), value]);
+    this.host = el(
       "article",
-      { className: `level-${Math.min(level, 3)}` },
+      { class: `level-${Math.min(level, 3)}` },
       title,
-      element("dl", {}, ...list),
+      el("dl", {}, ...list),
     );
   }
 

@@ -5,22 +5,24 @@ import {
   Color,
   Group,
   InstancedMesh,
+  type LatheGeometry,
   MeshStandardMaterial,
   type PerspectiveCamera,
   Vector3,
 } from "three";
 
 import "./levels.css";
-import { levelColour, onTheme } from "./colours.ts";
+import { levelColour } from "./colours.ts";
 import { type Ladder, ladder, lens } from "./detail.ts";
+import { el } from "./dom.ts";
 import { Ghost } from "./ghost-lines.ts";
 import { Latest } from "./latest.ts";
 import { type Apart, Note } from "./level-notes.ts";
-import { element } from "./markup.ts";
 import type { Mount, Page } from "./page.ts";
 import { boneShape, Rig, SIZE } from "./rig.ts";
 import { type Placed, place, placed } from "./skeleton.ts";
 import type { State } from "./state.ts";
+import * as theme from "./theme.ts";
 
 /** Frames a second of the clips: what a screen shows. */
 const RATE = 60;
@@ -33,7 +35,7 @@ export const mount: Mount = (host, page) => new Levels(host, page).begin();
 
 /** One level's character, and where its joints are now. */
 interface Figure {
-  readonly mesh: InstancedMesh;
+  readonly mesh: InstancedMesh<LatheGeometry, MeshStandardMaterial>;
   readonly ghost: Ghost;
   readonly joints: Placed;
   readonly note: Note;
@@ -43,10 +45,10 @@ interface Figure {
 
 class Levels {
   readonly #page: Page;
-  readonly #host = element("section", {
-    className: "levels",
+  readonly #host = el("section", {
+    class: "levels",
     hidden: true,
-    ariaLabel: "Levels of detail",
+    "aria-label": "Levels of detail",
   });
   readonly #group = new Group();
   readonly #rig: Rig;
@@ -80,9 +82,14 @@ class Levels {
       if (this.#group.visible) scene.camera.clearViewOffset();
       this.#host.remove();
       this.#group.removeFromParent();
-      for (const { mesh } of this.#figures) mesh.dispose();
+      for (const { mesh, ghost } of this.#figures) {
+        mesh.dispose();
+        mesh.geometry.dispose();
+        mesh.material.dispose();
+        ghost.dispose();
+      }
     });
-    onTheme(() => this.#paint(), signal);
+    theme.listen(() => this.#paint(), signal);
     this.#paint();
     this.#show(store.state);
   }
@@ -100,7 +107,7 @@ class Levels {
 
   #paint(): void {
     this.#figures.forEach(({ mesh, ghost }, level) => {
-      (mesh.material as MeshStandardMaterial).color = new Color(levelColour(level));
+      mesh.material.color = new Color(levelColour(level));
       ghost.paint();
     });
     this.#page.scene.redraw();

@@ -4,8 +4,8 @@ import type { ModelCard, SigmaGrid } from "@posefield/client";
 
 import { type Control, extent } from "./chart.ts";
 import { viridis } from "./colours.ts";
-import { leftOut } from "./examples.ts";
-import { centimetres, element, figure } from "./markup.ts";
+import { el } from "./dom.ts";
+import { figure, precise } from "./written.ts";
 
 interface Legend {
   readonly host: HTMLElement;
@@ -14,7 +14,7 @@ interface Legend {
 
 /** The scale of colours in centimetres, and what a ring means. */
 export function legend(): Legend {
-  const bar = element("canvas", { width: 256, height: 1, className: "map-scale" });
+  const bar = el("canvas", { width: 256, height: 1, class: "map-scale" });
   bar.setAttribute("aria-hidden", "true");
   const pen = bar.getContext("2d")!;
   const image = pen.createImageData(256, 1);
@@ -23,9 +23,9 @@ export function legend(): Legend {
     image.data[4 * i + 3] = 255;
   }
   pen.putImageData(image, 0, 0);
-  const numbers = element("div", { className: "map-numbers" });
-  const rings = element("div", { className: "map-rings" });
-  const host = element("div", { className: "map-legend" }, bar, numbers, rings);
+  const numbers = el("div", { class: "map-numbers" });
+  const rings = el("div", { class: "map-rings" });
+  const host = el("div", { class: "map-legend" }, bar, numbers, rings);
   return { host, show: (grid, card) => fill(numbers, rings, grid, card) };
 }
 
@@ -33,14 +33,12 @@ function fill(numbers: HTMLElement, rings: HTMLElement, grid: SigmaGrid, card: M
   const [low, high] = extent(grid);
   const [least, middle, most] = [low, (low + high) / 2, high].map((value) => figure(100 * value));
   numbers.replaceChildren(
-    element("span", {}, `${least} cm`),
-    element("span", {}, `sigma ${middle}`),
-    element("span", {}, `${most} cm and more`),
+    el("span", {}, `${least} cm`),
+    el("span", {}, `sigma ${middle}`),
+    el("span", {}, `${most} cm and more`),
   );
-  const worst = Math.max(0, ...leftOut(card));
-  const ring = worst
-    ? `, a ring as wide as its error when left out, up to ${centimetres(worst)}`
-    : "";
+  const worst = Math.max(0, ...(card.left_out ?? []));
+  const ring = worst ? `, a ring as wide as its error when left out, up to ${precise(worst)}` : "";
   rings.textContent = `A dot is a captured clip${ring}; faint where other controls differ. Hatched: never sampled.`;
 }
 
@@ -57,8 +55,8 @@ export function said(grid: SigmaGrid, [across, along]: readonly [Control, Contro
   const at = ({ x, y }: Cell) =>
     `at ${across.name} ${figure(x)} ${across.unit}, ${along.name} ${figure(y)} ${along.unit}`;
   return (
-    `Within what was sampled sigma is least, ${centimetres(least.sigma)}, ${at(least)}, ` +
-    `and greatest, ${centimetres(most.sigma)}, ${at(most)}.`
+    `Within what was sampled sigma is least, ${precise(least.sigma)}, ${at(least)}, ` +
+    `and greatest, ${precise(most.sigma)}, ${at(most)}.`
   );
 }
 
@@ -89,24 +87,24 @@ export function table(
     Array.from({ length: STEPS }, (_, i) => Math.round((i * (count - 1)) / (STEPS - 1)));
   const columns = pick(grid.across_values.length);
   const rows = pick(grid.along_values.length).reverse();
-  const heading = (value: number, scope: string) => element("th", { scope }, figure(value));
+  const heading = (value: number, scope: string) => el("th", { scope }, figure(value));
   const title = `Sigma in cm; * lies outside what was sampled. Columns: ${across.name}, rows: ${along.name}.`;
-  const head = element(
+  const head = el(
     "tr",
     {},
-    element("td"),
+    el("td"),
     ...columns.map((column) => heading(grid.across_values[column]!, "col")),
   );
   const body = rows.map((row) =>
-    element(
+    el(
       "tr",
       {},
       heading(grid.along_values[row]!, "row"),
       ...columns.map((column) => {
         const star = grid.inside[row]![column] ? "" : " *";
-        return element("td", {}, figure(100 * grid.sigma[row]![column]!) + star);
+        return el("td", {}, figure(100 * grid.sigma[row]![column]!) + star);
       }),
     ),
   );
-  return [element("caption", {}, title), element("thead", {}, head), element("tbody", {}, ...body)];
+  return [el("caption", {}, title), el("thead", {}, head), el("tbody", {}, ...body)];
 }

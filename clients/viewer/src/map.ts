@@ -4,25 +4,28 @@ import type { SigmaGrid } from "@posefield/client";
 
 import "./map.css";
 import { type Control, type Dot, draw, Frame, heat, MARGIN, rounded } from "./chart.ts";
-import { onTheme } from "./colours.ts";
-import { clips, distance, leftOut, nearestTo, others } from "./examples.ts";
+import { chooser, el, labelled } from "./dom.ts";
+import { clips, distance, mover, nearestTo, others } from "./examples.ts";
 import { Latest } from "./latest.ts";
 import { legend, said, table } from "./map-words.ts";
-import { centimetres, chooser, element, figure, labelled } from "./markup.ts";
 import type { Mount, Page } from "./page.ts";
 import type { State } from "./state.ts";
+import * as theme from "./theme.ts";
+import { figure, precise } from "./written.ts";
 
 const [COLUMNS, ROWS] = [48, 36];
 /** Milliseconds that other controls rest before the map is asked for anew. */
 const REST = 120;
 /** Pixels within which a dot is meant. */
 const REACH = 11;
+/** Pixels that a finger or a mouse may tremble on a dot. */
+const TREMBLE = 4;
+/** Milliseconds after which where one is is said aloud. */
+const CALM = 400;
 
 export const mount: Mount = (host, page) => {
   if (page.card.controls.length < 2) {
-    host.append(
-      element("p", { className: "map-none" }, "A map needs two controls; this model has one."),
-    );
+    host.append(el("p", { class: "map-none" }, "A map needs two controls; this model has one."));
     return;
   }
   new Map2(host, page).begin();
@@ -30,13 +33,15 @@ export const mount: Mount = (host, page) => {
 
 class Map2 {
   readonly #page: Page;
-  readonly #canvas = element("canvas", { tabIndex: 0, className: "map-canvas" });
-  readonly #tip = element("div", { className: "map-tip", hidden: true });
-  readonly #here = element("output", { className: "map-here" });
-  readonly #words = element("p", { className: "map-words", id: "map-words" });
+  readonly #canvas = el("canvas", { tabindex: 0, class: "map-canvas" });
+  readonly #tip = el("div", { class: "map-tip", hidden: true });
+  readonly #here = el("p", { class: "map-here" });
+  readonly #aloud = el("p", { class: "unseen" });
+  readonly #words = el("p", { class: "map-words", id: "map-words" });
   readonly #legend = legend();
-  readonly #table = element("table");
-  readonly #axes = element("div", { className: "map-axes" });
+  readonly #table = el("table");
+  readonly #across: HTMLSelectElement;
+  readonly #along: HTMLSelectElement;
   readonly #asking: Latest<string>;
   #grid: SigmaGrid | null = null;
   #picture: HTMLCanvasElement | null = null;
@@ -44,25 +49,39 @@ class Map2 {
   #asked = "";
   #waiting = 0;
   #drawn = 0;
+  #speaking = 0;
+  /** Where a dot was pressed; null where none was, or the pointer has left it since. */
+  #pressed: readonly [number, number] | null = null;
 
   constructor(host: HTMLElement, page: Page) {
     this.#page = page;
     this.#asking = new Latest((key) => this.#ask(key));
-    const tables = element("details", {}, element("summary", {}, "Sigma as a table"), this.#table);
-    const frame = element("div", { className: "map-frame" }, this.#canvas, this.#tip);
+    const names = page.card.controls.map(({ name }) => [name, name] as const);
+    this.#across = chooser(names, "", (value) => this.#take("across", value));
+    this.#along = chooser(names, "", (value) => this.#take("along", value));
+    const axes = el(
+      "div",
+      { class: "map-axes" },
+      labelled("across", this.#across),
+      labelled("up", this.#along),
+    );
+    const tables = el("details", {}, el("summary", {}, "Sigma as a table"), this.#table);
+    const frame = el("div", { class: "map-frame" }, this.#canvas, this.#tip);
     host.append(
-      element(
+      el(
         "section",
-        { className: "map", ariaLabel: "Map of two controls" },
-        element("h2", {}, "Map"),
-        this.#axes,
+        { class: "map", "aria-label": "Map of two controls" },
+        el("h2", {}, "Map"),
+        axes,
         frame,
         this.#legend.host,
         this.#here,
+        this.#aloud,
         this.#words,
         tables,
       ),
     );
+    this.#aloud.setAttribute("aria-live", "polite");
     this.#canvas.setAttribute("role", "application");
     this.#canvas.setAttribute("aria-roledescription", "map of two controls");
     this.#canvas.setAttribute("aria-describedby", "map-words");
@@ -72,10 +91,14 @@ class Map2 {
     const { store, signal } = this.#page;
     const stop = store.listen((_, changed) => this.#changed(changed));
     signal.addEventListener("abort", stop);
-    onTheme(() => this.#redraw(), signal);
+    theme.listen(() => this.#redraw(), signal);
     const watch = new ResizeObserver(() => this.#redraw());
     watch.observe(this.#canvas);
-    signal.addEventListener("abort", () => watch.disconnect());
+    signal.addEventListener("abort", () => {
+      watch.disconnect();
+      clearTimeout(this.#waiting);
+      clearTimeout(this.#speaking);
+    });
     this.#listen();
     this.#choosers();
     this.#renew(0);
@@ -120,25 +143,18 @@ class Map2 {
   }
 
   #choosers(): void {
-    const { card, store } = this.#page;
     const [across, along] = this.#pair;
-    const names = card.controls.map(({ name }) => [name, name] as const);
-    // Who chooses the other axis' control changes the two over.
-    const take = (key: "across" | "along", value: string) => {
-      const other = key === "across" ? "along" : "across";
-      const now = { across: across.name, along: along.name };
-      store.set({ ...now, [other]: now[other] === value ? now[key] : now[other], [key]: value });
-    };
-    this.#axes.replaceChildren(
-      labelled(
-        "across",
-        chooser(names, across.name, (value) => take("across", value)),
-      ),
-      labelled(
-        "up",
-        chooser(names, along.name, (value) => take("along", value)),
-      ),
-    );
+    this.#across.value = across.name;
+    this.#along.value = along.name;
+  }
+
+  /** Who chooses the other axis' control changes the two over. */
+  #take(key: "across" | "along", value: string): void {
+    const [across, along] = this.#pair;
+    const other = key === "across" ? "along" : "across";
+    const now = { across: across.name, along: along.name };
+    const left = now[other] === value ? now[key] : now[other];
+    this.#page.store.set({ ...now, [other]: left, [key]: value });
   }
 
   /** Asks for sigma where it is of other controls than the map that is shown. */
@@ -148,11 +164,11 @@ class Map2 {
       others(this.#state.controls, this.#pair),
       this.#state.performer,
     ]);
+    clearTimeout(this.#waiting);
     if (key === this.#asked) {
       this.#tell();
       return;
     }
-    clearTimeout(this.#waiting);
     this.#waiting = window.setTimeout(() => {
       this.#asked = key;
       this.#asking.ask(key);
@@ -175,7 +191,7 @@ class Map2 {
       const grid = await source.sigma(this.#state.model || card.name, question, signal);
       if (key === this.#asked) this.#show(grid);
     } catch (fault) {
-      this.#asked = "";
+      if (key === this.#asked) this.#asked = "";
       if (!signal.aborted) notice(fault);
     }
   }
@@ -239,6 +255,15 @@ class Map2 {
       "aria-label",
       `Map: ${where}; ${near}. Arrows move, page keys go to examples`,
     );
+    this.#speak();
+  }
+
+  /** Once it rests, and only to those who move by keys. */
+  #speak(): void {
+    clearTimeout(this.#speaking);
+    this.#speaking = window.setTimeout(() => {
+      if (document.activeElement === this.#canvas) this.#aloud.textContent = this.#here.textContent;
+    }, CALM);
   }
 
   #name(index: number): string {
@@ -254,16 +279,24 @@ class Map2 {
     on("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
       const met = this.#met(event);
+      this.#pressed = met && [event.offsetX, event.offsetY];
       if (met) this.#example(met.index);
       else this.#go(event);
     });
     on("pointermove", (event) => {
-      if (event.buttons & 1 && canvas.hasPointerCapture(event.pointerId)) this.#go(event);
+      if (event.buttons & 1 && canvas.hasPointerCapture(event.pointerId)) this.#drag(event);
       else this.#hover(event);
     });
     on("pointerleave", () => this.#point_out(null));
     on("keydown", (event) => this.#key(event));
     on("blur", () => this.#point_out(null));
+  }
+
+  #drag(event: PointerEvent): void {
+    const [x, y] = this.#pressed ?? [Number.NaN, Number.NaN];
+    if (Math.hypot(event.offsetX - x, event.offsetY - y) < TREMBLE) return;
+    this.#pressed = null;
+    this.#go(event);
   }
 
   #go(event: PointerEvent): void {
@@ -299,23 +332,23 @@ class Map2 {
 
   #label(index: number): void {
     const dot = this.#dots[index]!;
-    const left = leftOut(this.#page.card)[index];
+    const left = this.#page.card.left_out?.[index];
     const lines = [this.#name(index)];
-    if (left !== undefined) lines.push(`left out: ${centimetres(left)} away`);
+    if (left !== undefined) lines.push(`left out: ${precise(left)} away`);
     const apart = distance(this.#page.card, this.#state.controls, index);
     if (apart > 0.02) lines.push(`other controls: ${figure(100 * apart)} % of a range away`);
-    this.#tip.replaceChildren(...lines.map((line) => element("div", {}, line)));
+    this.#tip.replaceChildren(...lines.map((line) => el("div", {}, line)));
     const [x, y] = [this.#frame.x(dot.at[0]), this.#frame.y(dot.at[1])];
     this.#tip.style.left = `${Math.min(x + 12, this.#canvas.clientWidth - 190)}px`;
     this.#tip.style.top = `${y + 12}px`;
   }
 
-  /** Goes to a captured clip with all of its controls. */
+  /** Goes to a captured clip with all of its controls, as who moved it. */
   #example(index: number): void {
     const { card, store } = this.#page;
     const values = card.examples[index]!;
     const controls = Object.fromEntries(card.controls.map(({ name }, i) => [name, values[i]!]));
-    store.set({ controls });
+    store.set({ controls, performer: mover(card, index) });
     this.#point_out(index);
   }
 

@@ -1,9 +1,9 @@
 /** How the body is shown: over the stage, where one looks. */
 
 import { choice, el, id, toggle } from "./dom.ts";
-import type { Mount } from "./page.ts";
+import { type Mount, served } from "./page.ts";
 
-export const mount: Mount = (host, { card, signal, store }) => {
+export const mount: Mount = (host, { card, signal, source, store }) => {
   const body = choice(
     "Body",
     [
@@ -17,6 +17,7 @@ export const mount: Mount = (host, { card, signal, store }) => {
   const root = toggle("Root motion", "Root motion: the body travels", (on) =>
     store.set({ root: on ? "travelling" : "in_place" }),
   );
+  ghost.hidden = !served(source);
   root.hidden = card.root === "in_place";
   const [level, chooser] = levels(card.levels.length, (value) => store.set({ level: value }));
   const show = () => {

@@ -8,6 +8,11 @@ import type { Store } from "./state.ts";
 /** Who answers: a service, or a model in the browser itself (offline/). */
 export type Source = Pick<Client, "models" | "card" | "pose" | "clip" | "crowd" | "sigma" | "why">;
 
+/** A service also gives files and says what an answer is made of; a model in the browser does not. */
+export function served(source: Source): source is Source & Pick<Client, "file"> {
+  return "file" in source;
+}
+
 export interface Page {
   readonly store: Store;
   readonly source: Source;

@@ -9,14 +9,5 @@ export interface Session extends Page {
   readonly player: Player;
 }
 
-/** The joint that a reach is for, and when in the clip it gets there. */
-export interface CardEvent {
-  readonly joint: number;
-  /** Of the clip's duration. */
-  readonly share: number;
-}
-
-/** Services before contract 2.1 do not tell. */
-export function event({ event: found }: ModelCard): CardEvent | null {
-  return found ?? null;
-}
+/** The joint that a reach is for, and when in the clip it gets there, as a share of its duration. */
+export type CardEvent = NonNullable<ModelCard["event"]>;

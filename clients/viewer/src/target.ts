@@ -6,13 +6,13 @@ import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { el, id } from "./dom.ts";
 import { Latest } from "./latest.ts";
 import { Reach } from "./reach.ts";
-import { type CardEvent, event, type Session } from "./session.ts";
+import type { CardEvent, Session } from "./session.ts";
 import type { Point } from "./solve.ts";
 import * as theme from "./theme.ts";
 import * as written from "./written.ts";
 
 export function mount(host: HTMLElement, session: Session): void {
-  const found = event(session.card);
+  const { event: found } = session.card;
   host.hidden = !found || session.card.cyclic;
   if (found && !session.card.cyclic) new Target(host, session, found);
 }
@@ -71,7 +71,11 @@ class Target {
     signal.addEventListener("abort", () => {
       leave();
       stop();
+      // Who drags while the model is replaced has let go of it.
+      scene.orbit.enabled = true;
       this.#gizmo.dispose();
+      this.#ball.geometry.dispose();
+      this.#ball.material.dispose();
       this.#gizmo.getHelper().removeFromParent();
       this.#handle.removeFromParent();
     });

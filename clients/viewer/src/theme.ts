@@ -1,21 +1,21 @@
 /** Light or dark: as the system has it, until somebody says otherwise. */
 
 const KEPT = "posefield-theme";
-const dark = matchMedia("(prefers-color-scheme: dark)");
+const dark = () => matchMedia("(prefers-color-scheme: dark)");
 
 type Listener = () => void;
 const listeners = new Set<Listener>();
 
 export function isDark(): boolean {
   const said = document.documentElement.dataset["theme"];
-  return said ? said === "dark" : dark.matches;
+  return said ? said === "dark" : dark().matches;
 }
 
 /** Applies what was said last time. */
 export function start(): void {
   const kept = stored();
   if (kept) document.documentElement.dataset["theme"] = kept;
-  dark.addEventListener("change", tell);
+  dark().addEventListener("change", tell);
 }
 
 export function toggle(): void {

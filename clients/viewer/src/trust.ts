@@ -4,6 +4,7 @@ import type { ModelCard, Reasons, Trust } from "@posefield/client";
 
 import { el } from "./dom.ts";
 import { Latest } from "./latest.ts";
+import { served } from "./page.ts";
 import type { Session } from "./session.ts";
 import { title } from "./slider.ts";
 import * as written from "./written.ts";
@@ -34,11 +35,9 @@ export function mount(host: HTMLElement, session: Session): void {
     meter,
     sentence,
     warnings,
-    el("h3", {}, "Made of these captured clips"),
-    list,
-    others,
     aloud,
   );
+  if (served(source)) host.append(el("h3", {}, "Made of these captured clips"), list, others);
   const why = new Latest<null>(async () => {
     const { controls, model, performer } = store.state;
     const question = { controls, performer, nearest: NEAREST };
@@ -58,7 +57,7 @@ export function mount(host: HTMLElement, session: Session): void {
     host.toggleAttribute("data-outside", trust.warnings.length > 0);
     clearTimeout(timer);
     timer = setTimeout(() => {
-      why.ask(null);
+      if (served(source)) why.ask(null);
       aloud.textContent = [says(trust, usual), ...trust.warnings].join(" ");
     }, CALM);
   });

@@ -22,7 +22,7 @@ export function short(value: number, range: number): string {
   return Number(text) === 0 ? (0).toFixed(digits) : text;
 }
 
-/** A length in centimetres; millimetres where it is small. */
+/** A length in centimetres, with a digit after the point where that is worth reading. */
 export function centimetres(metres: number): string {
   const found = 100 * metres;
   return `${found.toFixed(Math.abs(found) < 10 ? 1 : 0)} cm`;
@@ -31,3 +31,15 @@ export function centimetres(metres: number): string {
 export function seconds(value: number): string {
   return `${value.toFixed(2)} s`;
 }
+
+const SHORT = new Intl.NumberFormat("en", { maximumSignificantDigits: 3, useGrouping: false });
+const WHOLE = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
+
+/** Three digits of a number. */
+export const figure = (value: number): string => SHORT.format(value).replace("-", "−");
+
+/** A whole number with its thousands apart. */
+export const whole = (value: number): string => WHOLE.format(value);
+
+/** A length in centimetres to three digits, where one is compared with others. */
+export const precise = (metres: number): string => `${figure(100 * metres)} cm`;

@@ -87,6 +87,30 @@ describe("files", () => {
     assert.deepEqual(readFileSync(join(own, "cmu_walk.usda")), found);
   });
 
+  it("copies the text that is shown", async () => {
+    await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
+    for (const kind of ["Link", "curl"]) {
+      const shown = await text(kind);
+      await page.locator(".files").getByRole("button", { name: "Copy" }).click();
+      await said(/Copied/);
+      assert.equal(await page.evaluate(() => navigator.clipboard.readText()), shown);
+    }
+  });
+
+  it("keeps the focus where something is chosen by keys", async () => {
+    const format = page.locator(".files").getByLabel("format", { exact: true });
+    await format.focus();
+    const before = await format.inputValue();
+    for (const [key, same] of [
+      ["ArrowUp", false],
+      ["ArrowDown", true],
+    ] as const) {
+      await page.keyboard.press(key);
+      assert.equal((await format.inputValue()) === before, same);
+      assert.ok(await format.evaluate((field) => field === document.activeElement));
+    }
+  });
+
   it("are not saved where the service is lost or one says stop", async () => {
     let saved = 0;
     page.on("download", () => saved++);

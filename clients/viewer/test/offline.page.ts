@@ -145,8 +145,11 @@ for (const model of ["reaching", "cmu_walk"]) {
 
     it("shows its page, which says what needs a service", async () => {
       await page.locator(".map-words", { hasText: "Within" }).waitFor();
-      await page.locator(".files-get").click();
       await page.locator(".files-said", { hasText: "need a service" }).waitFor();
+      assert.equal(await page.locator(".files-get, .files pre").count(), 0);
+      assert.equal(await page.getByText("Made of these captured clips").count(), 0);
+      assert.equal(await page.getByRole("button", { name: "Ghost" }).count(), 0);
+      await page.getByRole("button", { name: "Sticks" }).waitFor();
     });
 
     it("refuses in words what it cannot answer", async () => {

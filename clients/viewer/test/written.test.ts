@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { centimetres, read, short } from "../src/written.ts";
+import { centimetres, figure, precise, read, short, whole } from "../src/written.ts";
 
 test("numbers are read", () => {
   for (const [text, value] of [
@@ -28,4 +28,10 @@ test("digits are those that the range is worth", () => {
   assert.equal(short(15.83333, 150), "16");
   assert.equal(centimetres(0.0136), "1.4 cm");
   assert.equal(centimetres(0.136), "14 cm");
+});
+
+test("what is compared has three digits, and thousands stand apart", () => {
+  assert.equal(precise(0.01227), "1.23 cm");
+  assert.equal(figure(-1234.5), "−1230");
+  assert.equal(whole(37293), "37,293");
 });

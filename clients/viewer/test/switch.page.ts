@@ -1,0 +1,124 @@
+/** What a model leaves behind when another is shown, or the same one otherwise: nothing. */
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { dirname, join, resolve } from "node:path";
+import { after, before, test } from "node:test";
+
+import { Client, type ModelCard, type Motion } from "@posefield/client";
+import type { Browser, Page } from "playwright-core";
+
+import { place, placed } from "../src/skeleton.ts";
+import { browser, opened, SERVICE } from "./harness.ts";
+import { picture, settled, until } from "./look.ts";
+import { COMMAND } from "./static.ts";
+
+const client = new Client(SERVICE);
+const PYTHON = resolve(join(dirname(COMMAND), "python"));
+const ROOT = resolve(import.meta.dirname, "../../..");
+
+let chromium: Browser;
+before(async () => {
+  chromium = await browser();
+});
+after(() => chromium.close());
+
+test("the graphics card is given back what a model took", async () => {
+  const page = await chromium.newPage({ viewport: { width: 640, height: 480 } });
+  // Each geometry has buffers; those that nobody gives back stay alive.
+  await page.addInitScript(`
+    globalThis.alive = 0;
+    const own = WebGL2RenderingContext.prototype;
+    for (const [name, by] of [["createBuffer", 1], ["deleteBuffer", -1]]) {
+      const before = own[name];
+      own[name] = function (...given) { globalThis.alive += by; return before.apply(this, given); };
+    }`);
+  await page.goto(`${SERVICE}/#reaching?~feet=yes`);
+  await settled(page);
+  const alive: number[] = [];
+  for (let round = 0; round < 3; round++) {
+    for (const model of ["cmu_walk", "reaching"]) {
+      await page.getByLabel("Model", { exact: true }).selectOption(model);
+      await page.getByRole("button", { name: "Levels" }).click();
+      await page.locator(".levels-now", { hasText: "px" }).first().waitFor();
+      await page.getByRole("button", { name: "Crowd" }).click();
+      await page.locator(".crowd[data-frame]").waitFor({ timeout: 60_000 });
+      await people(page, "50");
+      await people(page, "100");
+    }
+    alive.push(await page.evaluate("alive"));
+  }
+  assert.ok(alive[0]! > 10, `${alive}`);
+  assert.equal(alive[2], alive[1]);
+  await page.close();
+});
+
+test("who drags while the model is replaced may look around afterwards", async () => {
+  const { page } = await opened(chromium, "/#reaching?~playing=no");
+  await settled(page);
+  const stage = (await page.locator("#stage").boundingBox())!;
+  const at = (await page.locator('[data-part="target"]').getAttribute("data-handle"))!.split(" ");
+  await page.mouse.move(stage.x + Number(at[0]), stage.y + Number(at[1]));
+  await page.mouse.down();
+  await page.mouse.move(stage.x + Number(at[0]), stage.y + Number(at[1]) - 20, { steps: 4 });
+  await page.getByLabel("Model", { exact: true }).selectOption("cmu_walk");
+  await page.locator('[data-control="speed"]').waitFor();
+  await page.mouse.up();
+  await settled(page);
+  await page.getByRole("button", { name: "Pause (space)" }).click();
+  const before = await picture(page);
+  await page.mouse.move(stage.x + 100, stage.y + 100);
+  await page.mouse.down();
+  await page.mouse.move(stage.x + 300, stage.y + 130, { steps: 5 });
+  await page.mouse.up();
+  assert.ok(!before.equals(await picture(page)));
+  await page.close();
+});
+
+test("feet slide as fast as the service reckons, and what is not known yet is not said", async () => {
+  const { page } = await opened(chromium, "/#cmu_walk?~feet=yes&~playing=no");
+  await settled(page);
+  const skate = page.locator("[data-skate]");
+  const known = async () => /cm\/s/.test((await skate.textContent())!);
+  await until(known, "it is said how fast they slide");
+  const card = await client.card("cmu_walk");
+  const controls = Object.fromEntries(card.controls.map((each) => [each.name, each.default]));
+  const clip = await client.clip("cmu_walk", { controls, fps: 60, loop: true });
+  const said = await skate.textContent();
+  assert.equal(said, sliding(card, clip));
+  assert.notEqual(said, sliding({ ...card, feet: [card.feet[0]!] }, clip));
+  const root = page.getByRole("button", { name: "Root motion" });
+  await root.click();
+  await page.getByText("In place, every foot slides").waitFor();
+  await page.waitForLoadState("networkidle");
+  await page.route(/clip.msgpack/, async (route) => {
+    await new Promise((done) => setTimeout(done, 1500));
+    return route.continue();
+  });
+  await root.click();
+  assert.equal(await skate.textContent(), "…");
+  await until(known, "it is said again");
+  assert.equal(await skate.textContent(), said);
+  await page.close();
+});
+
+async function people(page: Page, count: string): Promise<void> {
+  await page.locator(".crowd input").first().fill(count);
+  const counted = async () =>
+    (await page.locator(".crowd li b").allInnerTexts()).reduce((all, one) => all + Number(one), 0);
+  await until(async () => (await counted()) === Number(count), `there are ${count}`);
+}
+
+/** By service/motion/ground.py, as the page writes it. */
+function sliding(card: ModelCard, clip: Motion): string {
+  const { parents } = card.skeleton;
+  const at = placed(parents.length);
+  const feet = Array.from({ length: clip.frames }, (_, frame) => {
+    place(at, parents, clip.boneOffsets, clip.rotations, clip.rootPosition, frame);
+    return card.feet.map((joint) => [...at.positions.slice(3 * joint, 3 * joint + 3)]);
+  });
+  const code =
+    "import json, sys, numpy; from service.motion.ground import skate; " +
+    "print(f'{100 * skate(numpy.array(json.load(sys.stdin)), 60):.1f} cm/s', end='')";
+  return execFileSync(PYTHON, ["-c", code], { cwd: ROOT, input: JSON.stringify(feet) }).toString();
+}
