@@ -92,7 +92,7 @@ test("without a loop it stops at its end; slower is slower", () =>
       "it ends",
     );
     await page.getByRole("button", { name: "Play (space)" }).waitFor();
-    assert.match(page.url(), /~loop=no/);
+    await until(async () => page.url().includes("~loop=no"), "the address says so");
   }));
 
 test("at half the speed time goes half as fast", () =>
