@@ -122,3 +122,12 @@ def unpacked(kind: str, content: bytes) -> dict[str, bytes]:
             return {m.name: found.extractfile(m).read() for m in found.getmembers()}
     with zipfile.ZipFile(io.BytesIO(content)) as found:
         return {name: found.read(name) for name in found.namelist()}
+
+
+def contains(whole: Any, part: Any) -> bool:
+    """Whether `part` is an excerpt of `whole`: fewer keys, the same values."""
+    if isinstance(part, dict):
+        return all(key in whole and contains(whole[key], part[key]) for key in part)
+    if isinstance(part, list):
+        return len(whole) == len(part) and all(map(contains, whole, part))
+    return whole == part

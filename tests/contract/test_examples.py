@@ -5,6 +5,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from asking import contains
 
 from service.web import contract
 
@@ -75,12 +76,3 @@ def resolve(spec, node):
         kind, name = node["$ref"].removeprefix("#/components/").split("/")
         node = spec["components"][kind][name]
     return node
-
-
-def contains(whole, part):
-    """Whether `part` is an excerpt of `whole`: fewer keys, the same values."""
-    if isinstance(part, dict):
-        return all(key in whole and contains(whole[key], part[key]) for key in part)
-    if isinstance(part, list):
-        return len(whole) == len(part) and all(map(contains, whole, part))
-    return whole == part

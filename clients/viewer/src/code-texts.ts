@@ -1,6 +1,6 @@
 /** A question for a clip as text that others run: a link, curl, Python. */
 
-import type { ClipFormat, ClipQuestion } from "@posefield/client";
+import { Client, type ClipFormat, type ClipQuestion } from "@posefield/client";
 
 /** What is asked of whom. */
 export interface Wanted {
@@ -17,12 +17,8 @@ type Words = Readonly<Record<string, string | number | boolean>>;
 export const fileName = ({ model, format }: Wanted): string =>
   `${model.replace(/[^A-Za-z0-9_-]/g, "_")}.${format}`;
 
-export function link(wanted: Wanted): string {
-  const { base, model, format, question } = wanted;
-  const pairs = Object.entries({ ...question.controls, ...words(question) });
-  const query = new URLSearchParams(pairs.map(([name, value]) => [name, String(value)]));
-  const path = encodeURIComponent(model).replace("%40", "@");
-  return `${base}/v1/models/${path}/clip.${format}?${query}`;
+export function link({ base, model, format, question }: Wanted): string {
+  return new Client(base).url(model, format, question);
 }
 
 export function curl(wanted: Wanted): string {

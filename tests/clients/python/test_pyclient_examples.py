@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, urlsplit
 import httpx
 import numpy as np
 import pytest
-from asking import listening
+from asking import contains, listening
 from posefield_client import NOTHING, AsyncClient, Client, asking
 from posefield_client.files import CLIP, CLIPS, CROWD, WALK
 from posefield_client.generated import OPERATIONS
@@ -201,15 +201,6 @@ def table_of(found):
     if hasattr(found, "rate"):
         return found.rate, len(found.times)
     return ["levels" if "levels" in found.column_names else found.column_names, found.num_rows]
-
-
-def contains(whole, part):
-    """Whether `part` is an excerpt of `whole`: fewer keys, the same values."""
-    if isinstance(part, dict):
-        return all(key in whole and contains(whole[key], part[key]) for key in part)
-    if isinstance(part, list):
-        return len(whole) == len(part) and all(map(contains, whole, part))
-    return whole == part
 
 
 def test_another_answer_would_be_seen():
