@@ -1,6 +1,7 @@
 """What a model answers: poses or a clip, and how far they may be trusted."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -14,6 +15,20 @@ Number = TypeVar("Number", bound=np.floating[Any])
 
 
 @dataclass(frozen=True)
+class Met:
+    """What an answer was held to, and how far it stays from it.
+
+    what: a control's name, or joint and moment of a target. miss: distance of the answer from what
+    was asked for, in `unit`. reached: whether that lay within what captured motions do.
+    """
+
+    what: str
+    miss: float
+    unit: str
+    reached: bool
+
+
+@dataclass(frozen=True)
 class Trust:
     """Where an answer comes from and what it is worth.
 
@@ -21,7 +36,10 @@ class Trust:
     duration: natural length of the whole clip at these controls, s. sigma: how far a captured
     clip at these controls would lie from this one, as a root-mean-square over joints and frames,
     m. warnings: one sentence for each control outside what was sampled. performer: who was asked
-    for; none for somebody who was never seen. level: of detail.
+    for; none for somebody who was never seen. level: of detail. supported: whether anything
+    like these controls was captured. inferred: names of the controls that were not given, and
+    chosen as the most typical for those that were. measured: the controls that the recipe says how
+    to measure, as the answer has them. targets: what the answer was held to.
     """
 
     model: str
@@ -31,9 +49,14 @@ class Trust:
     warnings: tuple[str, ...]
     performer: str | None = None
     level: int = 0
+    supported: bool = True
+    inferred: tuple[str, ...] = ()
+    measured: Mapping[str, float] = field(default_factory=dict)
+    targets: tuple[Met, ...] = ()
 
     def facts(self) -> dict[str, Any]:
-        """The same as plain values, for formats that carry free metadata."""
+        """The same as plain values, for formats that carry free metadata; what there is nothing to
+        say of is left out."""
         return {
             "model": self.model,
             "controls": self.controls,
@@ -42,7 +65,16 @@ class Trust:
             "duration": self.duration,
             "sigma": self.sigma,
             "warnings": list(self.warnings),
+            **self._more(),
         }
+
+    def _more(self) -> dict[str, Any]:
+        more = {
+            "inferred": list(self.inferred),
+            "measured": dict(self.measured),
+            "targets": [asdict(met) for met in self.targets],
+        }
+        return {name: fact for name, fact in more.items() if fact}
 
 
 @dataclass(frozen=True)

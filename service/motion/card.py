@@ -11,9 +11,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from service.motion import roles
+from service.motion import measure, roles
 from service.motion.detail import Level
 from service.motion.field import Hyper
+from service.motion.measure import Measure
 from service.motion.skeleton import Skeleton
 
 FORMAT = 2
@@ -25,7 +26,8 @@ class Control:
     """One control parameter, its unit and what of it was sampled.
 
     default: the sampled value in the middle. values: the distinct sampled values where they are
-    few (a handful of performers, sitting or standing), else empty.
+    few (a handful of performers, sitting or standing), else empty. measure: how it is read off a
+    motion; None where somebody typed it, and in files older than this.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Control:
     maximum: float
     default: float
     values: tuple[float, ...]
+    measure: Measure | None = None
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
     joints = card.skeleton
     return {
         **{key: getattr(card, key) for key in _AS_THEY_ARE},
-        "controls": [{**vars(c), "values": list(c.values)} for c in card.controls],
+        "controls": [_plain_control(control) for control in card.controls],
         "levels": [_plain_level(level) for level in card.levels],
         "durations": list(card.durations),
         "performers": list(card.performers),
@@ -129,6 +132,18 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
             "tip_offsets": np.round(joints.tip_offsets, 6).tolist(),
         },
     }
+
+
+def _plain_control(control: Control) -> dict[str, Any]:
+    own = {**vars(control), "values": list(control.values)}
+    measured = own.pop("measure")
+    return own if measured is None else {**own, "measure": measure.plain(measured)}
+
+
+def _control(plain: Mapping[str, Any]) -> Control:
+    found = plain.get("measure")
+    own = None if found is None else measure.parse(found)
+    return Control(**{**plain, "values": tuple(plain["values"]), "measure": own})
 
 
 def _plain_level(level: Level) -> dict[str, Any]:
@@ -169,7 +184,7 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
     joints = plain["skeleton"]
     return ModelCard(
         **{key: plain[key] for key in _AS_THEY_ARE},
-        controls=tuple(Control(**{**c, "values": tuple(c["values"])}) for c in plain["controls"]),
+        controls=tuple(map(_control, plain["controls"])),
         skeleton=Skeleton(
             tuple(joints["names"]),
             tuple(joints["parents"]),
