@@ -67,7 +67,9 @@ class ModelCard:
     frames of each captured clip. kriging: what the weight of each of them hangs on; None, and no
     sources, in files older than these. left_out (N,): how far each of them lies from what the
     others predict for it, root mean square over joints and frames, m; empty in files older than
-    this. event: None where the recipe names none, and in files older than this.
+    this. event: None where the recipe names none, and in files older than this. beside: of a cycle
+    a root of the covariance by which captured clips stray in the logarithm of their duration and in
+    their travel, for a sigma of one metre; empty for what is no cycle, and in older files.
     """
 
     name: str
@@ -92,6 +94,7 @@ class ModelCard:
     kriging: Hyper | None = None
     left_out: tuple[float, ...] = ()
     event: Event | None = None
+    beside: tuple[tuple[float, ...], ...] = ()
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""
@@ -123,6 +126,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "kriging": _plain_hyper(card.kriging),
         "left_out": list(card.left_out),
         "event": asdict(card.event) if card.event else None,
+        "beside": [list(row) for row in card.beside],
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -208,6 +212,7 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         kriging=_hyper(plain.get("kriging")),
         left_out=tuple(plain.get("left_out", ())),
         event=_event(plain.get("event")),
+        beside=tuple(map(tuple, plain.get("beside", ()))),
     )
 
 
