@@ -84,7 +84,7 @@ def _nearer(
     """The next numbers with what is seen of them; None where none come nearer."""
     values, gradients = looked
     left = goal - values
-    share = min(1.0, STRIDE / float(np.abs(left).max()))
+    share = min(1.0, STRIDE / max(_apart(aims, left), 1e-12))
     worth = _worth(aims, spread.of(gradients))
     for _ in range(HALVINGS):
         toward = share * left + gradients @ (numbers - begun)
@@ -117,6 +117,14 @@ def _worth(aims: Sequence[Aim], covariance: Floats) -> Floats:
         worth[own] = 1.0 / max(float(np.diagonal(covariance)[own].mean()), 1e-12)
         start = own.stop
     return worth
+
+
+def _apart(aims: Sequence[Aim], left: Floats) -> float:
+    """Largest distance, m, among values (k,) of aims that are places."""
+    units = [aim.unit for aim in aims for _ in aim.goal]
+    return max(
+        (abs(value) for value, unit in zip(left, units, strict=True) if unit == "m"), default=0.0
+    )
 
 
 def _size(left: Floats, worth: Floats) -> float:
