@@ -115,6 +115,8 @@ def _goal(card: ModelCard, index: int, target: Target) -> Goal:
         known = ", ".join(card.skeleton.names)
         raise InvalidField(f"{field}/joint", f"{target.joint!r}, expected one of {known}")
     joint = card.skeleton.names.index(target.joint)
+    if len(target.position) != 3:
+        raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
     x, y, z = (limits.number(f"{field}/position/{a}", v) for a, v in enumerate(target.position))
     for axis, value in enumerate((x, y, z)):
         limits.within(f"{field}/position/{axis}", value, -FARTHEST, FARTHEST, "m")
