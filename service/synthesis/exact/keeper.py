@@ -96,9 +96,10 @@ class Keeper:
         if not asked.goals:
             return begun
         aims = looking.of_controls(asked.goals.controls, bench.reduced.frames)
+        pins = bench.pins(begun) if asked.goals.pin_feet else []
         for _ in range(ROUNDS):
             aimed = self._targets(question, asked.goals.targets, held)
-            found = bench.held(begun, [*aims, *aimed])
+            found = bench.held(begun, [*aims, *aimed], pins)
             settled = abs(found.duration / held.duration - 1.0) < SAME
             held = found
             if settled:

@@ -177,3 +177,34 @@ def test_the_event_needs_no_landmark(reach):
         model.clip(ClipQuestion(middle(model), hold=hold)).trust.targets[0].what
         == "LeftHand at event"
     )
+
+
+def test_pinned_feet_stay_where_they_stand(reach):
+    names = reach.session.card.skeleton.names
+    feet = names.index("LeftFoot"), names.index("RightFoot")
+    card = replace(reach.session.card, feet=feet)
+    reach = Synthesizer("reach", replace(reach.session, card=card))
+    controls = middle(reach)
+    free = reach.clip(ClipQuestion(controls, fps=60.0, hold=FREE))
+    goal = np.add(joint(reach, free, "RightHand")[-1], [0.02, -0.01, 0.02])
+    targets = (Target("RightHand", tuple(goal), "end"),)
+    held, pinned = (
+        reach.clip(ClipQuestion(controls, fps=60.0, hold=Hold("none", targets, pin)))
+        for pin in (False, True)
+    )
+
+    def moved(answer):
+        gaps = [joint(reach, answer, n) - joint(reach, free, n) for n in ("LeftFoot", "RightFoot")]
+        return float(np.linalg.norm(gaps, axis=-1).mean())
+
+    assert moved(pinned) < 0.5 * moved(held)
+    assert moved(held) > 1e-4
+    assert pinned.trust.targets[0].miss < 1e-4
+    assert pinned.trust.targets[0].miss == pytest.approx(held.trust.targets[0].miss, abs=1e-4)
+
+
+def test_feet_that_nobody_named_cannot_be_pinned(reach):
+    model = Synthesizer("reach", replace(reach.session, card=replace(reach.session.card, feet=())))
+    with pytest.raises(InvalidField, match="names no feet") as fault:
+        model.clip(ClipQuestion(middle(model), hold=Hold(pin_feet=True)))
+    assert fault.value.field == "pin_feet"
