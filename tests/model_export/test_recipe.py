@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 from minimal import TOML
 
-from model_export import recipe
+from model_export import controls, recipe
 from model_export.covariance import COVARIANCES
 from service.motion.errors import RecipeError
 
@@ -255,7 +255,7 @@ def test_an_event_may_be_at_a_landmark(read):
 
 
 def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):
-    for name in recipe.RESERVED:
+    for name in controls.RESERVED:
         with pytest.raises(RecipeError, match=f"controls.0.name.*'{name}'"):
             read(MINIMAL.replace('"speed"', f'"{name}"'))
     assert read(MINIMAL.replace('"speed"', '"pace"')).controls[0].name == "pace"
