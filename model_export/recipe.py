@@ -381,7 +381,9 @@ def _line_of(message: str) -> int | None:
 
 def _explain(fault: ValidationError) -> str:
     lines = []
-    for error in fault.errors(include_url=False):
+    # A unit that was left out is not known where what is measured is not: that is said already.
+    errors = fault.errors(include_url=False)
+    for error in (one for one in errors if one["type"] != "default_factory_not_called"):
         parts = [str(part) for part in error["loc"] if part not in (COLUMN, MEASURED)]
         key = ".".join(parts) or "recipe"
         found = "" if error["type"] in ("missing", "value_error") else f", found {error['input']!r}"
