@@ -165,3 +165,11 @@ def test_units_are_those_of_the_values(quantity, unit):
 def test_a_measure_read_is_the_measure_written(asked):
     assert measure.parse(measure.plain(asked)) == asked
     assert all(value not in (None, []) for value in measure.plain(asked).values())
+
+
+def test_a_measure_can_be_said():
+    names = ("hips", "hand", "foot")
+    assert measure.words(Measure("turn"), names) == "turn"
+    assert measure.words(Measure("step_length", (1, 2)), names) == "step length of hand and foot"
+    at_end = Measure("height", (1,), "landmark", 0.254)
+    assert measure.words(at_end, names) == "height of hand at landmark (25%)"
