@@ -272,8 +272,9 @@ class Synthesizer:
 
     def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
         controls, warnings = question.controls, question.warnings
-        who, level = question.performer, question.level
-        return Trust(self.identity, controls, duration, sigma, warnings, who, level)
+        who, level, inferred = question.performer, question.level, question.inferred
+        identity = self.identity
+        return Trust(identity, controls, duration, sigma, warnings, who, level, inferred=inferred)
 
     def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level
