@@ -20,7 +20,7 @@ from service import __version__, exports, page
 from service.encode import ENCODERS, Encoder, poses, reasons
 from service.encode.convention import Unit, Up
 from service.motion import card as cards
-from service.motion import files
+from service.motion import files, measure
 from service.motion.answer import ClipAnswer
 from service.motion.errors import (
     FileError,
@@ -378,6 +378,14 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
     )
 
 
+def _control(plain: dict[str, Any], joints: list[str]) -> str:
+    """A control in a line: what of it was sampled, and how it is measured where it is."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
+    own = plain.get("measure")
+    how = f" (measured: {measure.words(measure.parse(own), joints)})" if own else ""
+    return f"  {plain['name']}: {span}, {plain['description']}{how}"
+
+
 def _summary(plain: dict[str, Any]) -> str:
     """A model card on one screen."""
     diagnostics = plain["diagnostics"]
@@ -393,10 +401,7 @@ def _summary(plain: dict[str, Any]) -> str:
         f"levels of detail, times in batches of {pace.BATCH}:",
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
-        *(
-            f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"
-            for c in plain["controls"]
-        ),
+        *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
         *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),

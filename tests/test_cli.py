@@ -381,6 +381,13 @@ def test_an_unknown_performer_is_refused_with_code_2(refused, labelled_path, mod
     assert refused(2, "pose", model_path, *words) == none
 
 
+def test_inspect_says_how_controls_are_measured(posefield, measured_walk_path, model_path):
+    out = posefield("inspect", measured_walk_path)[1]
+    assert " m/s, speed (measured: speed)\n" in out
+    assert " deg, turn (measured: turn)\n" in out
+    assert "measured" not in posefield("inspect", model_path)[1]
+
+
 def test_inspect_lists_the_performers_there_are(posefield, labelled_path, model_path):
     assert "\nperformers: middle, short, tall\n" in posefield("inspect", labelled_path)[1]
     assert "\nperformers: " not in posefield("inspect", model_path)[1]

@@ -328,17 +328,9 @@ class Synthesizer:
 
     def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
         controls, warnings = question.controls, question.warnings
-        who, level = question.performer, question.level
-        return Trust(
-            self.identity,
-            controls,
-            duration,
-            sigma,
-            warnings,
-            who,
-            level,
-            inferred=question.inferred,
-        )
+        who, level, inferred = question.performer, question.level, question.inferred
+        identity = self.identity
+        return Trust(identity, controls, duration, sigma, warnings, who, level, inferred=inferred)
 
     def _held_trust(self, question: Question, held: Held) -> Trust:
         own = self._trust(question, held.duration, held.state.sigma)

@@ -1623,6 +1623,27 @@ export interface components {
             default: number;
             /** @description The distinct sampled values where they are few, else empty. */
             values: number[];
+            measure?: components["schemas"]["Measure"];
+        };
+        /** @description How a control is read off a motion; a control that somebody typed has none. Since 2.2.0. */
+        Measure: {
+            /**
+             * @description `left`, `height` and `forward` are where a joint is at a moment, m, from where the root's first pose stands on the
+             *     floor, as it faces; `step_length` is the greatest distance ahead that one foot gets of the other, m; `stride_length`,
+             *     m, `speed`, m/s, and `turn`, degrees to the left, are of a whole cycle; `leg_length` and `stature`, m, are of the
+             *     performer's bones and not of the motion.
+             * @enum {string}
+             */
+            quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "leg_length" | "stature";
+            /** @description Indices of the joints whose middle is looked at, of the two feet of a step, or of the bones of a leg. */
+            joints?: number[];
+            /**
+             * @description The moment of a place; `farthest` is from the root.
+             * @enum {string}
+             */
+            at?: "start" | "end" | "highest" | "lowest" | "farthest" | "landmark";
+            /** @description Of the duration, at which the landmark is in the mean over captured clips. */
+            share?: number;
         };
         /** @description Joints parents first, their rest offsets, and the end sites that no joint follows. At rest every rotation is the identity. */
         Skeleton: {
@@ -6035,7 +6056,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "2.1.0";
+export const CONTRACT = "2.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
