@@ -77,10 +77,11 @@ class Door:
             for control in self._card.controls
             if control.name in controls
         }
-        return given if len(given) == len(self._names) else self._chooser.fill(given, own)
+        return given if len(given) == len(self._names) else self.chooser.fill(given, own)
 
     @cached_property
-    def _chooser(self) -> Chooser:
+    def chooser(self) -> Chooser:
+        """What chooses controls that are not given."""
         return Chooser(self._card)
 
     def _outside(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:

@@ -128,7 +128,7 @@ class Synthesizer:
         the motion cannot be held to, OutsideSamples where `extrapolate` is "refuse" and a control
         lies outside its sampled range.
         """
-        asked = self.moments(controls, times, extrapolate, performer, level)
+        asked = self.moments(controls, times, extrapolate, performer, level, hold)
         goals = self.keeper.goals(asked.question, hold)
         if goals:
             return self.held_poses(asked, goals)
@@ -148,9 +148,10 @@ class Synthesizer:
         extrapolate: Policy,
         performer: str | None = None,
         level: int = 0,
+        hold: Hold = HOLD,
     ) -> Moments:
         """The question of `pose` as far as it can be checked before the model is asked."""
-        question = self.door.question(controls, extrapolate, performer, level)
+        question = self.question(controls, extrapolate, performer, level, hold)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
         when = [limits.number(f"times/{i}", value) for i, value in enumerate(times)]
@@ -291,8 +292,25 @@ class Synthesizer:
         return Prospect(len(times) + asked.loop, question.warnings)
 
     def _asked(self, asked: ClipQuestion) -> Question:
-        who, level = asked.performer, asked.level
-        return self.door.question(asked.controls, asked.extrapolate, who, level)
+        who, level, policy = asked.performer, asked.level, asked.extrapolate
+        return self.question(asked.controls, policy, who, level, asked.hold)
+
+    def question(
+        self,
+        controls: Mapping[str, float],
+        extrapolate: Policy,
+        performer: str | None,
+        level: int,
+        hold: Hold,
+    ) -> Question:
+        """The question, its open controls as is most typical for those given and for its targets;
+        raises as the door does."""
+        asked = self.door.question(controls, extrapolate, performer, level)
+        found = self.keeper.controls(asked, hold, self.door.chooser)
+        if found is None:
+            return asked
+        every = self.door.question(found, extrapolate, performer, level)
+        return replace(every, inferred=asked.inferred)
 
     def _length(self, question: Question, asked: ClipQuestion) -> float:
         """Seconds that a clip takes, which a speed that it is held to changes."""

@@ -61,7 +61,18 @@ class Chooser:
         self._controls = card.controls
         labels = np.eye(len(card.performers))[list(card.moved_by)] if card.moved_by else None
         points = np.array(card.examples)
-        self._typical = fit(points if labels is None else np.hstack([points, labels]))
+        self._samples = points if labels is None else np.hstack([points, labels])
+        self._typical = fit(self._samples)
+
+    def fill_seen(
+        self, given: Mapping[str, float], labels: Floats, seen: Floats, wanted: Floats
+    ) -> dict[str, float]:
+        """All controls as `fill` has them, the most typical too for something else of which the
+        captured clips have values (n, m), and which is wanted to be (m,)."""
+        start = self._samples.shape[1]
+        typical = fit(np.hstack([self._samples, seen]))
+        beside = {start + i: float(value) for i, value in enumerate(wanted)}
+        return self._fill(typical, given, labels, beside)
 
     def fill(self, given: Mapping[str, float], labels: Floats) -> dict[str, float]:
         """All controls, in the card's order: those given, and the most typical of the others for
@@ -70,15 +81,23 @@ class Chooser:
         A control of few values takes the nearest sampled one, before the others are chosen; none
         leaves what was sampled.
         """
+        return self._fill(self._typical, given, labels, {})
+
+    def _fill(
+        self,
+        typical: Typical,
+        given: Mapping[str, float],
+        labels: Floats,
+        beside: dict[int, float],
+    ) -> dict[str, float]:
         known = {i: given[c.name] for i, c in enumerate(self._controls) if c.name in given}
         who = np.ravel(labels)
-        beside = (
-            {len(self._controls) + i: label for i, label in enumerate(who)} if who.any() else {}
-        )
+        if who.any():
+            beside = beside | {len(self._controls) + i: label for i, label in enumerate(who)}
         steps = [i for i, c in enumerate(self._controls) if i not in known and c.values]
-        row = self._typical(known | beside)
+        row = typical(known | beside)
         known |= {i: _nearest(self._controls[i].values, row[i]) for i in steps}
-        row = self._typical(known | beside)
+        row = typical(known | beside)
         return {
             control.name: known[i] if i in known else _within(control, row[i])
             for i, control in enumerate(self._controls)
