@@ -151,6 +151,16 @@ def _size(left: Floats, worth: Floats) -> float:
     return float(np.sum(worth * np.square(left)))
 
 
+def distance(
+    scene: Scene, spread: Spread, sigma: float, numbers: Floats, aims: Sequence[Aim]
+) -> float:
+    """How far off aims lie from a motion (numbers,), in standard deviations."""
+    values, gradients = looking.look(aims, scene, numbers)
+    left = np.concatenate([aim.goal for aim in aims]) - values
+    covariance = sigma**2 * _evened(aims, spread.of(gradients))
+    return float(np.sqrt(left @ np.linalg.solve(covariance, left)))
+
+
 def far(values: int) -> float:
     """How far so many values may be off together, in standard deviations: as unlikely as FAR is for
     three (Wilson and Hilferty 1931)."""

@@ -41,15 +41,17 @@ def off(model, controls, truth):
 
 
 def test_controls_are_those_of_motions_that_get_there(reach):
-    gains = []
+    gains, misses = [], []
     for index in range(0, 46, 5):
         truth, place = captured(reach, index)
         found = asked(reach, place)
         nothing = reach.clip(ClipQuestion({})).trust
         gains.append(off(reach, found.controls, truth) / off(reach, nothing.controls, truth))
         assert set(found.inferred) == set(truth)
-        assert found.targets[0].miss < 0.02
+        misses.append(found.targets[0].miss)
+    # Who stands or sits, and how tall they are, no hand tells: the rest is found.
     assert np.median(gains) < 0.7
+    assert np.median(misses) < 1e-3
 
 
 def test_a_control_that_the_target_is_about_is_read_off_it(reach):
