@@ -35,9 +35,10 @@ def asked(model, place, joint="RightHand", **given):
 
 
 def off(model, controls, truth):
-    """Distance of controls from others, in ranges."""
+    """Distance of those controls from others that a hand tells of, in ranges."""
     ranges = {c.name: c.maximum - c.minimum for c in model.session.card.controls}
-    return np.linalg.norm([(controls[n] - truth[n]) / ranges[n] for n in ranges])
+    told = ("turn", "target_height")
+    return np.linalg.norm([(controls[n] - truth[n]) / ranges[n] for n in told])
 
 
 def test_controls_are_those_of_motions_that_get_there(reach):
@@ -50,7 +51,7 @@ def test_controls_are_those_of_motions_that_get_there(reach):
         assert set(found.inferred) == set(truth)
         misses.append(found.targets[0].miss)
     # Who stands or sits, and how tall they are, no hand tells: the rest is found.
-    assert np.median(gains) < 0.7
+    assert np.median(gains) < 0.4
     assert np.median(misses) < 1e-3
 
 
