@@ -1354,7 +1354,8 @@ export interface components {
          */
         LevelNumber: number;
         /**
-         * @description A number for each control of the model, in the control's unit.
+         * @description A number for each control of the model, in the control's unit. In a question some or all of them
+         *     may be left out, of a crowd none: they are then the most typical for those that are given and for the performer.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -1425,6 +1426,7 @@ export interface components {
             performer: string | null;
             /** @description One sentence for each control outside what was sampled. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1559,7 +1561,13 @@ export interface components {
             /** @description As in Trust, m. */
             sigma: number;
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
         };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given;
+         *     not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
             model: components["schemas"]["Identity"];
@@ -1574,6 +1582,7 @@ export interface components {
             sigma: number;
             /** @description One sentence for each control outside what was sampled. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
         };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
@@ -1780,7 +1789,7 @@ export interface components {
          */
         CrowdQuestion: {
             /**
-             * @description For each control of the model its values, in the control's unit.
+             * @description For each control of the model its values, in the control's unit. None may be left out.
              * @example {
              *       "stature": [
              *         1.72,
@@ -2820,7 +2829,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2889,9 +2898,12 @@ export interface components {
         model: string;
         /**
          * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-         *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-         *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-         *     width of the range away. The names of the other parameters are reserved.
+         *     The model's card gives their names, units and sampled ranges; a value outside the range is
+         *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+         *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+         *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+         *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+         *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -3145,9 +3157,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3155,7 +3170,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3241,9 +3256,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3251,7 +3269,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3335,9 +3353,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3345,7 +3366,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3429,9 +3450,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3439,7 +3463,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3523,9 +3547,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3533,7 +3560,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3614,12 +3641,15 @@ export interface operations {
     };
     getClip: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3627,7 +3657,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3714,12 +3744,15 @@ export interface operations {
     };
     getClipUsda: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3727,7 +3760,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3812,12 +3845,15 @@ export interface operations {
     };
     getClipUsdc: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3825,7 +3861,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3910,12 +3946,15 @@ export interface operations {
     };
     getClipUsdz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3923,7 +3962,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4008,12 +4047,15 @@ export interface operations {
     };
     getClipJson: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4021,7 +4063,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4106,12 +4148,15 @@ export interface operations {
     };
     getClipBvh: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4119,7 +4164,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4204,12 +4249,15 @@ export interface operations {
     };
     getClipGlb: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4217,7 +4265,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4302,12 +4350,15 @@ export interface operations {
     };
     getClipNpz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4315,7 +4366,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4400,12 +4451,15 @@ export interface operations {
     };
     getClipArrow: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4413,7 +4467,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4498,12 +4552,15 @@ export interface operations {
     };
     getClipMsgpack: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4511,7 +4568,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -5047,12 +5104,15 @@ export interface operations {
     };
     getWhy: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5060,7 +5120,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
                 /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
