@@ -134,10 +134,10 @@ WRONG_BODIES = [
     (b'{"controls": {}, "loop": 1}', 400, "bad-body", "/loop"),
     (b'{"controls": {}, "unit": "inch"}', 400, "bad-body", "/unit"),
     (b'{"controls": {}, "up": 2}', 400, "bad-body", "/up"),
-    (b'{"controls": {}}', 422, "invalid-field", "/controls/stature"),
+    (b'{"controls": {"spin": 1}}', 422, "invalid-field", "/controls/spin"),
     (b'{"controls": {}, "performer": 1}', 400, "bad-body", "/performer"),
     (b'{"controls": {}, "performer": "Tall"}', 422, "invalid-field", "/performer"),
-    (b'{"controls": {}, "performer": "tall"}', 422, "invalid-field", "/controls/stature"),
+    (b'{"controls": {}, "performer": "tall", "fps": 0}', 422, "invalid-field", "/fps"),
 ]
 
 

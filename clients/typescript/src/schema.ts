@@ -2366,6 +2366,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2478,6 +2479,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2496,6 +2498,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2514,6 +2517,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2532,6 +2536,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2550,6 +2555,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2568,6 +2574,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2586,6 +2593,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2604,6 +2612,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2622,6 +2631,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -3071,6 +3081,11 @@ export interface components {
         Sigma: number;
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
+        /**
+         * @description Values of the controls that were left out, and are the most typical for those that were given: a JSON
+         *     object in ASCII; absent where none was. Since 2.2.0.
+         */
+        Inferred: string;
         /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
