@@ -42,13 +42,13 @@ class Typical:
         return row
 
 
-def fit(samples: Floats) -> Typical:
-    """The Gaussian of samples (n, k)."""
+def fit(samples: Floats, shrunk: float = SHRUNK) -> Typical:
+    """The Gaussian of samples (n, k), a share of what columns have in common left out."""
     mean = samples.mean(axis=0)
     deviation = samples.std(axis=0)
     deviation[deviation == 0.0] = 1.0
     apart = (samples - mean) / deviation
-    correlation = (1.0 - SHRUNK) * (apart.T @ apart) / len(samples)
+    correlation = (1.0 - shrunk) * (apart.T @ apart) / len(samples)
     # One that never varies is of no use to any other, and no hindrance.
     np.fill_diagonal(correlation, 1.0)
     return Typical(mean, deviation, correlation)

@@ -257,6 +257,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -287,6 +288,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
 
@@ -307,6 +309,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
 
 
 class Liveness(Struct, frozen=True, kw_only=True):

@@ -1354,7 +1354,8 @@ export interface components {
          */
         LevelNumber: number;
         /**
-         * @description A number for each control of the model, in the control's unit.
+         * @description A number for each control of the model, in the control's unit. In a question some or all of them
+         *     may be left out, of a crowd none: they are then the most typical for those that are given and for the performer.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -1425,6 +1426,7 @@ export interface components {
             performer: string | null;
             /** @description One sentence for each control outside what was sampled. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1559,7 +1561,13 @@ export interface components {
             /** @description As in Trust, m. */
             sigma: number;
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
         };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given;
+         *     not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
             model: components["schemas"]["Identity"];
@@ -1574,6 +1582,7 @@ export interface components {
             sigma: number;
             /** @description One sentence for each control outside what was sampled. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
         };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
@@ -1780,7 +1789,7 @@ export interface components {
          */
         CrowdQuestion: {
             /**
-             * @description For each control of the model its values, in the control's unit.
+             * @description For each control of the model its values, in the control's unit. None may be left out.
              * @example {
              *       "stature": [
              *         1.72,
@@ -2357,6 +2366,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2469,6 +2479,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2487,6 +2498,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2505,6 +2517,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2523,6 +2536,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2541,6 +2555,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2559,6 +2574,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2577,6 +2593,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2595,6 +2612,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2613,6 +2631,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2820,7 +2839,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2889,9 +2908,12 @@ export interface components {
         model: string;
         /**
          * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-         *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-         *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-         *     width of the range away. The names of the other parameters are reserved.
+         *     The model's card gives their names, units and sampled ranges; a value outside the range is
+         *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+         *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+         *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+         *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+         *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -3060,6 +3082,11 @@ export interface components {
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
         /**
+         * @description Values of the controls that were left out, and are the most typical for those that were given: a JSON
+         *     object in ASCII; absent where none was. Since 2.2.0.
+         */
+        Inferred: string;
+        /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
@@ -3145,9 +3172,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3155,7 +3185,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3241,9 +3271,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3251,7 +3284,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3335,9 +3368,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3345,7 +3381,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3429,9 +3465,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3439,7 +3478,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3523,9 +3562,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3533,7 +3575,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3614,12 +3656,15 @@ export interface operations {
     };
     getClip: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3627,7 +3672,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3714,12 +3759,15 @@ export interface operations {
     };
     getClipUsda: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3727,7 +3775,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3812,12 +3860,15 @@ export interface operations {
     };
     getClipUsdc: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3825,7 +3876,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3910,12 +3961,15 @@ export interface operations {
     };
     getClipUsdz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3923,7 +3977,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4008,12 +4062,15 @@ export interface operations {
     };
     getClipJson: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4021,7 +4078,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4106,12 +4163,15 @@ export interface operations {
     };
     getClipBvh: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4119,7 +4179,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4204,12 +4264,15 @@ export interface operations {
     };
     getClipGlb: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4217,7 +4280,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4302,12 +4365,15 @@ export interface operations {
     };
     getClipNpz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4315,7 +4381,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4400,12 +4466,15 @@ export interface operations {
     };
     getClipArrow: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4413,7 +4482,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4498,12 +4567,15 @@ export interface operations {
     };
     getClipMsgpack: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4511,7 +4583,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -5047,12 +5119,15 @@ export interface operations {
     };
     getWhy: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5060,7 +5135,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
                 /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
