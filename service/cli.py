@@ -47,7 +47,7 @@ Controls = Annotated[
     typer.Option("--control", "-c", help="NAME=VALUE, once for each control", metavar="NAME=VALUE"),
 ]
 Extrapolate = Annotated[
-    Policy, typer.Option(help="what to do with controls outside what was sampled")
+    Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
 ]
 Performer = Annotated[
     str | None, typer.Option(help="who moves, by name; somebody never seen if not said")

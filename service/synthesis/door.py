@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import support
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
@@ -15,8 +16,8 @@ from service.synthesis.question import Policy
 @dataclass(frozen=True)
 class Question:
     """What has passed the door: controls, in the card's order, and performer as they were given,
-    and as the graph takes them, point (1, d) and labels (1, p); a warning for each control outside
-    its sampled range."""
+    and as the graph takes them, point (1, d) and labels (1, p); what is warned of; and whether
+    anything like these controls was captured."""
 
     controls: dict[str, float]
     performer: str | None
@@ -24,6 +25,7 @@ class Question:
     point: Floats
     labels: Floats
     warnings: tuple[str, ...]
+    supported: bool
 
 
 class Door:
@@ -34,6 +36,7 @@ class Door:
         self._ranges = [(control.name, *limits.sampled(control)) for control in card.controls]
         self._names = {control.name for control in card.controls}
         self._nobody = labels(card.performers, None)
+        self.support = support.of(np.array(card.examples))
 
     def question(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
@@ -41,7 +44,7 @@ class Door:
         """The question, if it has an answer.
 
         Raises InvalidField for a control, performer or level that cannot be used, OutsideSamples
-        where `extrapolate` is "refuse" and a control lies outside its sampled range.
+        where `extrapolate` is "refuse" and nothing like the controls was captured.
         """
         if not controls.keys() <= self._names:
             limits.check_names(self._card, controls)
@@ -49,12 +52,13 @@ class Door:
         coarsest = len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-        plain = self._plain(controls)
-        warnings = () if plain else self._checked(controls, extrapolate)
+        found = () if self._plain(controls) else self._checked(controls)
         # However they are put: the same question has the same bytes.
         given = {name: float(controls[name]) for name, _, _ in self._ranges}
-        point = np.array([list(given.values())])
-        return Question(given, performer, level, point, own, warnings)
+        point = list(given.values())
+        supported = self.support.held(point)
+        warnings = () if supported and not found else self._said(extrapolate, found, point)
+        return Question(given, performer, level, np.array([point]), own, warnings, supported)
 
     def _plain(self, controls: Mapping[str, float]) -> bool:
         """Whether there is nothing to say of the controls, as of nearly all that are asked for."""
@@ -63,10 +67,24 @@ class Door:
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
-    def _checked(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:
-        """What to warn of."""
-        values = np.array([required(control, controls) for control in self._card.controls])
-        return outside(self._card.controls, values, extrapolate)
+    def _checked(self, controls: Mapping[str, float]) -> tuple[str, ...]:
+        """A sentence for each control outside what was sampled."""
+        values = [required(control, controls) for control in self._card.controls]
+        return outside(self._card.controls, values)
+
+    def _said(
+        self, extrapolate: Policy, found: tuple[str, ...], point: Sequence[float]
+    ) -> tuple[str, ...]:
+        """What to warn of where something lies outside, or in a gap; OutsideSamples where that is
+        refused."""
+        said = found or (self._gap(point),)
+        if extrapolate == "refuse":
+            raise OutsideSamples("controls", "; ".join(said))
+        return said if extrapolate == "warn" else ()
+
+    def _gap(self, point: Sequence[float]) -> str:
+        variance = float(self.support.variance(np.array([point]))[0])
+        return gap("these controls lie", variance, self.support.limit)
 
 
 def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
@@ -90,14 +108,18 @@ def required(control: Control, controls: Mapping[str, float]) -> float:
     return value
 
 
-def outside(controls: Sequence[Control], point: Floats, extrapolate: Policy) -> tuple[str, ...]:
-    """A sentence for each control whose value (d,) lies outside its sampled range; OutsideSamples
-    where that is refused."""
+def outside(controls: Sequence[Control], point: Sequence[float]) -> tuple[str, ...]:
+    """A sentence for each control whose value (d,) lies outside its sampled range."""
     found = (_outside(control, value) for control, value in zip(controls, point, strict=True))
-    said = tuple(filter(None, found))
-    if said and extrapolate == "refuse":
-        raise OutsideSamples("controls", "; ".join(said))
-    return said
+    return tuple(filter(None, found))
+
+
+def gap(who: str, variance: float, limit: float) -> str:
+    """What to say of controls between the captured clips, by the variance of a plain field."""
+    return (
+        f"{who} in a gap of what was sampled: nothing like it was captured "
+        f"(variance {variance:.2g}, expected at most {limit:.2g})"
+    )
 
 
 def _outside(control: Control, value: float) -> str | None:

@@ -119,7 +119,7 @@ class Synthesizer:
         somebody who was never seen, at a level of detail.
 
         Raises InvalidField for a control, time, performer or level that cannot be used,
-        OutsideSamples where `extrapolate` is "refuse" and a control lies outside its sampled range.
+        OutsideSamples where `extrapolate` is "refuse" and nothing like the controls was captured.
         """
         asked = self.moments(controls, times, extrapolate, performer, level)
         return self.posed(asked, self.poses([asked])[0])
@@ -191,7 +191,7 @@ class Synthesizer:
         """A question at a share of each control's range, and of the shortest clip."""
         card = self.session.card
         controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
-        return self.moments(controls, [share * card.durations[0]], "warn", None, level)
+        return self.moments(controls, [share * card.durations[0]], "ok", None, level)
 
     def posed(self, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
         """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
@@ -271,9 +271,19 @@ class Synthesizer:
         return PoseAnswer(when, rotations, root, offsets, trust)
 
     def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
-        controls, warnings = question.controls, question.warnings
-        who, level = question.performer, question.level
-        return Trust(self.identity, controls, duration, sigma, warnings, who, level)
+        who = question.performer
+        seen = who is not None if self.session.card.performers else None
+        return Trust(
+            self.identity,
+            question.controls,
+            duration,
+            sigma,
+            question.warnings,
+            who,
+            question.level,
+            question.supported,
+            seen,
+        )
 
     def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level

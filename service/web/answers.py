@@ -64,6 +64,7 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
         "Posefield-Model": trust.model,
         "Posefield-Sigma": repr(trust.sigma),
         "Posefield-Duration": repr(trust.duration),
+        "Posefield-Supported": "true" if trust.supported else "false",
     }
     made = Response(content, headers=headers, media_type=encoder.media_type)
     return _warning(made, trust.warnings)

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "2.1.0"
+CONTRACT = "2.2.0"
 """Version of the contract that this client was made for."""
 
 
@@ -27,7 +27,7 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     controls: dict[str, float]
     times: tuple[float, ...]
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
 
@@ -39,7 +39,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
@@ -57,7 +57,7 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
@@ -106,7 +106,7 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     pixels: float | UnsetType | None = UNSET
     budget_ms: float | UnsetType | None = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
 
 
 class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -126,7 +126,7 @@ class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     controls: dict[str, float]
     nearest: int | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
 
 
@@ -246,7 +246,19 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
     warnings: tuple[str, ...]
+
+
+class Backing(Struct, frozen=True, kw_only=True):
+    """Whether anything like these controls was captured, and by what that was told."""
+
+    supported: bool
+    beyond: dict[str, float]
+    most_beyond: float
+    variance: float
+    most_variance: float
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -277,6 +289,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
+    support: Backing
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
 
@@ -296,6 +309,8 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
     warnings: tuple[str, ...]
 
 

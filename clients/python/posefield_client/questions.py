@@ -28,7 +28,7 @@ from posefield_client.wire import Call, Reply, Request
 
 T = TypeVar("T")
 
-Extrapolate = Literal["warn", "refuse"]
+Extrapolate = Literal["ok", "warn", "refuse"]
 Controls = Mapping[str, float]
 Times = float | Sequence[float] | npt.NDArray[Any]
 

@@ -1337,10 +1337,13 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
+         * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
+         *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
+         *     a gap of what was sampled; `refuse` answers neither.
          * @default warn
          * @enum {string}
          */
-        Extrapolate: "warn" | "refuse";
+        Extrapolate: "ok" | "warn" | "refuse";
         /**
          * @description Who moves, of the `performers` that the model's card names; null for somebody who was never seen.
          * @default null
@@ -1423,8 +1426,9 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Who was asked for; null for somebody who was never seen. */
             performer: string | null;
-            /** @description One sentence for each control outside what was sampled. */
+            /** @description As in Trust. */
             warnings: string[];
+            support: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1432,6 +1436,20 @@ export interface components {
                 count: number;
                 weight: number;
             };
+        };
+        /** @description Whether anything like these controls was captured, and by what that was told. */
+        Backing: {
+            supported: components["schemas"]["Supported"];
+            /** @description How far each control lies beyond its sampled range, as a share of it. */
+            beyond: {
+                [key: string]: number;
+            };
+            /** @description The share beyond which nothing is supported. */
+            most_beyond: number;
+            /** @description Of a plain field over the controls of the captured clips, from 0 where many are near to 1 where none is. */
+            variance: number;
+            /** @description The variance above which nothing is supported. */
+            most_variance: number;
         };
         CapturedClip: {
             /** @description The motion file, and the frames of it where the clip is a part. */
@@ -1558,6 +1576,8 @@ export interface components {
             duration: number;
             /** @description As in Trust, m. */
             sigma: number;
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
             warnings: string[];
         };
         /** @description Where an answer comes from and what it is worth. */
@@ -1572,9 +1592,15 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            /** @description One sentence for each control outside what was sampled. */
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it. */
             warnings: string[];
         };
+        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
+        Supported: boolean;
+        /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
+        PerformerSeen: boolean;
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
         /** @description For each time the position of the root, m. */
@@ -1882,6 +1908,8 @@ export interface components {
             duration: number[];
             /** @description As in Trust, m. */
             sigma: number[];
+            /** @description As in Trust. */
+            supported: boolean[];
             /** @description The level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers; absent without a camera. */
@@ -2336,6 +2364,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2448,6 +2477,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2466,6 +2496,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2484,6 +2515,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2502,6 +2534,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2520,6 +2553,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2538,6 +2572,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2556,6 +2591,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2574,6 +2610,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2592,6 +2629,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2799,7 +2837,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls like which nothing was captured with `extrapolate` refuse. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2918,7 +2956,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+        /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -3038,6 +3076,8 @@ export interface components {
         Sigma: number;
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
+        /** @description As `supported` in Trust. */
+        Supported: "true" | "false";
         /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
@@ -3143,7 +3183,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3239,7 +3279,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3333,7 +3373,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3427,7 +3467,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3521,7 +3561,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3613,7 +3653,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3713,7 +3753,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3811,7 +3851,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3909,7 +3949,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4007,7 +4047,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4105,7 +4145,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4203,7 +4243,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4301,7 +4341,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4399,7 +4439,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4497,7 +4537,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -5042,7 +5082,7 @@ export interface operations {
                 controls: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -6035,7 +6075,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "2.1.0";
+export const CONTRACT = "2.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -6052,6 +6092,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ],
   "ModelCard": [
@@ -6099,6 +6140,7 @@ export const REQUIRED = {
     "controls",
     "performer",
     "warnings",
+    "support",
     "nearest",
     "others"
   ],
@@ -6121,6 +6163,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ]
 } as const;
