@@ -158,6 +158,7 @@ def _card(
         roles={str(role): joint for role, joint in recipe.roles.items()},
         left_out=tuple(map(_round, np.sqrt(trained.missed))),
         event=fidelity.event(recipe, examples),
+        joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
     )
 
 

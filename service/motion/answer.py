@@ -41,7 +41,7 @@ class Trust:
     somebody captured was asked for; none where the model tells nobody apart. inferred: names of the
     controls that were not given, and chosen as the most typical for those that were. measured: the
     controls that the recipe says how to measure, as the answer has them. targets: what the answer
-    was held to.
+    was held to. joint_sigma (J,), m: sigma of each joint, where it was asked for.
     """
 
     model: str
@@ -56,6 +56,7 @@ class Trust:
     inferred: tuple[str, ...] = ()
     measured: Mapping[str, float] = field(default_factory=dict)
     targets: tuple[Met, ...] = ()
+    joint_sigma: tuple[float, ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """The same as plain values, for formats that carry free metadata; what there is nothing to
@@ -78,6 +79,7 @@ class Trust:
             "inferred": list(self.inferred),
             "measured": dict(self.measured),
             "targets": [asdict(met) for met in self.targets],
+            "joint_sigma": list(self.joint_sigma),
         }
         return seen | {name: fact for name, fact in more.items() if fact}
 

@@ -67,7 +67,8 @@ class ModelCard:
     frames of each captured clip. kriging: what the weight of each of them hangs on; None, and no
     sources, in files older than these. left_out (N,): how far each of them lies from what the
     others predict for it, root mean square over joints and frames, m; empty in files older than
-    this. event: None where the recipe names none, and in files older than this.
+    this. event: None where the recipe names none, and in files older than this. joint_sigma (J,):
+    how far each joint errs, as a share of sigma; empty in files older than this.
     """
 
     name: str
@@ -92,6 +93,7 @@ class ModelCard:
     kriging: Hyper | None = None
     left_out: tuple[float, ...] = ()
     event: Event | None = None
+    joint_sigma: tuple[float, ...] = ()
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""
@@ -123,6 +125,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "kriging": _plain_hyper(card.kriging),
         "left_out": list(card.left_out),
         "event": asdict(card.event) if card.event else None,
+        "joint_sigma": list(card.joint_sigma),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -208,6 +211,7 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         kriging=_hyper(plain.get("kriging")),
         left_out=tuple(plain.get("left_out", ())),
         event=_event(plain.get("event")),
+        joint_sigma=tuple(plain.get("joint_sigma", ())),
     )
 
 

@@ -31,7 +31,8 @@ class ClipQuestion:
     is; heights stay, and so does all of a model that is in place already. loop: a whole cycle as
     N = max(1, round(duration * fps)) steps, without start and end. Its frame N is its first again:
     equal in every number where it stays in place, else carried by the cycle's way and turn. It
-    plays N / fps seconds, which is the duration but for the rounding.
+    plays N / fps seconds, which is the duration but for the rounding. joint_sigma: whether the
+    answer says how far each joint may err.
     """
 
     controls: Mapping[str, float]
@@ -44,6 +45,7 @@ class ClipQuestion:
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+    joint_sigma: bool = False
 
 
 @dataclass(frozen=True)

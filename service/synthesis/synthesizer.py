@@ -1,7 +1,7 @@
 """Questions to a model, checked at the door, and its answers in the project's own types."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
 from typing import Any
@@ -42,6 +42,9 @@ class Moments:
         return self.question.level
 
 
+OLD = "does not say how far its joints err; train it again"
+MICROMETRES = 6
+"""Decimals of a metre."""
 SAMPLE = 17
 """Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
 
@@ -96,9 +99,11 @@ class Synthesizer:
         return {"own": self.session.card.skeleton}
 
     def _joints(self, asked: ClipQuestion) -> Skeleton:
-        """The skeleton with the names asked for; InvalidField for names that no role leads to, and
-        for a loop of what is no cycle."""
+        """The skeleton with the names asked for; InvalidField for names that no role leads to, for
+        a loop of what is no cycle, and for sigma by joint of a model that cannot say."""
         card = self.session.card
+        if asked.joint_sigma:
+            self._shares()
         if asked.loop and not card.cyclic:
             raise InvalidField(
                 "loop", "true, expected false: this model's last pose does not lead into its first"
@@ -216,7 +221,20 @@ class Synthesizer:
         if asked.loop or asked.root == "in_place":
             answer = self._routed(question, answer, asked)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
+        trust = self.by_joint(answer.trust) if asked.joint_sigma else answer.trust
+        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), trust)
+
+    def by_joint(self, trust: Trust) -> Trust:
+        """The same with sigma of each joint; InvalidField for a model that cannot say."""
+        joints = (round(share * trust.sigma, MICROMETRES) for share in self._shares())
+        return replace(trust, joint_sigma=tuple(joints))
+
+    def _shares(self) -> tuple[float, ...]:
+        """Sigma of each joint as a share of sigma."""
+        found = self.session.card.joint_sigma
+        if not found:
+            raise InvalidField("joint_sigma", f"true, but {self.identity} {OLD}")
+        return found
 
     def check(self, asked: ClipQuestion) -> None:
         """Raise what `clip` would, as far as it can be said before anything is synthesised: how

@@ -30,6 +30,7 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -42,6 +43,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
@@ -60,6 +62,7 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
@@ -232,6 +235,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     provenance: dict[str, Any]
     roles: dict[str, str]
     sources: tuple[str, ...]
+    joint_sigma: tuple[float, ...] = ()
     kriging: ModelCardKriging | None
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
@@ -248,6 +252,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     sigma: float
     supported: bool
     performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
 
 
@@ -311,6 +316,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     sigma: float
     supported: bool
     performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
 
 

@@ -1325,6 +1325,11 @@ export interface components {
          */
         Loop: boolean;
         /**
+         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer.
+         * @default false
+         */
+        JointSigma: boolean;
+        /**
          * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
          * @default null
          * @enum {string|null}
@@ -1381,6 +1386,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -1402,6 +1408,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
@@ -1554,6 +1561,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
@@ -1578,6 +1586,7 @@ export interface components {
             sigma: number;
             supported: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
         };
         /** @description Where an answer comes from and what it is worth. */
@@ -1594,11 +1603,14 @@ export interface components {
             sigma: number;
             supported: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
             /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it. */
             warnings: string[];
         };
         /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
         Supported: boolean;
+        /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
+        SigmaByJoint: number[];
         /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
         PerformerSeen: boolean;
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
@@ -1732,6 +1744,8 @@ export interface components {
             };
             /** @description File and frames of each captured clip; empty in models trained before this was kept. */
             sources: string[];
+            /** @description How far each joint errs, as a share of sigma; empty in models trained before this was kept. */
+            joint_sigma?: number[];
             /** @description What the weights of the captured clips hang on; null in models trained before this was kept. */
             kriging: {
                 /** @enum {string} */
@@ -2948,6 +2962,8 @@ export interface components {
         root: components["schemas"]["Root"];
         /** @description Whether the clip is a loop. */
         loop: components["schemas"]["Loop"];
+        /** @description Whether the trust says how far each joint may err. */
+        jointSigma: components["schemas"]["JointSigma"];
         /** @description The file's unit of length; the format's usual one, if left out. */
         unit: "m" | "cm";
         /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3191,6 +3207,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3287,6 +3305,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3381,6 +3401,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3475,6 +3497,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3569,6 +3593,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3661,6 +3687,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3761,6 +3789,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3859,6 +3889,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3957,6 +3989,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4055,6 +4089,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4153,6 +4189,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4251,6 +4289,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4349,6 +4389,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4447,6 +4489,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4545,6 +4589,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
