@@ -179,6 +179,10 @@ def evaluate(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
     ] = None,
+    joined: Annotated[
+        Path | None,
+        typer.Option(help="another recipe: is the gap between both flagged?", metavar="RECIPE"),
+    ] = None,
     table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
     scheduler: Scheduler = None,
 ) -> None:
@@ -195,7 +199,7 @@ def evaluate(
         raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
     else:
         asked = [one.value for one in protocol or []]
-        wanted = _Wanted(asked, report, json_file, scheduler)
+        wanted = _Wanted(asked, report, json_file, scheduler, joined)
         _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
@@ -210,17 +214,19 @@ def _table1(json_file: Path | None) -> None:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Protocols, all that can for none, what to write, and where to work."""
+    """Protocols, all that can for none, what to write, where to work, and the recipe of a family
+    that is joined to this one."""
 
     protocols: list[str]
     report: Path | None
     json_file: Path | None
     scheduler: str | None
+    joined: Path | None
 
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import protocol, summary
+    from model_export.evaluate import flags, protocol, summary
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -235,9 +241,15 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
                 results.append(protocol.run(own, examples, name, progress))
             typer.echo(f"{summary.table(results[-1])}\n")
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
+    more: dict[str, Any] = {}
+    if wanted.joined:
+        other = recipe.read(wanted.joined)
+        both = flags.joined(own, examples, other, ingest.ingest(other, data)[0])
+        typer.echo(f"\n{own.name} and {other.name} joined, {summary.flags_said(both)}")
+        more = {"joined": {"family": other.name, "support": summary.flags_facts(both)}}
     first, *others = map(summary.facts, results)
     if wanted.json_file:
-        files.write(as_json({**first, "others": others}).encode(), wanted.json_file)
+        files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
     if wanted.report:
         from model_export.evaluate import render
 

@@ -159,6 +159,7 @@ def _card(
         left_out=tuple(map(_round, np.sqrt(trained.missed))),
         event=fidelity.event(recipe, examples),
         beside=_beside(trained),
+        joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
     )
 
 

@@ -7,6 +7,7 @@ that died; 128 and a signal's number where that ended an export.
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -52,7 +53,7 @@ Controls = Annotated[
     ),
 ]
 Extrapolate = Annotated[
-    Policy, typer.Option(help="what to do with controls outside what was sampled")
+    Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
 ]
 Performer = Annotated[
     str | None, typer.Option(help="who moves, by name; somebody never seen if not said")
@@ -61,6 +62,9 @@ LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the fine
 JointNames = Annotated[Names, typer.Option(help="what joints are called")]
 RootMotion = Annotated[Root, typer.Option(help="whether the root travels")]
 Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last frame is its first")]
+JointSigma = Annotated[
+    bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
+]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -136,13 +140,15 @@ def pose(
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
     level: LevelOfDetail = 0,
+    joint_sigma: JointSigma = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
     answer = synthesizer.pose(asked, times, extrapolate, performer, level)
     _tell(answer.trust)
-    typer.echo(poses.json(answer).decode())
+    trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
+    typer.echo(poses.json(replace(answer, trust=trust)).decode())
 
 
 @app.command()
@@ -159,6 +165,7 @@ def clip(
     names: JointNames = "own",
     root: RootMotion = "travelling",
     loop: Loop = False,
+    joint_sigma: JointSigma = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -169,7 +176,7 @@ def clip(
     synthesizer = open_model(model)
     controls = numbers(control or [])
     asked = ClipQuestion(
-        controls, fps, extrapolate, start, end, performer, level, names, root, loop
+        controls, fps, extrapolate, start, end, performer, level, names, root, loop, joint_sigma
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)

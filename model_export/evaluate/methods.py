@@ -38,10 +38,12 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answers:
-    """Motions of each method, and our own standard deviation (Q,) of each query, m."""
+    """Motions of each method, and our own standard deviation of each query (Q,), and of each joint
+    of it (Q, J), m."""
 
     motions: dict[str, list[Motion]]
     sigma: Floats
+    joint_sigma: Floats
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
     motions = {OURS: _ours(trained, asked, points, event)}
     for name, predict in _methods(trained).items():
         motions[name] = _restore(trained, predict(points), event)
-    return Answers(motions, bank.sigma(bank.numpy(points)[VARIANCE]))
+    sigma = bank.sigma(bank.numpy(points)[VARIANCE])
+    return Answers(motions, sigma, sigma[:, None] * trained.joints)
 
 
 def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:

@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
 from model_export import threads
-from model_export.evaluate import errors, folds, methods, motion, truth
+from model_export.evaluate import errors, flags, folds, methods, motion, truth
 from model_export.evaluate.errors import Errors
+from model_export.evaluate.flags import Flags
 from model_export.evaluate.folds import Fold
 from model_export.evaluate.methods import Answers, Asked
 from model_export.evaluate.motion import Motion
@@ -34,7 +35,8 @@ class Result:
     """What one protocol found.
 
     clips: what was asked for, by name. errors: of each method, clip by clip. sigma (C,): predicted
-    standard deviation of ours, m.
+    standard deviation of ours, m; joint_sigma (C, J): of each joint, by name in `joints`. flags:
+    how the support flag does on the same clips; none against the truth, which is everywhere.
     """
 
     family: str
@@ -42,6 +44,9 @@ class Result:
     clips: tuple[str, ...]
     errors: dict[str, tuple[Errors, ...]]
     sigma: Floats
+    joint_sigma: Floats
+    joints: tuple[str, ...]
+    flags: Flags | None = None
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,7 @@ class _Part:
     places: tuple[int, ...]
     errors: dict[str, list[Errors]]
     sigma: Floats
+    joint_sigma: Floats
 
 
 def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
@@ -70,7 +76,10 @@ def run(recipe: Recipe, examples: Sequence[Example], protocol: str, report: Repo
     own = folds.clips(examples) if protocol == "clip" else folds.performers(examples)
     jobs = [delayed(_held_out)(recipe, examples, fold) for fold in own]
     names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
-    return _result(recipe, f"leave_one_{protocol}_out", names, _done(jobs, report))
+    controls = np.stack([example.controls for example in examples])
+    found = flags.measure(controls, [control.name for control in recipe.controls], own)
+    asked = _Asked(f"leave_one_{protocol}_out", names, examples[0].clip.skeleton.names)
+    return replace(_result(recipe, asked, _done(jobs, report)), flags=found)
 
 
 def against_truth(
@@ -81,7 +90,7 @@ def against_truth(
     starts = range(0, len(points), BATCH)
     jobs = [delayed(_true)(recipe, trained, points[at : at + BATCH], at) for at in starts]
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
-    return _result(recipe, "truth", names, _done(jobs, report))
+    return _result(recipe, _Asked("truth", names, trained.skeleton.names), _done(jobs, report))
 
 
 def _done(jobs: Sequence[object], report: Report) -> Iterator[_Part]:
@@ -135,10 +144,19 @@ def _compared(
         name: [errors.compare(own, true, feet) for own, true in zip(made, captured, strict=True)]
         for name, made in found.motions.items()
     }
-    return _Part(places, compared, found.sigma)
+    return _Part(places, compared, found.sigma, found.joint_sigma)
 
 
-def _result(recipe: Recipe, protocol: str, names: Sequence[str], parts: Iterator[_Part]) -> Result:
+@dataclass(frozen=True)
+class _Asked:
+    """Which protocol, of which clips, and the names of the joints."""
+
+    protocol: str
+    clips: Sequence[str]
+    joints: tuple[str, ...]
+
+
+def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
     """Parts in the order of the clips, whichever came first."""
     listed = list(parts)
     order = np.argsort([place for part in listed for place in part.places])
@@ -147,8 +165,10 @@ def _result(recipe: Recipe, protocol: str, names: Sequence[str], parts: Iterator
     }
     return Result(
         recipe.name,
-        protocol,
-        tuple(names),
+        asked.protocol,
+        tuple(asked.clips),
         {name: tuple(own[i] for i in order) for name, own in gathered.items()},
         np.concatenate([part.sigma for part in listed])[order],
+        np.concatenate([part.joint_sigma for part in listed])[order],
+        asked.joints,
     )

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from model_export.evaluate import errors
+from model_export.evaluate import errors, flags
 from model_export.evaluate.errors import Errors
+from model_export.evaluate.flags import Flags
 from model_export.evaluate.methods import DEFINITIONS, OURS
 from model_export.evaluate.protocol import Result
 from model_export.report import plain
@@ -133,13 +134,59 @@ def sigma_ratio(result: Result) -> float:
     return float(np.mean(squared / np.square(result.sigma)))
 
 
+def joint_sigma_ratios(result: Result) -> dict[str, float]:
+    """The same for each joint alone, by name."""
+    squared = np.stack([error.joints for error in result.errors[OURS]])
+    ratios = np.mean(squared / np.square(result.joint_sigma), axis=0)
+    return dict(zip(result.joints, ratios.tolist(), strict=True))
+
+
+def flags_facts(found: Flags) -> dict[str, Any]:
+    """How the support flag does, as JSON holds it."""
+    facts = {
+        "false_alarms": plain.number(found.alarms),
+        "beyond": {name: plain.number(share) for name, share in found.beyond.items()},
+    }
+    if found.gap is None:
+        return facts
+    control, share = found.gap
+    return {**facts, "gap": {"control": control, "flagged": plain.number(share)}}
+
+
+def flags_said(found: Flags) -> str:
+    """The same in a sentence."""
+    beyond = ", ".join(f"{name} {100 * share:.0f}" for name, share in found.beyond.items())
+    said = (
+        f"support: {100 * found.alarms:.1f} % of held-out clips flagged; of those moved "
+        f"{100 * flags.BEYOND:.0f} % of its range beyond a control, %: {beyond}"
+    )
+    if found.gap is None:
+        return said
+    control, share = found.gap
+    return f"{said}; in the gap of {control}, %: {100 * share:.0f}"
+
+
+def _joints_said(result: Result) -> str:
+    """Sigma by joint in a sentence."""
+    ratios = joint_sigma_ratios(result)
+    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    return (
+        f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
+        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
+    )
+
+
 def facts(result: Result) -> dict[str, Any]:
     """Figures of a result as JSON holds them."""
+    held = {} if result.flags is None else {"support": flags_facts(result.flags)}
+    by_joint = joint_sigma_ratios(result)
     return {
         "family": result.family,
         "protocol": result.protocol,
         "clips": len(result.clips),
         "sigma_ratio": plain.number(sigma_ratio(result)),
+        "joint_sigma_ratio": {name: plain.number(ratio) for name, ratio in by_joint.items()},
+        **held,
         "methods": {summary.name: summary.facts() for summary in of(result)},
     }
 
@@ -157,7 +204,8 @@ def table(result: Result) -> str:
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
-    return "\n".join([title, "", lines[0], rule, *lines[1:]])
+    said = [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
+    return "\n".join([title, "", lines[0], rule, *lines[1:], "", *said])
 
 
 LEGEND = (

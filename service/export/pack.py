@@ -27,10 +27,11 @@ class Order:
 
     @property
     def warnings(self) -> list[str]:
-        """One sentence if some clips are extrapolated; the manifest says which."""
+        """One sentence if some clips are like nothing that was captured; the manifest says
+        which."""
         outside = sum(bool(prospect.warnings) for prospect in self.prospects)
         clips = f"{outside} of {len(self.prospects)} clips"
-        return [f"{clips} have some control outside what was sampled"] if outside else []
+        return [f"{clips} lie outside what was sampled, or in a gap of it"] if outside else []
 
 
 def members(order: Order) -> Iterator[tuple[str, bytes]]:

@@ -47,6 +47,9 @@ class Moments:
         return self.question.level
 
 
+OLD = "does not say how far its joints err; train it again"
+MICROMETRES = 6
+"""Decimals of a metre."""
 SAMPLE = 17
 """Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
 
@@ -101,9 +104,11 @@ class Synthesizer:
         return {"own": self.session.card.skeleton}
 
     def _joints(self, asked: ClipQuestion) -> Skeleton:
-        """The skeleton with the names asked for; InvalidField for names that no role leads to, and
-        for a loop of what is no cycle."""
+        """The skeleton with the names asked for; InvalidField for names that no role leads to, for
+        a loop of what is no cycle, and for sigma by joint of a model that cannot say."""
         card = self.session.card
+        if asked.joint_sigma:
+            self._shares()
         if asked.loop and not card.cyclic:
             raise InvalidField(
                 "loop", "true, expected false: this model's last pose does not lead into its first"
@@ -125,8 +130,8 @@ class Synthesizer:
         somebody who was never seen, at a level of detail, of a motion that is held to something.
 
         Raises InvalidField for a control, time, performer or level that cannot be used, or for what
-        the motion cannot be held to, OutsideSamples where `extrapolate` is "refuse" and a control
-        lies outside its sampled range.
+        the motion cannot be held to, OutsideSamples where `extrapolate` is "refuse" and nothing
+        like the controls was captured.
         """
         asked = self.moments(controls, times, extrapolate, performer, level, hold)
         goals = self.keeper.goals(asked.question, hold)
@@ -214,7 +219,7 @@ class Synthesizer:
         """A question at a share of each control's range, and of the shortest clip."""
         card = self.session.card
         controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
-        return self.moments(controls, [share * card.durations[0]], "warn", None, level)
+        return self.moments(controls, [share * card.durations[0]], "ok", None, level)
 
     def posed(self, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
         """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
@@ -243,7 +248,20 @@ class Synthesizer:
         else:
             answer = self._plain(question, asked, most)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
+        trust = self.by_joint(answer.trust) if asked.joint_sigma else answer.trust
+        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), trust)
+
+    def by_joint(self, trust: Trust) -> Trust:
+        """The same with sigma of each joint; InvalidField for a model that cannot say."""
+        joints = (round(share * trust.sigma, MICROMETRES) for share in self._shares())
+        return replace(trust, joint_sigma=tuple(joints))
+
+    def _shares(self) -> tuple[float, ...]:
+        """Sigma of each joint as a share of sigma."""
+        found = self.session.card.joint_sigma
+        if not found:
+            raise InvalidField("joint_sigma", f"true, but {self.identity} {OLD}")
+        return found
 
     def _plain(self, question: Question, asked: ClipQuestion, most: int) -> PoseAnswer[np.float64]:
         """Frames of a clip that is held to nothing."""
@@ -345,10 +363,20 @@ class Synthesizer:
         return PoseAnswer(when, rotations, root, offsets, trust)
 
     def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
-        controls, warnings = question.controls, question.warnings
-        who, level, inferred = question.performer, question.level, question.inferred
-        identity = self.identity
-        return Trust(identity, controls, duration, sigma, warnings, who, level, inferred=inferred)
+        who = question.performer
+        seen = who is not None if self.session.card.performers else None
+        return Trust(
+            self.identity,
+            question.controls,
+            duration,
+            sigma,
+            question.warnings,
+            who,
+            question.level,
+            question.supported,
+            seen,
+            inferred=question.inferred,
+        )
 
     def _held_trust(self, question: Question, held: Held) -> Trust:
         own = self._trust(question, held.duration, held.state.sigma)

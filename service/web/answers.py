@@ -64,6 +64,7 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
         "Posefield-Model": trust.model,
         "Posefield-Sigma": repr(trust.sigma),
         "Posefield-Duration": repr(trust.duration),
+        "Posefield-Supported": "true" if trust.supported else "false",
     }
     if trust.inferred:
         chosen = {name: trust.controls[name] for name in trust.inferred}

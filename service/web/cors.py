@@ -22,7 +22,7 @@ _READABLE = b", ".join(
         # Without it a page would take the length of compressed content for that of what it reads.
         b"Content-Encoding",
         *(b"Posefield-Duration", b"Posefield-Inferred", b"Posefield-Model"),
-        *(b"Posefield-Sigma", b"Posefield-Warning"),
+        *(b"Posefield-Sigma", b"Posefield-Supported", b"Posefield-Warning"),
         *(b"X-Request-Id", b"Inference-Header-Content-Length"),
     )
 )

@@ -36,14 +36,15 @@ FLAGS = {"true": True, "false": False}
 
 @dataclass(frozen=True)
 class PoseQuestion:
-    """Which poses: control values and times, s, who moves, nobody that was seen for none, and the
-    level of detail."""
+    """Which poses: control values and times, s, who moves, nobody that was seen for none, the
+    level of detail, and whether sigma is asked for by joint."""
 
     controls: dict[str, float]
     times: list[float]
     extrapolate: Policy
     performer: str | None = None
     level: int = 0
+    joint_sigma: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,7 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     extrapolate: Policy = POLICY
     performer: str | None = None
     level: float = 0.0
+    joint_sigma: bool = False
 
 
 class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -78,6 +80,7 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+    joint_sigma: bool = False
 
 
 class FileBody(ClipBody, frozen=True):
@@ -103,15 +106,16 @@ def pairs(query_string: bytes) -> list[tuple[str, str]]:
 
 
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
-    """Question of query parameters: `time` once or more, extrapolate, performer, level, and one
-    per control."""
+    """Question of query parameters: `time` once or more, extrapolate, performer, level,
+    joint_sigma, and one per control."""
     times = [number(name, text) for name, text in pairs if name == "time"]
     if not times:
         raise bad_parameter("time", "missing; give seconds from the start of the clip")
     single = unique([pair for pair in pairs if pair[0] != "time"])
     policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
-    return PoseQuestion(numbers_of(single), times, policy, performer, level)
+    by_joint = _flag(single, "joint_sigma")
+    return PoseQuestion(numbers_of(single), times, policy, performer, level, by_joint)
 
 
 def file_of_pairs(pairs: Pairs) -> FileQuestion:
@@ -128,7 +132,7 @@ def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
     level = whole("level", single.pop("level", "0"))
     names = _word(single, "names", _choices(Names), NAMES)
     root = _word(single, "root", _choices(Root), ROOT)
-    loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
+    loop, by_joint = _flag(single, "loop"), _flag(single, "joint_sigma")
     numbers = numbers_of(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -141,6 +145,7 @@ def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
         names=names,
         root=root,
         loop=loop,
+        joint_sigma=by_joint,
     )
 
 
@@ -149,7 +154,8 @@ def pose_of_body(content: bytes) -> PoseQuestion:
     body = decoding.decoded(_POSE, content)
     controls = controls_of(body.controls)
     level = _level(body.level)
-    return PoseQuestion(controls, body.times, body.extrapolate, body.performer, level)
+    policy, who, by_joint = body.extrapolate, body.performer, body.joint_sigma
+    return PoseQuestion(controls, body.times, policy, who, level, by_joint)
 
 
 def file_of_body(content: bytes) -> FileQuestion:
@@ -171,6 +177,7 @@ def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
         body.names,
         body.root,
         body.loop,
+        body.joint_sigma,
     )
 
 
@@ -196,6 +203,11 @@ def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Wo
     if text is not usual and text not in choices:
         raise bad_parameter(name, f"{text!r}, expected one of {', '.join(choices)}")
     return cast(Word, text)
+
+
+def _flag(single: dict[str, str], name: str) -> bool:
+    """What is said under that name, which is taken out; false where nothing is."""
+    return FLAGS[_word(single, name, tuple(FLAGS), "false")]
 
 
 def numbers_of(texts: dict[str, str]) -> dict[str, float]:

@@ -156,7 +156,7 @@ class InvalidField(Unanswerable, kind="invalid-field"):
 
 
 class OutsideSamples(Unanswerable, kind="outside-samples"):
-    """The controls lie outside what was sampled, and `extrapolate` is "refuse"."""
+    """Nothing like the controls was captured, and `extrapolate` is "refuse"."""
 
 
 class Busy(Problem):

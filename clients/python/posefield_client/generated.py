@@ -27,9 +27,10 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     controls: dict[str, float]
     times: tuple[float, ...]
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,9 +40,10 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
@@ -57,9 +59,10 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
@@ -106,7 +109,7 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     pixels: float | UnsetType | None = UNSET
     budget_ms: float | UnsetType | None = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
 
 
 class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -126,7 +129,7 @@ class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     controls: dict[str, float]
     nearest: int | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
 
 
@@ -242,6 +245,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     provenance: dict[str, Any]
     roles: dict[str, str]
     sources: tuple[str, ...]
+    joint_sigma: tuple[float, ...] = ()
     kriging: ModelCardKriging | None
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
@@ -256,8 +260,21 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
+
+
+class Backing(Struct, frozen=True, kw_only=True):
+    """Whether anything like these controls was captured, and by what that was told."""
+
+    supported: bool
+    beyond: dict[str, float]
+    most_beyond: float
+    variance: float
+    most_variance: float
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -289,6 +306,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     performer: str | None
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
+    support: Backing
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
 
@@ -308,6 +326,9 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
 

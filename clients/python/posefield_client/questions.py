@@ -28,7 +28,7 @@ from posefield_client.wire import Call, Reply, Request
 
 T = TypeVar("T")
 
-Extrapolate = Literal["warn", "refuse"]
+Extrapolate = Literal["ok", "warn", "refuse"]
 Controls = Mapping[str, float]
 Times = float | Sequence[float] | npt.NDArray[Any]
 
@@ -60,6 +60,7 @@ def pose(
     *,
     performer: str | None = None,
     level: int | None = None,
+    joint_sigma: bool | None = None,
     extrapolate: Extrapolate | None = None,
     controls: Controls | None = None,
     **named: float,
@@ -69,6 +70,7 @@ def pose(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
+        **asking.said(joint_sigma=joint_sigma),
     )
     return Call(asking.either("PoseMsgpack", model, question), numbers.pose)
 

@@ -1325,6 +1325,11 @@ export interface components {
          */
         Loop: boolean;
         /**
+         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer.
+         * @default false
+         */
+        JointSigma: boolean;
+        /**
          * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
          * @default null
          * @enum {string|null}
@@ -1337,10 +1342,13 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
+         * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
+         *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
+         *     a gap of what was sampled; `refuse` answers neither.
          * @default warn
          * @enum {string}
          */
-        Extrapolate: "warn" | "refuse";
+        Extrapolate: "ok" | "warn" | "refuse";
         /**
          * @description Who moves, of the `performers` that the model's card names; null for somebody who was never seen.
          * @default null
@@ -1379,6 +1387,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -1400,6 +1409,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
@@ -1424,9 +1434,10 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Who was asked for; null for somebody who was never seen. */
             performer: string | null;
-            /** @description One sentence for each control outside what was sampled. */
+            /** @description As in Trust. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
+            support: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1434,6 +1445,20 @@ export interface components {
                 count: number;
                 weight: number;
             };
+        };
+        /** @description Whether anything like these controls was captured, and by what that was told. */
+        Backing: {
+            supported: components["schemas"]["Supported"];
+            /** @description How far each control lies beyond its sampled range, as a share of it. */
+            beyond: {
+                [key: string]: number;
+            };
+            /** @description The share beyond which nothing is supported. */
+            most_beyond: number;
+            /** @description Of a plain field over the controls of the captured clips, from 0 where many are near to 1 where none is. */
+            variance: number;
+            /** @description The variance above which nothing is supported. */
+            most_variance: number;
         };
         CapturedClip: {
             /** @description The motion file, and the frames of it where the clip is a part. */
@@ -1538,6 +1563,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
@@ -1560,6 +1586,9 @@ export interface components {
             duration: number;
             /** @description As in Trust, m. */
             sigma: number;
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
         };
@@ -1580,10 +1609,19 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            /** @description One sentence for each control outside what was sampled. */
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
+            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
         };
+        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
+        Supported: boolean;
+        /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
+        SigmaByJoint: number[];
+        /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
+        PerformerSeen: boolean;
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
         /** @description For each time the position of the root, m. */
@@ -1736,6 +1774,8 @@ export interface components {
             };
             /** @description File and frames of each captured clip; empty in models trained before this was kept. */
             sources: string[];
+            /** @description How far each joint errs, as a share of sigma; empty in models trained before this was kept. */
+            joint_sigma?: number[];
             /** @description What the weights of the captured clips hang on; null in models trained before this was kept. */
             kriging: {
                 /** @enum {string} */
@@ -1912,6 +1952,8 @@ export interface components {
             duration: number[];
             /** @description As in Trust, m. */
             sigma: number[];
+            /** @description As in Trust. */
+            supported: boolean[];
             /** @description The level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers; absent without a camera. */
@@ -2367,6 +2409,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2480,6 +2523,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2499,6 +2543,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2518,6 +2563,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2537,6 +2583,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2556,6 +2603,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2575,6 +2623,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2594,6 +2643,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2613,6 +2663,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2632,6 +2683,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2839,7 +2891,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls like which nothing was captured with `extrapolate` refuse. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2953,6 +3005,8 @@ export interface components {
         root: components["schemas"]["Root"];
         /** @description Whether the clip is a loop. */
         loop: components["schemas"]["Loop"];
+        /** @description Whether the trust says how far each joint may err. */
+        jointSigma: components["schemas"]["JointSigma"];
         /** @description The file's unit of length; the format's usual one, if left out. */
         unit: "m" | "cm";
         /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -2961,7 +3015,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+        /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -3086,6 +3140,8 @@ export interface components {
          *     object in ASCII; absent where none was. Since 2.2.0.
          */
         Inferred: string;
+        /** @description As `supported` in Trust. */
+        Supported: "true" | "false";
         /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
@@ -3194,7 +3250,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3202,6 +3258,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3293,7 +3351,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3301,6 +3359,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3390,7 +3450,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3398,6 +3458,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3487,7 +3549,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3495,6 +3557,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3584,7 +3648,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3592,6 +3656,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
             };
@@ -3679,7 +3745,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3687,6 +3753,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3782,7 +3850,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3790,6 +3858,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3883,7 +3953,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3891,6 +3961,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3984,7 +4056,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3992,6 +4064,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4085,7 +4159,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4093,6 +4167,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4186,7 +4262,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4194,6 +4270,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4287,7 +4365,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4295,6 +4373,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4388,7 +4468,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4396,6 +4476,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4489,7 +4571,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4497,6 +4579,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4590,7 +4674,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4598,6 +4682,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -5138,7 +5224,7 @@ export interface operations {
                 controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -6148,6 +6234,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ],
   "ModelCard": [
@@ -6195,6 +6282,7 @@ export const REQUIRED = {
     "controls",
     "performer",
     "warnings",
+    "support",
     "nearest",
     "others"
   ],
@@ -6217,6 +6305,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ]
 } as const;

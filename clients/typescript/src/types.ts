@@ -70,6 +70,8 @@ export interface CrowdPoses {
   readonly boneOffsets: Float32Array;
   readonly duration: Float32Array;
   readonly sigma: Float32Array;
+  /** N, whether anything like it was captured; from services that say so. */
+  readonly supported: readonly boolean[] | null;
   readonly levels: Int32Array;
   /** N, where a camera was given. */
   readonly errorPx: Float32Array | null;
@@ -86,6 +88,8 @@ export interface Named {
   readonly sigma: number | null;
   /** As in Trust, s; of a single clip. */
   readonly duration: number | null;
+  /** As in Trust; of a single clip. */
+  readonly supported: boolean | null;
   readonly warnings: readonly string[];
 }
 

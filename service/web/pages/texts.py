@@ -111,9 +111,10 @@ TEXTS: dict[Kind, Text] = {
         {"parameter": "fps"},
     ),
     TABLE[OutsideSamples]: Text(
-        "Controls lie outside what the model was trained from, and `extrapolate=refuse` asked "
-        "for an error rather than a warning.",
-        "Move the controls into the ranges on the model's card, or ask with `extrapolate=warn`.",
+        "Controls lie outside what the model was trained from, or in a gap of it, and "
+        "`extrapolate=refuse` asked for an error rather than a warning.",
+        "Move the controls into the ranges on the model's card and near to clips that were "
+        "captured, which `why` names, or ask with `extrapolate=warn`.",
         "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
         {"parameter": "controls"},
     ),
