@@ -49,6 +49,11 @@ class Kriging:
         basis = self._basis(points)
         return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
+    @property
+    def values(self) -> Floats:
+        """What it was laid through (n, m), from the dual weights."""
+        return values(self.weighing, self.dual)
+
     def _basis(self, points: Floats) -> Floats:
         return field.basis(self.hyper, points, self.samples)
 
@@ -63,6 +68,11 @@ def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
     toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
     form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
     return Kriging(hyper, samples, weighing @ values, weighing, form)
+
+
+def values(weighing: Floats, dual: Floats) -> Floats:
+    """Values (n, m) of which dual weights (n + k, m) were made."""
+    return np.asarray(np.linalg.lstsq(weighing, dual)[0], dtype=np.float64)
 
 
 def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
