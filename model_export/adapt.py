@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import align, extend, flips, kriging, new_fields, phase, threads
+from model_export import align, extend, fidelity, flips, kriging, new_fields, phase, threads
 from model_export import travel as travels
 from model_export.align import FINE, Aligned, Canon
 from model_export.chart import Chart
@@ -21,8 +21,10 @@ from model_export.flips import Finding
 from model_export.ingest import Example
 from model_export.model import Model
 from model_export.new_fields import Laid
+from model_export.recipe import Recipe
+from model_export.train import Trained
 from service.motion.clip import assemble
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 from service.motion.skeleton import Skeleton
 
 
@@ -32,7 +34,7 @@ class Known:
 
     skeleton: the family's. landmarks (M,): their canonical times. joint_weights (J,). in_phase:
     cycles were brought to begin together. in_place: the root does not travel. truncation: what
-    cutting the tensor cost, root mean square, m.
+    cutting the tensor cost, root mean square, m. groups (n,): samples that are left out together.
     """
 
     model: Model
@@ -42,12 +44,28 @@ class Known:
     in_phase: bool
     in_place: bool
     truncation: float
+    groups: Indices
 
     @property
     def canon(self) -> Canon:
         """Its canonical time."""
         timing = self.model.timing
         return Canon(timing.frames, timing.basis, self.landmarks, self.joint_weights)
+
+
+def known(recipe: Recipe, trained: Trained) -> Known:
+    """What is known of a model that has just been trained."""
+    own, marks = trained.model, [example.landmarks for example in trained.examples]
+    return Known(
+        own,
+        trained.skeleton,
+        np.array(marks).reshape(len(marks), -1).mean(axis=0),
+        fidelity.joint_weights(recipe, trained.examples),
+        recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
+        recipe.motion.root == "in_place",
+        trained.fidelity.rms,
+        trained.laid.groups,
+    )
 
 
 @dataclass(frozen=True)
@@ -87,7 +105,8 @@ def adapt(known: Known, examples: Sequence[Example], performer: str) -> Adapted:
         moved = move(known, examples)
         parents, weights = known.skeleton.parents, known.joint_weights
         extended = extend.extend(known.model, parents, weights, moved.numbers, known.truncation)
-        return _solved(known.model, moved, extended, performer)
+        laid = new_fields.lay(known.model.bank, known.groups, moved.examples, performer)
+        return _solved(known.model, moved, extended, laid)
 
 
 def move(known: Known, examples: Sequence[Example]) -> Moved:
@@ -135,16 +154,15 @@ def _distances(
     return np.array(found)
 
 
-def _solved(model: Model, moved: Moved, extended: Extended, performer: str) -> Adapted:
-    laid = new_fields.lay(model.bank, moved.examples, performer)
+def _solved(model: Model, moved: Moved, extended: Extended, laid: Laid) -> Adapted:
     reduced = extended.full.truncated(extended.ranks)
-    pose = kriging.solve(
-        laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2]
-    )
+    pose = kriging.solve(laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2])
     bones, proportions = new_fields.bones(laid, model.bank, model.proportions, moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
-    solved = {name: new_fields.solve(laid, model.bank, name, values) for name, values in new.items()}
+    solved = {
+        name: new_fields.solve(laid, model.bank, name, values) for name, values in new.items()
+    }
     # In the order in which the model has them.
     others = {name: solved.get(name, bones) for name in model.bank.others}
     missed, sill = _missed(model.bank, laid, moved, extended)
@@ -155,9 +173,7 @@ def _solved(model: Model, moved: Moved, extended: Extended, performer: str) -> A
     return Adapted(adapted, moved, extended, missed)
 
 
-def _missed(
-    old: FieldBank, laid: Laid, moved: Moved, extended: Extended
-) -> tuple[Floats, float]:
+def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tuple[Floats, float]:
     """Mean squared joint distance (k,), m², of the new clips from what all others predict, and the
     sill, m², with them."""
     hyper, points, k = laid.hyper(old.pose.hyper), laid.samples.points, len(moved.examples)
@@ -177,5 +193,7 @@ def _travel_residuals(old: FieldBank, laid: Laid, new: Floats) -> Floats:
     field, both = old.others["travel"], np.vstack([old.at_samples("travel"), new])
     if isinstance(field, kriging.Kriging):
         hyper = laid.hyper(field.hyper)
-        return (kriging.leave_out(hyper, laid.samples.points, laid.samples.groups) @ both)[-len(new) :]
+        return (kriging.leave_out(hyper, laid.samples.points, laid.samples.groups) @ both)[
+            -len(new) :
+        ]
     return laid.samples.from_mean(both)[-len(new) :]

@@ -220,7 +220,7 @@ class _Wanted:
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import protocol, summary
+    from model_export.evaluate import protocol, summary, worth
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -234,10 +234,13 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
             with _bar(name) as progress:
                 results.append(protocol.run(own, examples, name, progress))
             typer.echo(f"{summary.table(results[-1])}\n")
-    typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
+    for said in worth.said(results):
+        typer.echo(said)
+    typer.echo(f"{summary.LEGEND}\n{summary.definitions(results)}")
     first, *others = map(summary.facts, results)
     if wanted.json_file:
-        files.write(as_json({**first, "others": others}).encode(), wanted.json_file)
+        named = {"performers": found} if (found := worth.facts(results)) else {}
+        files.write(as_json({**first, "others": others, **named}).encode(), wanted.json_file)
     if wanted.report:
         from model_export.evaluate import render
 

@@ -17,7 +17,7 @@ from model_export.ingest import Example
 from model_export.kriging import Hyper
 from model_export.samples import Samples
 from model_export.tune import LABELS, NUGGETS, SCALES
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 from service.motion.field import half_ranges
 
 
@@ -37,10 +37,10 @@ class Laid:
         return replace(old, scales=old.scales * self.growth)
 
 
-def lay(bank: FieldBank, examples: Sequence[Example], performer: str) -> Laid:
-    """Samples of a bank, each left out by itself, and those of a new performer's examples, left out
-    by their takes."""
-    d, n = len(bank.low), len(bank.pose.samples)
+def lay(bank: FieldBank, old_groups: Indices, examples: Sequence[Example], performer: str) -> Laid:
+    """Samples of a bank with their groups (n,), and those of a new performer's examples, which are
+    left out by their takes."""
+    d = len(bank.low)
     old = (bank.pose.samples[:, :d] * (bank.high - bank.low) + bank.low + bank.high) / 2.0
     new = np.stack([example.controls for example in examples])
     low, high = np.minimum(bank.low, new.min(axis=0)), np.maximum(bank.high, new.max(axis=0))
@@ -48,7 +48,7 @@ def lay(bank: FieldBank, examples: Sequence[Example], performer: str) -> Laid:
     moved_by = [bank.performers[i] for i in np.argmax(bank.pose.samples[:, d:], axis=1)]
     labels = samples.labels([*moved_by, *([performer] * len(new))], performers)
     points = np.hstack([half_ranges(np.vstack([old, new]), low, high), labels])
-    groups = np.concatenate([np.arange(n), n + samples.takes(examples)])
+    groups = np.concatenate([old_groups, 1 + old_groups.max() + samples.takes(examples)])
     growth = (high - low) / (bank.high - bank.low)
     return Laid(low, high, performers, Samples(points, d, groups), growth)
 

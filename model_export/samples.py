@@ -101,9 +101,9 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
     Raises TrainingError where there is none without a single example.
     """
     degree = recipe.kriging.degree
-    takes, alone = takes(examples), np.arange(len(examples))
-    if _needed(takes, points, degree) is None:
-        return takes
+    by_file, alone = takes(examples), np.arange(len(examples))
+    if _needed(by_file, points, degree) is None:
+        return by_file
     needed = _needed(alone, points, degree)
     if needed is not None:
         raise TrainingError(
