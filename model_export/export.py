@@ -170,8 +170,22 @@ def _card(
         roles={str(role): joint for role, joint in recipe.roles.items()},
         left_out=tuple(map(_round, np.sqrt(trained.missed))),
         event=fidelity.event(recipe, examples),
+        beside=_beside(trained),
         making=_making(recipe, trained),
     )
+
+
+def _beside(trained: Trained) -> tuple[tuple[float, ...], ...]:
+    """Root of the covariance of what strays beside a cycle's poses, for a sigma of one metre."""
+    if "travel" not in trained.residuals:
+        return ()
+    strays = np.hstack([trained.residuals["duration"], trained.residuals["travel"]])
+    sigmas = np.sqrt(trained.model.bank.sill * trained.pose.variances)
+    standard = strays / sigmas[:, None]
+    covariance = standard.T @ standard / len(standard)
+    # A walk of one duration, or a straight one, has no variance there.
+    root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(covariance)))
+    return tuple(tuple(map(_round, row)) for row in root)
 
 
 def _making(recipe: Recipe, trained: Trained) -> Making:

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import onnx
-from onnx import numpy_helper
 
-from model_export import kriging, samples
+from model_export import kriging
 from model_export.adapt import Known
 from model_export.decoder import Decoder, Proportions
 from model_export.field_bank import POSE, Constant, Field, FieldBank
@@ -23,11 +21,12 @@ from model_export.model import Model
 from model_export.timing import Timing
 from model_export.travel import Travel
 from model_export.warp import WarpBasis
-from service.motion import field, quat
+from service.motion import field
 from service.motion.card import Making, ModelCard
 from service.motion.conventions import Floats, Indices
 from service.motion.errors import ModelError
-from service.synthesis import session
+from service.synthesis import freeze, session
+from service.synthesis.exact import reduced, spread
 
 # Numbers of float32 are this near to those that they were, in half-ranges.
 SAME = 1e-5
@@ -73,8 +72,7 @@ def reopen(content: bytes, source: str) -> Reopened:
             "was written before models could be adapted: its card does not say what its fields "
             "were solved with; train it again",
         )
-    graph = onnx.load_from_string(content).graph
-    numbers = {t.name: _plain(numpy_helper.to_array(t)) for t in graph.initializer}
+    numbers = {name: _plain(array) for name, array in freeze.weights(content).items()}
     file = _File(numbers, own_card, own_card.making, source)
     return Reopened(_known(file), own_card, own_card.making, session.sha256(content))
 
@@ -88,8 +86,6 @@ def _known(file: _File) -> Known:
     bank = _bank(file)
     model = Model(bank, _timing(file), _decoder(file, bank), _bones(file), _travel(card))
     names = card.skeleton.names
-    degree = max(bank.pose.hyper.drifts)
-    takes = [source.partition(", frames ")[0] for source in card.sources]
     return Known(
         model,
         card.skeleton,
@@ -98,7 +94,7 @@ def _known(file: _File) -> Known:
         making.in_phase,
         card.root == "in_place",
         float(card.diagnostics["truncation_rms_m"]),
-        samples.by_file(takes, bank.pose.samples[:, : len(card.controls)], degree),
+        spread.groups(card, bank.pose.samples),
     )
 
 
@@ -133,20 +129,10 @@ def _bank(file: _File) -> FieldBank:
 
 def _order(file: _File, points: Floats) -> Indices:
     """Place on the card (n,) of each sample of the graph."""
-    d, stored = len(file.card.controls), file["samples"][0].T
-    whose = file["whose"] if "whose" in file else np.zeros(len(stored), np.int64)
-    own = np.argmax(points[:, d:], axis=1) if "whose" in file else whose
-    left = list(range(len(points)))
-    order = []
-    for sample, label in zip(stored, whose, strict=True):
-        gaps = [
-            np.abs(points[place, :d] - sample).max() + float(own[place] != label) for place in left
-        ]
-        best = int(np.argmin(gaps))
-        if gaps[best] > SAME:
-            raise ModelError(file.source, "its card lists other samples than its graph holds")
-        order.append(left.pop(best))
-    return np.array(order)
+    order, held = spread.order_of(file.card, file.numbers, points), file["samples"][0].T
+    if np.abs(points[order, : len(file.card.controls)] - held).max() > SAME:
+        raise ModelError(file.source, "its card lists other samples than its graph holds")
+    return order
 
 
 def _widths(file: _File) -> dict[str, int]:
@@ -188,24 +174,12 @@ def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Krig
     near[order] = file[f"{name}_weights"]
     functions = 1 + max(hyper.drifts) * len(hyper.scales)
     dual = np.vstack([near, file["drift_weights"][:functions, _columns(file, name)]])
-    return kriging.solve(hyper, points, kriging.values(field.weighing(hyper, points), dual))
+    return kriging.solve(hyper, points, kriging.values(hyper, points, dual))
 
 
 def _decoder(file: _File, bank: FieldBank) -> Decoder:
     """Decoder whose first mode's coordinates are those of the core."""
-    core = file["core"].transpose(1, 0, 2)
-    varying = np.vstack([file["directions"], np.zeros((1, len(core)))])
-    unwhiten = varying[file["freedoms"]]
-    bases = np.eye(len(core)), file["time_basis"].T, bank.pose.values
-    means = file["mean_rotations"][:, :, 0]
-    return Decoder(Multilinear(core, bases), _mean(file, means), unwhiten, means)
-
-
-def _mean(file: _File, means: Floats) -> Floats:
-    """Pose vector (D,) that the tensor is centred on: `decoder.turned` the other way round."""
-    turned = np.empty_like(means)
-    turned[file["joint_order"] if "joint_order" in file else slice(None)] = file[
-        "rotation_mean"
-    ].reshape(-1, 4)
-    vectors = 2.0 * quat.mul(quat.conj(means), turned)[:, 1:]
-    return np.concatenate([file["root_mean"], vectors.ravel()])
+    held = reduced.read(file.numbers, file.card.levels[0])
+    core = held.core.transpose(1, 0, 2)
+    bases = np.eye(len(core)), held.time, bank.pose.values
+    return Decoder(Multilinear(core, bases), held.mean, held.directions.T, held.rotations)

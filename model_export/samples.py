@@ -101,21 +101,17 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
     Raises TrainingError where there is none without a single example.
     """
     degree = recipe.kriging.degree
-    needed = _needed(np.arange(len(examples)), points, degree)
+    by_file, alone = takes(examples), np.arange(len(examples))
+    if _needed(by_file, points, degree) is None:
+        return by_file
+    needed = _needed(alone, points, degree)
     if needed is not None:
         raise TrainingError(
             f"without the clip of line {examples[needed].row.line} the controls of all others "
             "follow linearly from one another, and it can only be predicted by a drift of degree "
             "0; expected at least two clips that differ there: add one, or set kriging.drift to 0"
         )
-    return by_file([str(e.row.place) for e in examples], points, degree)
-
-
-def by_file(files: Sequence[str], points: Floats, degree: int) -> Indices:
-    """Groups (N,) of samples at points (N, d) by the files that they were cut from; of one each
-    where a drift of some degree cannot do without one of the files."""
-    own = np.unique(files, return_inverse=True)[1]
-    return own if _needed(own, points, degree) is None else np.arange(len(own))
+    return alone
 
 
 def _needed(groups: Indices, points: Floats, degree: int) -> int | None:

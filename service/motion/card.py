@@ -82,8 +82,10 @@ class ModelCard:
     frames of each captured clip. kriging: what the weight of each of them hangs on; None, and no
     sources, in files older than these. left_out (N,): how far each of them lies from what the
     others predict for it, root mean square over joints and frames, m; empty in files older than
-    this. event: None where the recipe names none, and in files older than this. making: nothing
-    that a client needs; None in files older than this.
+    this. event: None where the recipe names none, and in files older than this. beside: of a cycle
+    a root of the covariance by which captured clips stray in the logarithm of their duration and in
+    their travel, for a sigma of one metre; empty for what is no cycle, and in older files. making:
+    nothing that a client needs; None in files older than this.
     """
 
     name: str
@@ -108,6 +110,7 @@ class ModelCard:
     kriging: Hyper | None = None
     left_out: tuple[float, ...] = ()
     event: Event | None = None
+    beside: tuple[tuple[float, ...], ...] = ()
     making: Making | None = None
 
     def control(self, name: str) -> Control | None:
@@ -142,6 +145,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "kriging": _plain_hyper(card.kriging),
         "left_out": list(card.left_out),
         "event": asdict(card.event) if card.event else None,
+        "beside": [list(row) for row in card.beside],
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -239,6 +243,7 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         kriging=_hyper(plain.get("kriging")),
         left_out=tuple(plain.get("left_out", ())),
         event=_event(plain.get("event")),
+        beside=tuple(map(tuple, plain.get("beside", ()))),
         making=_making(plain.get("making")),
     )
 

@@ -24,6 +24,7 @@ class Question:
     point: Floats
     labels: Floats
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
 
 
 class Door:

@@ -12,7 +12,34 @@ Policy = Literal["warn", "refuse"]
 Root = Literal["travelling", "in_place"]
 """Whether a clip goes where it leads, or stays where it begins."""
 
+Exact = Literal["auto", "none"] | tuple[str, ...]
+"""Which measured controls an answer is held to: those that were given, none, or those named."""
+
+When = float | Literal["start", "end", "event", "highest", "lowest", "farthest"]
+"""When a target counts: seconds from the start of the clip, or a moment of the motion."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A joint, by name, that is to be in its place, m, in the frame of the clip, at a moment."""
+
+    joint: str
+    position: tuple[float, float, float]
+    when: When
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What an answer is held to: measured controls, targets, and feet that are to stay where they
+    stand."""
+
+    exact: Exact = "auto"
+    targets: tuple[Target, ...] = ()
+    pin_feet: bool = False
+
+
 FPS = 30.0
+HOLD = Hold()
 POLICY: Policy = "warn"
 NAMES: Names = "own"
 ROOT: Root = "travelling"
@@ -30,7 +57,9 @@ class ClipQuestion:
     is; heights stay, and so does all of a model that is in place already. loop: a whole cycle as
     N = max(1, round(duration * fps)) steps, without start and end. Its frame N is its first again:
     equal in every number where it stays in place, else carried by the cycle's way and turn. It
-    plays N / fps seconds, which is the duration but for the rounding.
+    equal in every number where it stays in place, else carried by the cycle's way and turn. It
+    plays N / fps seconds, which is the duration but for the rounding. hold: what the clip has to
+    meet exactly.
     """
 
     controls: Mapping[str, float]
@@ -43,6 +72,7 @@ class ClipQuestion:
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+    hold: Hold = HOLD
 
 
 @dataclass(frozen=True)
