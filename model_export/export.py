@@ -166,7 +166,7 @@ def _card(
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
         sources=tuple(example.row.source for example in examples),
-        kriging=_plainly(trained.pose.hyper),
+        kriging=plainly(trained.pose.hyper),
         roles={str(role): joint for role, joint in recipe.roles.items()},
         left_out=tuple(map(_round, np.sqrt(trained.missed))),
         event=fidelity.event(recipe, examples),
@@ -193,14 +193,14 @@ def _making(recipe: Recipe, trained: Trained) -> Making:
     times = np.array(marks).reshape(len(marks), -1).mean(axis=0)
     fields = trained.model.bank.others.items()
     return Making(
-        {name: _solved_with(field.hyper) for name, field in fields if isinstance(field, Kriging)},
+        {name: solved_with(field.hyper) for name, field in fields if isinstance(field, Kriging)},
         dict(zip(recipe.clips.landmarks, map(float, times), strict=True)),
         {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
     )
 
 
-def _solved_with(hyper: Hyper) -> tuple[float, ...]:
+def solved_with(hyper: Hyper) -> tuple[float, ...]:
     """Nugget and drifts; six digits of the one, for all that is made of it takes it as it stands
     there."""
     return (float(f"{hyper.nugget:.6g}"), *hyper.drifts)
@@ -250,7 +250,7 @@ def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str,
     }
 
 
-def _plainly(hyper: Hyper) -> Hyper:
+def plainly(hyper: Hyper) -> Hyper:
     """The same in numbers of Python, which a card can hold."""
     return replace(hyper, nugget=float(hyper.nugget), label=float(hyper.label))
 
@@ -285,13 +285,13 @@ def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
     return {
         "licence": recipe.licence,
         "recipe_sha256": hashlib.sha256(recipe.model_dump_json().encode()).hexdigest(),
-        "data_sha256": _digest({str(e.row.place.name): e for e in examples}),
+        "data_sha256": digest({str(e.row.place.name): e for e in examples}),
         "clips": len(examples),
         "versions": {name: version(name) for name in ("posefield", "numpy", "scipy", "onnx")},
     }
 
 
-def _digest(files: Mapping[str, Example]) -> str:
+def digest(files: Mapping[str, Example]) -> str:
     """One hash over the content of every motion file, in the order of their names."""
     total = hashlib.sha256()
     for name in sorted(files):

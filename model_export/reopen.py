@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from model_export import kriging
-from model_export.adapt import Known
+from model_export.canonical import Known
 from model_export.decoder import Decoder, Proportions
 from model_export.field_bank import POSE, Constant, Field, FieldBank
 from model_export.hosvd import Multilinear

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from model_export import adapt, samples
+from model_export import adapt, canonical, samples
 from model_export.evaluate import methods
 from model_export.evaluate.methods import Asked
 from model_export.evaluate.motion import Motion
@@ -41,14 +41,14 @@ def adapted(
         return {}
     if len(np.unique(samples.takes(held))) <= FEWEST:
         return {name: [None] * len(held) for name in SHOWN}
-    known = adapt.known(recipe, trained)
+    known = canonical.known(recipe, trained)
     return {name: _motions(recipe, trained, known, held, count) for name, count in SHOWN.items()}
 
 
 def _motions(
     recipe: Recipe,
     trained: Trained,
-    known: adapt.Known,
+    known: canonical.Known,
     held: Sequence[Example],
     count: int,
 ) -> list[Motion | None]:

@@ -6,7 +6,7 @@ import numpy as np
 import onnx
 import pytest
 
-from model_export import adapt, kriging, reopen
+from model_export import canonical, kriging, reopen
 from model_export.field_bank import Constant
 from service.motion import card as cards
 from service.motion.errors import ModelError
@@ -97,7 +97,7 @@ def test_the_motions_of_the_samples_come_back_in_the_cards_order(labelled, reope
 
 
 def test_what_is_known_is_what_training_knows(labelled_recipe, labelled, reopened):
-    expected, found = adapt.known(labelled_recipe, labelled), reopened.known
+    expected, found = canonical.known(labelled_recipe, labelled), reopened.known
     assert np.array_equal(found.joint_weights, expected.joint_weights)
     assert np.array_equal(found.groups, expected.groups)
     assert found.truncation == pytest.approx(expected.truncation, rel=1e-3)
