@@ -199,8 +199,9 @@ def _diagnostics(
 def _notes(reopened: Reopened, adapted: Adapted, newcomer: Newcomer) -> list[str]:
     moved, names = adapted.moved, reopened.card.skeleton.names
     listed = ", ".join(example.row.source for example in moved.examples)
-    identity = f"{reopened.card.name}@{reopened.digest[:16]}"
-    adapting = f"adapted from {identity} to {newcomer.performer!r} by {len(moved.examples)} clips: {listed}"
+    parent = f"{reopened.card.name}@{reopened.digest[:16]}"
+    said = f"adapted from {parent} to {newcomer.performer!r} by {len(moved.examples)} clips"
+    adapting = f"{said}: {listed}"
     return [adapting, *newcomer.notes, *export.found(moved.findings, moved.examples, names)]
 
 
