@@ -1,6 +1,6 @@
 """The three ways to ask how good a model is, and what came out."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,7 @@ import numpy as np
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
 from model_export import threads
-from model_export.evaluate import errors, flags, folds, methods, motion, truth
+from model_export.evaluate import errors, flags, folds, methods, motion, newcomers, truth
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.flags import Flags
 from model_export.evaluate.folds import Fold
@@ -34,19 +34,28 @@ Report = Callable[[int, int], None]
 class Result:
     """What one protocol found.
 
-    clips: what was asked for, by name. errors: of each method, clip by clip. sigma (C,): predicted
-    standard deviation of ours, m; joint_sigma (C, J): of each joint, by name in `joints`. flags:
-    how the support flag does on the same clips; none against the truth, which is everywhere.
+    clips: what was asked for, by name. errors: of each method, clip by clip; None where a method
+    was not asked. sigma (C,): predicted standard deviation of ours, m; joint_sigma (C, J): of each
+    joint, by name in `joints`. flags: how the support flag does on the same clips; none against the
+    truth, which is everywhere.
     """
 
     family: str
     protocol: str
     clips: tuple[str, ...]
-    errors: dict[str, tuple[Errors, ...]]
+    errors: dict[str, tuple[Errors | None, ...]]
     sigma: Floats
     joint_sigma: Floats
     joints: tuple[str, ...]
     flags: Flags | None = None
+
+    def asked(self, name: str) -> list[int]:
+        """Places of the clips that a method was asked for."""
+        return [place for place, error in enumerate(self.errors[name]) if error is not None]
+
+    def of(self, name: str, places: Sequence[int]) -> list[Errors]:
+        """Errors of a method at some of the places that it was asked for."""
+        return [error for place in places if (error := self.errors[name][place]) is not None]
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,7 @@ class _Part:
     """Answers to some of the clips: their places in the whole, their errors, and sigma."""
 
     places: tuple[int, ...]
-    errors: dict[str, list[Errors]]
+    errors: dict[str, list[Errors | None]]
     sigma: Floats
     joint_sigma: Floats
 
@@ -74,7 +83,7 @@ def run(recipe: Recipe, examples: Sequence[Example], protocol: str, report: Repo
     if protocol == "truth":
         return against_truth(recipe, examples, truth.points(), report)
     own = folds.clips(examples) if protocol == "clip" else folds.performers(examples)
-    jobs = [delayed(_held_out)(recipe, examples, fold) for fold in own]
+    jobs = [delayed(_held_out)(recipe, examples, fold, protocol) for fold in own]
     names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
     controls = np.stack([example.controls for example in examples])
     found = flags.measure(controls, [control.name for control in recipe.controls], own)
@@ -108,7 +117,7 @@ def _alone() -> Iterator[None]:
 
 
 @_alone()
-def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
+def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str) -> _Part:
     rest, held = fold.split(examples)
     try:
         trained = train(recipe, rest, lambda _: None)
@@ -120,7 +129,17 @@ def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
         motion.of_clip(e.clip, methods.captured_event(recipe, trained, e.landmarks)) for e in held
     ]
     found = methods.answers(recipe, trained, asked)
-    return _compared(recipe, trained, fold.held, found, captured)
+    if protocol == "clip":
+        more: Mapping[str, Sequence[Motion | None]] = newcomers.unnamed(recipe, trained, asked)
+    else:
+        more = newcomers.adapted(recipe, trained, held)
+    return _compared(recipe, trained, fold.held, _with(found, more), captured)
+
+
+def _with(found: Answers, more: Mapping[str, Sequence[Motion | None]]) -> Answers:
+    """Answers with those of more methods, ours before all others."""
+    ours = {methods.OURS: found.motions[methods.OURS]}
+    return replace(found, motions={**ours, **more, **found.motions})
 
 
 @_alone()
@@ -141,7 +160,10 @@ def _compared(
 ) -> _Part:
     feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
     compared = {
-        name: [errors.compare(own, true, feet) for own, true in zip(made, captured, strict=True)]
+        name: [
+            None if own is None else errors.compare(own, true, feet)
+            for own, true in zip(made, captured, strict=True)
+        ]
         for name, made in found.motions.items()
     }
     return _Part(places, compared, found.sigma, found.joint_sigma)
