@@ -220,7 +220,7 @@ class _Wanted:
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import protocol, summary
+    from model_export.evaluate import protocol, reach, summary
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -234,6 +234,8 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
             with _bar(name) as progress:
                 results.append(protocol.run(own, examples, name, progress))
             typer.echo(f"{summary.table(results[-1])}\n")
+            if results[-1].corrections:
+                typer.echo(f"{reach.table(results[-1])}\n")
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
     first, *others = map(summary.facts, results)
     if wanted.json_file:

@@ -51,7 +51,7 @@ def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     Raises TrainingError for levels of detail that there cannot be, ExportRefused where onnxruntime
     answers anything else than the float64 reference does.
     """
-    about = {"producer_name": "posefield", "producer_version": __version__}
+    about = _about()
     notes = [*notes, *samples.notes(recipe, trained.examples)]
     laddered = levels.build(recipe, trained)
     # The gate's finding is part of the card, so the weights are judged before it is written.
@@ -60,6 +60,19 @@ def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     own_card = _card(recipe, trained, laddered.levels, notes, parity)
     content = laddered.model.onnx(card.dump(own_card), about)
     return Exported(laddered.model, content, own_card, parity)
+
+
+@threads.one()
+def finest(recipe: Recipe, trained: Trained) -> bytes:
+    """File of the finest level alone, that no gate has judged: to be measured, not to be served."""
+    alone = recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": []})})
+    laddered = levels.build(alone, trained)
+    own_card = _card(recipe, trained, laddered.levels, [], parity=0.0)
+    return laddered.model.onnx(card.dump(own_card), _about())
+
+
+def _about() -> dict[str, str]:
+    return {"producer_name": "posefield", "producer_version": __version__}
 
 
 def gate(model: Model, content: bytes, own_card: ModelCard) -> float:

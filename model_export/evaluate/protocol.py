@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
-from model_export import threads
-from model_export.evaluate import errors, folds, methods, motion, truth
+from model_export import export, threads
+from model_export.evaluate import errors, exact, folds, methods, motion, truth
 from model_export.evaluate.errors import Errors
+from model_export.evaluate.exact import Correction
 from model_export.evaluate.folds import Fold
-from model_export.evaluate.methods import Answers, Asked
-from model_export.evaluate.motion import Motion
+from model_export.evaluate.methods import EXACT, OURS, Asked
+from model_export.evaluate.motion import Event, Motion
 from model_export.ingest import Example
 from model_export.recipe import Recipe
 from model_export.sample import truth as truths
@@ -34,7 +35,8 @@ class Result:
     """What one protocol found.
 
     clips: what was asked for, by name. errors: of each method, clip by clip. sigma (C,): predicted
-    standard deviation of ours, m.
+    standard deviation of ours, m. corrections (C,): what it took to hold ours to the captured
+    event; none where the recipe names no event.
     """
 
     family: str
@@ -42,15 +44,26 @@ class Result:
     clips: tuple[str, ...]
     errors: dict[str, tuple[Errors, ...]]
     sigma: Floats
+    corrections: tuple[Correction, ...]
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Answers to some of the clips: their places in the whole, their errors, and sigma."""
+    """Answers to some of the clips: their places in the whole, their errors, sigma, corrections."""
 
     places: tuple[int, ...]
     errors: dict[str, list[Errors]]
     sigma: Floats
+    corrections: list[Correction]
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What was trained of a recipe, and the file of it."""
+
+    recipe: Recipe
+    trained: Trained
+    file: bytes
 
 
 def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
@@ -77,9 +90,9 @@ def against_truth(
     recipe: Recipe, examples: Sequence[Example], points: Floats, report: Report
 ) -> Result:
     """Result at control points (C, d) whose noise-free motion is known."""
-    trained = train(recipe, examples, lambda _: None)
+    made = _made(recipe, examples)
     starts = range(0, len(points), BATCH)
-    jobs = [delayed(_true)(recipe, trained, points[at : at + BATCH], at) for at in starts]
+    jobs = [delayed(_true)(made, points[at : at + BATCH], at) for at in starts]
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
     return _result(recipe, "truth", names, _done(jobs, report))
 
@@ -102,46 +115,59 @@ def _alone() -> Iterator[None]:
 def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
     rest, held = fold.split(examples)
     try:
-        trained = train(recipe, rest, lambda _: None)
+        made = _made(recipe, rest)
     except TrainingError as fault:
         named = ", ".join(sorted({example.row.place.name for example in held}))
         raise TrainingError(f"with {named} held out: {fault}") from fault
     asked = Asked(np.stack([e.controls for e in held]), [e.row.performer for e in held])
-    captured = [
-        motion.of_clip(e.clip, methods.captured_event(recipe, trained, e.landmarks)) for e in held
-    ]
-    found = methods.answers(recipe, trained, asked)
-    return _compared(recipe, trained, fold.held, found, captured)
+    events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
+    pairs = zip(held, events, strict=True)
+    captured = [motion.of_clip(example.clip, event) for example, event in pairs]
+    return _compared(made, fold.held, asked, captured, events)
 
 
 @_alone()
-def _true(recipe: Recipe, trained: Trained, points: Floats, start: int) -> _Part:
-    event = methods.captured_event(recipe, trained, ())
+def _true(made: _Made, points: Floats, start: int) -> _Part:
+    event = methods.captured_event(made.recipe, made.trained, ())
     captured = [motion.of_clip(truths.clip(list(p), RATE), event) for p in points]
-    found = methods.answers(recipe, trained, Asked(points, [""] * len(points)))
     places = tuple(range(start, start + len(points)))
-    return _compared(recipe, trained, places, found, captured)
+    asked = Asked(points, [""] * len(points))
+    return _compared(made, places, asked, captured, [event] * len(points))
+
+
+def _made(recipe: Recipe, examples: Sequence[Example]) -> _Made:
+    trained = train(recipe, examples, lambda _: None)
+    return _Made(recipe, trained, export.finest(recipe, trained))
 
 
 def _compared(
-    recipe: Recipe,
-    trained: Trained,
+    made: _Made,
     places: tuple[int, ...],
-    found: Answers,
+    asked: Asked,
     captured: Sequence[Motion],
+    events: Sequence[Event | None],
 ) -> _Part:
+    recipe, trained = made.recipe, made.trained
     feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
+    found = methods.answers(recipe, trained, asked)
+    motions, corrections = found.motions, list[Correction]()
+    wanted = [exact.goal(own, event) for own, event in zip(captured, events, strict=True) if event]
+    if wanted:
+        held = exact.answers(recipe, trained, made.file, asked, wanted)
+        rest = {name: own for name, own in motions.items() if name != OURS}
+        motions, corrections = {OURS: motions[OURS], EXACT: held.motions, **rest}, held.corrections
     compared = {
-        name: [errors.compare(own, true, feet) for own, true in zip(made, captured, strict=True)]
-        for name, made in found.motions.items()
+        name: [errors.compare(own, true, feet) for own, true in zip(named, captured, strict=True)]
+        for name, named in motions.items()
     }
-    return _Part(places, compared, found.sigma)
+    return _Part(places, compared, found.sigma, corrections)
 
 
 def _result(recipe: Recipe, protocol: str, names: Sequence[str], parts: Iterator[_Part]) -> Result:
     """Parts in the order of the clips, whichever came first."""
     listed = list(parts)
     order = np.argsort([place for part in listed for place in part.places])
+    corrections = [correction for part in listed for correction in part.corrections]
     gathered = {
         name: [error for part in listed for error in part.errors[name]] for name in listed[0].errors
     }
@@ -151,4 +177,5 @@ def _result(recipe: Recipe, protocol: str, names: Sequence[str], parts: Iterator
         tuple(names),
         {name: tuple(own[i] for i in order) for name, own in gathered.items()},
         np.concatenate([part.sigma for part in listed])[order],
+        tuple(corrections[i] for i in order if corrections),
     )

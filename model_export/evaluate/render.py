@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from model_export.evaluate import summary
-from model_export.evaluate.methods import DEFINITIONS, OURS
+from model_export.evaluate import reach, summary
+from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
 from model_export.evaluate.protocol import Result
 from model_export.evaluate.summary import Summary
 from model_export.report import page, picture
@@ -42,14 +42,19 @@ def _section(result: Result) -> Section:
         result.protocol,
         TITLES[result.protocol],
         (summary.LEGEND, _verdict(found)),
-        (Table(summary.HEAD, tuple(one.cells() for one in found)),),
+        (Table(summary.HEAD, tuple(one.cells() for one in found)), *_held(result)),
         (_bars(result, found), _clips(result, found), _calibration(result)),
     )
 
 
+def _held(result: Result) -> list[Table]:
+    rows = reach.rows(result)
+    return [Table(reach.HEAD, rows)] if rows else []
+
+
 def _verdict(found: Sequence[Summary]) -> str:
     """Who is ahead, and by how much beyond chance, in words."""
-    others = [one for one in found if one.name != OURS]
+    others = _others(found)
     ahead = [one.name for one in others if one.worse < -one.worse_error]
     tied = [one.name for one in others if abs(one.worse) <= one.worse_error]
     if ahead:
@@ -89,7 +94,12 @@ def _paint_bars(found: Sequence[Summary], figure: Figure) -> None:
 
 
 def _rival(found: Sequence[Summary]) -> str:
-    return min((one for one in found if one.name != OURS), key=lambda one: one.worse).name
+    return min(_others(found), key=lambda one: one.worse).name
+
+
+def _others(found: Sequence[Summary]) -> list[Summary]:
+    """Other methods; what is held to the captured event was told more than they were."""
+    return [one for one in found if one.name not in (OURS, EXACT)]
 
 
 def _clips(result: Result, found: Sequence[Summary]) -> Picture:
