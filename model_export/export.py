@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost, fidelity, levels, phase, samples, strangers, threads
+from model_export import cost, fidelity, levels, measured, phase, samples, strangers, threads
 from model_export.ingest import Example
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
@@ -151,7 +151,7 @@ def _card(
     return ModelCard(
         name=recipe.name,
         description=recipe.description,
-        controls=_controls(recipe, np.stack([example.controls for example in examples])),
+        controls=_controls(recipe, trained),
         skeleton=trained.skeleton,
         cyclic=recipe.motion.cyclic,
         root=recipe.motion.root,
@@ -188,19 +188,22 @@ def _beside(trained: Trained) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(map(_round, row)) for row in root)
 
 
-def _controls(recipe: Recipe, values: Floats) -> tuple[Control, ...]:
+def _controls(recipe: Recipe, trained: Trained) -> tuple[Control, ...]:
+    values = np.stack([example.controls for example in trained.examples])
+    landmarks = np.array([example.landmarks for example in trained.examples])
     controls = []
-    for column, own in zip(recipe.controls, values.T, strict=True):
+    for asked, own in zip(recipe.controls, values.T, strict=True):
         distinct = np.unique(own)
         controls.append(
             Control(
-                column.name,
-                column.unit,
-                column.description,
+                asked.name,
+                asked.unit,
+                asked.description,
                 float(distinct[0]),
                 float(distinct[-1]),
                 float(np.sort(own)[len(own) // 2]),
                 tuple(map(float, distinct)) if len(distinct) <= FEW_VALUES else (),
+                measured.on_the_card(recipe, asked, trained.skeleton, landmarks),
             )
         )
     return tuple(controls)

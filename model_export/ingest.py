@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from model_export import flips, table
+from model_export import flips, measured, table
 from model_export.flips import Finding
 from model_export.recipe import Recipe
 from model_export.table import Row
@@ -24,7 +24,8 @@ RIGID = 1e-4
 class Example:
     """One clip with what it is an example of.
 
-    controls (d,), landmarks: fractions of the clip, in order. jumps: what a solver did to small
+    controls (d,), typed and measured, in the recipe's order. landmarks: fractions of the clip, in
+    order. jumps: what a solver did to small
     joints between two frames, and is undone. shift: the share of a cycle by which it begins later
     than it was cut.
     """
@@ -39,9 +40,7 @@ class Example:
     @property
     def offsets(self) -> Floats:
         """Bone offsets (J, 3) of the performer, the root's zero, m."""
-        offsets = self.clip.translations.mean(axis=0)
-        offsets[0] = 0.0
-        return offsets
+        return measured.bones(self.clip)
 
 
 def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
@@ -92,7 +91,9 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
     clip = _loop(set_out(clip)) if recipe.motion.cyclic else _origin_out(clip)
     if recipe.motion.root == "in_place":
         clip = stay(clip)
-    return Example(row, clip, row.controls, _landmarks(row, last), tuple(jumps))
+    landmarks = _landmarks(row, last)
+    controls = measured.controls(recipe, row, clip, landmarks)
+    return Example(row, clip, controls, landmarks, tuple(jumps))
 
 
 def _cut(clip: Clip, first: int, last: int) -> Clip:
@@ -132,6 +133,8 @@ def _needed(recipe: Recipe) -> set[str]:
     """Joints that a recipe speaks of."""
     event = {recipe.event.joint} if recipe.event else set()
     motion = recipe.motion
+    autos = [control.auto for control in recipe.measured]
+    event |= {joint for auto in autos for joint in (*auto.places, *recipe.ends(auto))}
     return {*motion.joint_weights, *motion.feet, *recipe.roles.values()} | event
 
 

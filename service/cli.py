@@ -20,8 +20,8 @@ from service import __version__, exports, page
 from service.encode import ENCODERS, Encoder, poses, reasons
 from service.encode.convention import Unit, Up
 from service.motion import card as cards
-from service.motion import files
-from service.motion.answer import ClipAnswer
+from service.motion import files, measure
+from service.motion.answer import ClipAnswer, Reasons, Trust
 from service.motion.errors import (
     FileError,
     InvalidField,
@@ -44,7 +44,12 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 ModelPath = Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")]
 Controls = Annotated[
     list[str] | None,
-    typer.Option("--control", "-c", help="NAME=VALUE, once for each control", metavar="NAME=VALUE"),
+    typer.Option(
+        "--control",
+        "-c",
+        help="NAME=VALUE, once for each control; a model chooses what is left out",
+        metavar="NAME=VALUE",
+    ),
 ]
 Extrapolate = Annotated[
     Policy, typer.Option(help="what to do with controls outside what was sampled")
@@ -136,7 +141,7 @@ def pose(
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
     answer = synthesizer.pose(asked, times, extrapolate, performer, level)
-    _warn(answer.trust.warnings)
+    _tell(answer.trust)
     typer.echo(poses.json(answer).decode())
 
 
@@ -168,7 +173,7 @@ def clip(
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)
-    _warn(answer.trust.warnings)
+    _tell(answer.trust)
     typer.echo(wrote(output, answer, json))
 
 
@@ -253,7 +258,7 @@ def why(
     synthesizer = open_model(model)
     asked = WhyQuestion(numbers(control or []), extrapolate, performer, nearest)
     found = find_reasons(synthesizer, asked)
-    _warn(found.warnings)
+    _tell(found)
     typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
 
 
@@ -360,8 +365,12 @@ def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
     )
 
 
-def _warn(warnings: Sequence[str]) -> None:
-    for warning in warnings:
+def _tell(found: Trust | Reasons) -> None:
+    """Say on standard error what was chosen for whoever asked, and what to beware of."""
+    if found.inferred:
+        chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)
+        typer.echo(f"inferred: {chosen}, most typical for what was given", err=True)
+    for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
 
 
@@ -376,6 +385,14 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
         f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
         f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
     )
+
+
+def _control(plain: dict[str, Any], joints: list[str]) -> str:
+    """A control in a line: what of it was sampled, and how it is measured where it is."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
+    own = plain.get("measure")
+    how = f" (measured: {measure.words(measure.parse(own), joints)})" if own else ""
+    return f"  {plain['name']}: {span}, {plain['description']}{how}"
 
 
 def _summary(plain: dict[str, Any]) -> str:
@@ -393,10 +410,7 @@ def _summary(plain: dict[str, Any]) -> str:
         f"levels of detail, times in batches of {pace.BATCH}:",
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
-        *(
-            f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"
-            for c in plain["controls"]
-        ),
+        *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
         *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),

@@ -17,6 +17,7 @@ def plain(found: Reasons) -> dict[str, Any]:
         "warnings": list(found.warnings),
         "nearest": [_clip(clip) for clip in found.nearest],
         "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
+        **({"inferred": list(found.inferred)} if found.inferred else {}),
     }
 
 

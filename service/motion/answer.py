@@ -143,6 +143,7 @@ class Reasons:
     others there are, with what all of them count for. All weights add up to one.
 
     model: name@contenthash. warnings: one sentence for each control outside what was sampled.
+    inferred: names of the controls that were not given, as of an answer.
     """
 
     model: str
@@ -152,3 +153,4 @@ class Reasons:
     nearest: tuple[Captured, ...]
     others: int
     others_weight: float
+    inferred: tuple[str, ...] = ()

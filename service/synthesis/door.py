@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -10,13 +11,15 @@ from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits
 from service.synthesis.question import Policy
+from service.synthesis.typical import Chooser
 
 
 @dataclass(frozen=True)
 class Question:
-    """What has passed the door: controls, in the card's order, and performer as they were given,
-    and as the graph takes them, point (1, d) and labels (1, p); a warning for each control outside
-    its sampled range."""
+    """What has passed the door: all controls, in the card's order, and performer as they were
+    given, and as the graph takes them, point (1, d) and labels (1, p); a warning for each control
+    outside its sampled range. inferred: names of the controls that were not given, and are the most
+    typical for those that were."""
 
     controls: dict[str, float]
     performer: str | None
@@ -24,6 +27,7 @@ class Question:
     point: Floats
     labels: Floats
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
 
 
 class Door:
@@ -38,7 +42,8 @@ class Door:
     def question(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> Question:
-        """The question, if it has an answer.
+        """The question, if it has an answer. Controls that are not given are the most typical for
+        those that are, and for the performer.
 
         Raises InvalidField for a control, performer or level that cannot be used, OutsideSamples
         where `extrapolate` is "refuse" and a control lies outside its sampled range.
@@ -50,11 +55,13 @@ class Door:
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         plain = self._plain(controls)
-        warnings = () if plain else self._checked(controls, extrapolate)
+        found = controls if plain else self._found(controls, own)
+        warnings = () if plain else self._outside(found, extrapolate)
         # However they are put: the same question has the same bytes.
-        given = {name: float(controls[name]) for name, _, _ in self._ranges}
-        point = np.array([list(given.values())])
-        return Question(given, performer, level, point, own, warnings)
+        every = {name: float(found[name]) for name, _, _ in self._ranges}
+        point = np.array([list(every.values())])
+        inferred = tuple(name for name in every if name not in controls)
+        return Question(every, performer, level, point, own, warnings, inferred)
 
     def _plain(self, controls: Mapping[str, float]) -> bool:
         """Whether there is nothing to say of the controls, as of nearly all that are asked for."""
@@ -63,9 +70,23 @@ class Door:
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
-    def _checked(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:
+    def _found(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
+        """All controls, as they were given or as is typical."""
+        given = {
+            control.name: checked(control, controls[control.name])
+            for control in self._card.controls
+            if control.name in controls
+        }
+        return given if len(given) == len(self._names) else self.chooser.fill(given, own)
+
+    @cached_property
+    def chooser(self) -> Chooser:
+        """What chooses controls that are not given."""
+        return Chooser(self._card)
+
+    def _outside(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:
         """What to warn of."""
-        values = np.array([required(control, controls) for control in self._card.controls])
+        values = np.array([controls[control.name] for control in self._card.controls])
         return outside(self._card.controls, values, extrapolate)
 
 
@@ -76,16 +97,10 @@ def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     return np.array([[float(name == asked) for name in performers]])
 
 
-def required(control: Control, controls: Mapping[str, float]) -> float:
-    """Value of a control; InvalidField where there is none, or none that could be answered."""
+def checked(control: Control, given: float) -> float:
+    """Value of a control; InvalidField for one that could not be answered."""
     field = f"controls/{control.name}"
-    if control.name not in controls:
-        raise InvalidField(
-            field,
-            f"missing; give a number in {control.unit}, "
-            f"sampled from {control.minimum:g} to {control.maximum:g}",
-        )
-    value = limits.number(field, controls[control.name])
+    value = limits.number(field, given)
     limits.within(field, value, *limits.reach(control), control.unit)
     return value
 

@@ -55,7 +55,8 @@ def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
     found = tuple(_captured(card, i, distances[i], weights[i]) for i in near.tolist())
     rest = float(weights[others].sum())
     controls, who, said = question.controls, question.performer, question.warnings
-    return Reasons(model.identity, controls, who, said, found, len(others), rest)
+    inferred = question.inferred
+    return Reasons(model.identity, controls, who, said, found, len(others), rest, inferred)
 
 
 def _point(card: ModelCard, question: Question) -> Floats:

@@ -65,6 +65,9 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
         "Posefield-Sigma": repr(trust.sigma),
         "Posefield-Duration": repr(trust.duration),
     }
+    if trust.inferred:
+        chosen = {name: trust.controls[name] for name in trust.inferred}
+        headers["Posefield-Inferred"] = json.dumps(chosen)
     made = Response(content, headers=headers, media_type=encoder.media_type)
     return _warning(made, trust.warnings)
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "2.1.0"
+CONTRACT = "2.2.0"
 """Version of the contract that this client was made for."""
 
 
@@ -145,6 +145,15 @@ class ModelList(Struct, frozen=True, kw_only=True):
     models: tuple[ModelSummary, ...]
 
 
+class Measure(Struct, frozen=True, kw_only=True):
+    """How a control is read off a motion; a control that somebody typed has none. Since 2.2.0."""
+
+    quantity: str
+    joints: tuple[int, ...] = ()
+    at: str | None = None
+    share: float | None = None
+
+
 class Control(Struct, frozen=True, kw_only=True):
     """One control parameter, its unit and what of it was sampled."""
 
@@ -155,6 +164,7 @@ class Control(Struct, frozen=True, kw_only=True):
     maximum: float
     default: float
     values: tuple[float, ...]
+    measure: Measure | None = None
 
 
 class Skeleton(Struct, frozen=True, kw_only=True):
@@ -247,6 +257,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -277,6 +288,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
 
@@ -297,6 +309,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
 
 
 class Liveness(Struct, frozen=True, kw_only=True):

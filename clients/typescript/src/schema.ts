@@ -1354,7 +1354,8 @@ export interface components {
          */
         LevelNumber: number;
         /**
-         * @description A number for each control of the model, in the control's unit.
+         * @description A number for each control of the model, in the control's unit. In a question some or all of them
+         *     may be left out, of a crowd none: they are then the most typical for those that are given and for the performer.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -1425,6 +1426,7 @@ export interface components {
             performer: string | null;
             /** @description One sentence for each control outside what was sampled. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1559,7 +1561,13 @@ export interface components {
             /** @description As in Trust, m. */
             sigma: number;
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
         };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given;
+         *     not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
             model: components["schemas"]["Identity"];
@@ -1574,6 +1582,7 @@ export interface components {
             sigma: number;
             /** @description One sentence for each control outside what was sampled. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
         };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
@@ -1623,6 +1632,27 @@ export interface components {
             default: number;
             /** @description The distinct sampled values where they are few, else empty. */
             values: number[];
+            measure?: components["schemas"]["Measure"];
+        };
+        /** @description How a control is read off a motion; a control that somebody typed has none. Since 2.2.0. */
+        Measure: {
+            /**
+             * @description `left`, `height` and `forward` are where a joint is at a moment, m, from where the root's first pose stands on the
+             *     floor, as it faces; `step_length` is the greatest distance ahead that one foot gets of the other, m; `stride_length`,
+             *     m, `speed`, m/s, and `turn`, degrees to the left, are of a whole cycle; `leg_length` and `stature`, m, are of the
+             *     performer's bones and not of the motion.
+             * @enum {string}
+             */
+            quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "leg_length" | "stature";
+            /** @description Indices of the joints whose middle is looked at, of the two feet of a step, or of the bones of a leg. */
+            joints?: number[];
+            /**
+             * @description The moment of a place; `farthest` is from the root.
+             * @enum {string}
+             */
+            at?: "start" | "end" | "highest" | "lowest" | "farthest" | "landmark";
+            /** @description Of the duration, at which the landmark is in the mean over captured clips. */
+            share?: number;
         };
         /** @description Joints parents first, their rest offsets, and the end sites that no joint follows. At rest every rotation is the identity. */
         Skeleton: {
@@ -1759,7 +1789,7 @@ export interface components {
          */
         CrowdQuestion: {
             /**
-             * @description For each control of the model its values, in the control's unit.
+             * @description For each control of the model its values, in the control's unit. None may be left out.
              * @example {
              *       "stature": [
              *         1.72,
@@ -2336,6 +2366,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2448,6 +2479,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2466,6 +2498,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2484,6 +2517,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2502,6 +2536,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2520,6 +2555,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2538,6 +2574,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2556,6 +2593,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2574,6 +2612,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2592,6 +2631,7 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 [name: string]: unknown;
             };
@@ -2799,7 +2839,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2868,9 +2908,12 @@ export interface components {
         model: string;
         /**
          * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-         *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-         *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-         *     width of the range away. The names of the other parameters are reserved.
+         *     The model's card gives their names, units and sampled ranges; a value outside the range is
+         *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+         *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+         *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+         *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+         *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -3039,6 +3082,11 @@ export interface components {
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
         /**
+         * @description Values of the controls that were left out, and are the most typical for those that were given: a JSON
+         *     object in ASCII; absent where none was. Since 2.2.0.
+         */
+        Inferred: string;
+        /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
@@ -3124,9 +3172,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3134,7 +3185,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3220,9 +3271,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3230,7 +3284,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3314,9 +3368,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3324,7 +3381,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3408,9 +3465,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3418,7 +3478,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3502,9 +3562,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3512,7 +3575,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3593,12 +3656,15 @@ export interface operations {
     };
     getClip: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3606,7 +3672,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3693,12 +3759,15 @@ export interface operations {
     };
     getClipUsda: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3706,7 +3775,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3791,12 +3860,15 @@ export interface operations {
     };
     getClipUsdc: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3804,7 +3876,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3889,12 +3961,15 @@ export interface operations {
     };
     getClipUsdz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3902,7 +3977,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -3987,12 +4062,15 @@ export interface operations {
     };
     getClipJson: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4000,7 +4078,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4085,12 +4163,15 @@ export interface operations {
     };
     getClipBvh: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4098,7 +4179,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4183,12 +4264,15 @@ export interface operations {
     };
     getClipGlb: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4196,7 +4280,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4281,12 +4365,15 @@ export interface operations {
     };
     getClipNpz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4294,7 +4381,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4379,12 +4466,15 @@ export interface operations {
     };
     getClipArrow: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4392,7 +4482,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -4477,12 +4567,15 @@ export interface operations {
     };
     getClipMsgpack: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4490,7 +4583,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
@@ -5026,12 +5119,15 @@ export interface operations {
     };
     getWhy: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5039,7 +5135,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
                 /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
@@ -6035,7 +6131,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "2.1.0";
+export const CONTRACT = "2.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {

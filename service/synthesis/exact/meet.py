@@ -15,7 +15,8 @@ import numpy as np
 from service.motion.answer import Met
 from service.motion.conventions import Floats
 from service.synthesis.exact import aims as looking
-from service.synthesis.exact.aims import Aim
+from service.synthesis.exact.aims import Aim, Looked
+from service.synthesis.exact.feet import LOOSE
 from service.synthesis.exact.scene import Scene
 from service.synthesis.exact.spread import EVEN, Spread
 
@@ -41,65 +42,85 @@ class Corrected:
     distance: float
 
 
+@dataclass(frozen=True)
+class _Task:
+    """What is to be met, and in which metric.
+
+    aims: that must be met. pins: that should. loose (k,): variance that each value is left, for a
+    sigma of one metre: none for the aims.
+    """
+
+    scene: Scene
+    spread: Spread
+    begun: Floats
+    aims: Sequence[Aim]
+    pins: Sequence[Aim]
+    loose: Floats
+
+    @property
+    def firm(self) -> int:
+        """Number of values that must be met."""
+        return sum(len(aim.goal) for aim in self.aims)
+
+    def look(self, numbers: Floats) -> Looked:
+        """Values and gradients of aims and pins."""
+        return looking.look([*self.aims, *self.pins], self.scene, numbers)
+
+    def least(self, gradients: Floats, toward: Floats) -> Floats:
+        """The least change that moves what has such gradients by so much."""
+        carried = self.spread.shrunk(gradients)
+        return carried @ _solve(gradients @ carried + np.diag(self.loose), toward)
+
+
 def meet(
-    scene: Scene, spread: Spread, sigma: float, begun: Floats, aims: Sequence[Aim]
+    scene: Scene,
+    spread: Spread,
+    sigma: float,
+    begun: Floats,
+    aims: Sequence[Aim],
+    pins: Sequence[Aim] = (),
 ) -> Corrected:
     """The motion nearest to a predicted one (numbers,) of standard deviation sigma, m, that meets
-    the aims, or comes as near as captured motions get."""
-    asked = np.concatenate([aim.goal for aim in aims])
+    the aims, or comes as near as captured motions get, and leaves pins about where they are."""
     values, gradients = looking.look(aims, scene, begun)
+    asked = np.concatenate([aim.goal for aim in aims])
     wanted, distance = _reachable(spread, sigma, asked - values, gradients, aims)
-    goal = values + wanted
-    numbers, steps = _descend(scene, spread, begun, aims, goal)
+    loose = np.repeat([0.0, (LOOSE / sigma) ** 2], [len(asked), 3 * len(pins)])
+    goal = np.concatenate([values + wanted, *(pin.goal for pin in pins)])
+    numbers, steps = _descend(_Task(scene, spread, begun, aims, pins, loose), goal)
     found, _ = looking.look(aims, scene, numbers)
     return Corrected(numbers, tuple(_met(aims, found)), steps, distance)
 
 
-def _descend(
-    scene: Scene, spread: Spread, begun: Floats, aims: Sequence[Aim], goal: Floats
-) -> tuple[Floats, int]:
+def _descend(task: _Task, goal: Floats) -> tuple[Floats, int]:
     """The corrected numbers, and in how many steps."""
-    numbers = begun
-    values, gradients = looking.look(aims, scene, numbers)
+    numbers, looked = task.begun, task.look(task.begun)
     for step in range(STEPS):
-        left = goal - values
-        if np.abs(left).max() < CLOSE:
+        if np.abs((goal - looked[0])[: task.firm]).max() < CLOSE:
             return numbers, step
-        moved = _nearer(scene, spread, begun, numbers, (values, gradients), aims, goal)
+        moved = _nearer(task, numbers, looked, goal)
         if moved is None:
             return numbers, step
-        numbers, values, gradients = moved
+        numbers, looked = moved
     return numbers, STEPS
 
 
 def _nearer(
-    scene: Scene,
-    spread: Spread,
-    begun: Floats,
-    numbers: Floats,
-    looked: tuple[Floats, Floats],
-    aims: Sequence[Aim],
-    goal: Floats,
-) -> tuple[Floats, Floats, Floats] | None:
+    task: _Task, numbers: Floats, looked: Looked, goal: Floats
+) -> tuple[Floats, Looked] | None:
     """The next numbers with what is seen of them; None where none come nearer."""
-    values, gradients = looked
+    (values, gradients), firm = looked, task.firm
     left = goal - values
-    share = min(1.0, STRIDE / float(np.abs(left).max()))
-    worth = _worth(aims, spread.of(gradients))
+    share = min(1.0, STRIDE / max(_apart(task.aims, left), 1e-12))
+    worth = _worth(task.aims, task.spread.of(gradients[:firm]))
     for _ in range(HALVINGS):
-        toward = share * left + gradients @ (numbers - begun)
-        tried = begun + _least(spread, gradients, toward)
-        found, steeper = looking.look(aims, scene, tried)
-        if _size(goal - found, worth) < _size(left, worth):
-            return tried, found, steeper
+        toward = share * left + gradients @ (numbers - task.begun)
+        tried = task.begun + task.least(gradients, toward)
+        found = task.look(tried)
+        if _size((goal - found[0])[:firm], worth) < _size(left[:firm], worth):
+            return tried, found
         share *= 0.5
     return None
-
-
-def _least(spread: Spread, gradients: Floats, toward: Floats) -> Floats:
-    """The least change that moves what has such gradients by so much."""
-    carried = spread.shrunk(gradients)
-    return carried @ _solve(gradients @ carried, toward)
 
 
 def _solve(matrix: Floats, right: Floats) -> Floats:
@@ -119,8 +140,25 @@ def _worth(aims: Sequence[Aim], covariance: Floats) -> Floats:
     return worth
 
 
+def _apart(aims: Sequence[Aim], left: Floats) -> float:
+    """Largest distance, m, among values (k,) of aims that are places."""
+    units = [aim.unit for aim in aims for _ in aim.goal]
+    places = zip(left[: len(units)], units, strict=True)
+    return max((abs(value) for value, unit in places if unit == "m"), default=0.0)
+
+
 def _size(left: Floats, worth: Floats) -> float:
     return float(np.sum(worth * np.square(left)))
+
+
+def distance(
+    scene: Scene, spread: Spread, sigma: float, numbers: Floats, aims: Sequence[Aim]
+) -> float:
+    """How far off aims lie from a motion (numbers,), in standard deviations."""
+    values, gradients = looking.look(aims, scene, numbers)
+    left = np.concatenate([aim.goal for aim in aims]) - values
+    covariance = sigma**2 * _evened(aims, spread.of(gradients))
+    return float(np.sqrt(left @ np.linalg.solve(covariance, left)))
 
 
 def far(values: int) -> float:

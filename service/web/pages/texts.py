@@ -103,8 +103,8 @@ TEXTS: dict[Kind, Text] = {
     ),
     TABLE[InvalidField]: Text(
         "The request keeps the contract, but this model has no answer to it: a control is "
-        "missing or unknown, a value is far outside what was sampled, a time lies outside the "
-        "clip, there would be too many frames, the model knows no such performer.",
+        "unknown (or one of a crowd's missing), a value is far outside what was sampled, a time "
+        "lies outside the clip, there would be too many frames, the model knows no such performer.",
         "Change the field that `errors` names. The model's card says what the model has: its "
         "controls, their ranges, its performers and levels.",
         "fps: 10000 frames a second, expected 1 to 1000 frames a second",

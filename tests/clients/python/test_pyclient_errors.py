@@ -102,7 +102,7 @@ def test_what_can_help_to_ask_again_is_asked_again():
     [
         (lambda m, c: m("reich").card, errors.UnknownModel),
         (lambda m, c: m("reach@0000000000000000").card, errors.UnknownModel),
-        (lambda m, c: m("reach").pose(0), errors.InvalidField),
+        (lambda m, c: m("reach").pose(0, spin=1), errors.InvalidField),
         (lambda m, c: m("reach").pose(100, **c), errors.InvalidField),
         (lambda m, c: m("reach").pose(0, performer="nobody", **c), errors.InvalidField),
         (
