@@ -288,7 +288,7 @@ class _Wanted:
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import flags, protocol, summary, worth
+    from model_export.evaluate import flags, protocol, reach, summary, worth
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -302,6 +302,8 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
             with _bar(name) as progress:
                 results.append(protocol.run(own, examples, name, progress))
             typer.echo(f"{summary.table(results[-1])}\n")
+            if results[-1].corrections:
+                typer.echo(f"{reach.table(results[-1])}\n")
     for said in worth.said(results):
         typer.echo(said)
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results)}")

@@ -66,12 +66,25 @@ def finished(model: Model, own_card: Callable[[float], ModelCard]) -> Exported:
 
     Raises ExportRefused as `gate` does.
     """
-    about = {"producer_name": "posefield", "producer_version": __version__}
+    about = _about()
     # The gate's finding is part of the card, so the weights are judged before it is written.
     draft = own_card(0.0)
     parity = gate(model, model.onnx(card.dump(draft), about), draft)
     written = own_card(parity)
     return Exported(model, model.onnx(card.dump(written), about), written, parity)
+
+
+@threads.one()
+def finest(recipe: Recipe, trained: Trained) -> bytes:
+    """File of the finest level alone, that no gate has judged: to be measured, not to be served."""
+    alone = recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": []})})
+    laddered = levels.build(alone, trained)
+    own_card = _card(recipe, trained, laddered.levels, [], parity=0.0)
+    return laddered.model.onnx(card.dump(own_card), _about())
+
+
+def _about() -> dict[str, str]:
+    return {"producer_name": "posefield", "producer_version": __version__}
 
 
 def gate(model: Model, content: bytes, own_card: ModelCard) -> float:

@@ -16,11 +16,13 @@ from model_export.train import Trained
 from service.motion import skeleton
 from service.motion.conventions import Floats
 
-OURS, NAIVE = "posefield", "naive"
+OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
 # What would only repeat another row where performers are not told apart.
 LABELLED = ("gp_controls", "nearest_same_performer")
 DEFINITIONS = {
     OURS: "the model as it is exported: truncated, with its own bones and timing",
+    EXACT: "the same, corrected by what the service runs until the event's joint is at its event "
+    "where the captured clip has it",
     "posefield_no_performer": "the same model, asked for nobody in particular",
     **{
         f"posefield_adapt_{count}": f"the same model adapted to the performer by {shown}, each of "

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from model_export.evaluate import summary
+from model_export.evaluate import reach, summary
 from model_export.evaluate.methods import DEFINITIONS, OURS
 from model_export.evaluate.protocol import Result
 from model_export.evaluate.summary import Summary
@@ -42,9 +42,14 @@ def _section(result: Result) -> Section:
         result.protocol,
         TITLES[result.protocol],
         (summary.LEGEND, _verdict(found)),
-        (Table(summary.HEAD, tuple(one.cells() for one in found)),),
+        (Table(summary.HEAD, tuple(one.cells() for one in found)), *_held(result)),
         (_bars(result, found), _clips(result, found), _calibration(result)),
     )
+
+
+def _held(result: Result) -> list[Table]:
+    rows = reach.rows(result)
+    return [Table(reach.HEAD, rows)] if rows else []
 
 
 def _verdict(found: Sequence[Summary]) -> str:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from model_export.evaluate import errors, flags
+from model_export.evaluate import columns, errors, flags, reach
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.flags import Flags
-from model_export.evaluate.methods import DEFINITIONS, OURS
+from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
 from model_export.evaluate.protocol import Result
 from model_export.report import plain
 from service.motion.conventions import Floats
@@ -190,6 +190,9 @@ def facts(result: Result) -> dict[str, Any]:
     """Figures of a result as JSON holds them."""
     held = {} if result.flags is None else {"support": flags_facts(result.flags)}
     by_joint = joint_sigma_ratios(result)
+    methods = {summary.name: summary.facts() for summary in of(result)}
+    if EXACT in methods:
+        methods[EXACT]["exact"] = reach.facts(result)
     return {
         "family": result.family,
         "protocol": result.protocol,
@@ -197,25 +200,19 @@ def facts(result: Result) -> dict[str, Any]:
         "sigma_ratio": plain.number(sigma_ratio(result)),
         "joint_sigma_ratio": {name: plain.number(ratio) for name, ratio in by_joint.items()},
         **held,
-        "methods": {summary.name: summary.facts() for summary in of(result)},
+        "methods": methods,
     }
 
 
 def table(result: Result) -> str:
     """A result in Markdown, the columns even for who reads it as it is."""
-    rows = [HEAD, *(summary.cells() for summary in of(result))]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(HEAD))]
-    lines = [
-        "| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |"
-        for row in rows
-    ]
-    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
     title = (
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
     said = [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
-    return "\n".join([title, "", lines[0], rule, *lines[1:], "", *said])
+    rows = columns.even(HEAD, [summary.cells() for summary in of(result)])
+    return "\n".join([title, "", rows, "", *said])
 
 
 LEGEND = (
@@ -223,7 +220,8 @@ LEGEND = (
     "left in; both after slope-limited time warping; plain: at equal shares of the duration. "
     "less ours: the method's relative error less ours, clip by clip. effector: the event's joint "
     "at its event. duration: root mean square of the logarithm. accel., skate: synthesised over "
-    "captured. sigma ratio: squared error over the squared error predicted."
+    "captured. sigma ratio: squared error over the squared error predicted. posefield_exact is "
+    "told where the captured clip has the event's joint; beyond: places farther from the root."
 )
 
 

@@ -9,7 +9,7 @@ import pytest
 from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from model_export import ingest
-from model_export.evaluate import errors, folds, methods, motion, protocol, render, summary
+from model_export.evaluate import errors, folds, methods, motion, protocol, reach, render, summary
 from model_export.evaluate.methods import Asked
 from model_export.recipe import Recipe
 from model_export.train import train
@@ -145,11 +145,51 @@ def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
 
 def test_all_methods_are_asked_the_same_clips(results):
     (clips, performers), _ = results
-    assert set(clips.errors) == {"posefield", "naive", *methods.PEERS}
+    assert set(clips.errors) == {"posefield", "posefield_exact", "naive", *methods.PEERS}
     assert all(len(found) == CLIPS for r in (clips, performers) for found in r.errors.values())
     assert clips.protocol == "leave_one_clip_out"
     assert performers.protocol == "leave_one_performer_out"
     assert len(clips.sigma) == CLIPS
+
+
+def test_what_is_held_to_the_captured_event_meets_it(results):
+    for result in results[0]:
+        assert len(result.corrections) == CLIPS
+        far = {
+            name: max(error.effector for error in result.errors[name])
+            for name in (methods.OURS, methods.EXACT)
+        }
+        reached = [c.reached for c in result.corrections]
+        # Without a captured clip that is told to be out of reach, all are met.
+        assert all(reached) == (far[methods.EXACT] < 1e-4)
+        assert far[methods.OURS] > 0.005
+
+
+def test_places_a_metre_off_are_told_to_be_out_of_reach(results):
+    """Arms of the small skeleton are shorter than that."""
+    corrections = [c for result in results[0] for c in result.corrections]
+    assert not any(c.far.reached for c in corrections)
+    assert any(c.reached for c in corrections)
+    assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in corrections)
+
+
+def test_without_an_event_nothing_is_held(recipe, family):
+    plain = recipe.model_copy(update={"event": None})
+    found = protocol.run(plain, family, "performer", lambda done, parts: None)
+    assert found.corrections == ()
+    assert methods.EXACT not in found.errors
+    assert "exact" not in str(summary.facts(found)["methods"].keys())
+    assert len(reach.rows(found)) == 0
+
+
+def test_what_was_held_stands_in_table_and_json(results):
+    (clips, _), _ = results
+    told = summary.facts(clips)["methods"]["posefield_exact"]["exact"]
+    steps = [c.steps for c in clips.corrections]
+    assert told["steps_worst"] == max(steps)
+    assert told["steps"] == pytest.approx(np.mean(steps), abs=1e-3)
+    assert f"| {np.mean(steps):.1f} " in reach.table(clips)
+    assert told["far_out_of_reach"] == 1.0
 
 
 def test_an_unknown_performer_is_trusted_less(results):
