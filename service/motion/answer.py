@@ -35,11 +35,12 @@ class Trust:
     model: name@contenthash. controls: the values that were asked for, in the model's units.
     duration: natural length of the whole clip at these controls, s. sigma: how far a captured
     clip at these controls would lie from this one, as a root-mean-square over joints and frames,
-    m. warnings: one sentence for each control outside what was sampled. performer: who was asked
-    for; none for somebody who was never seen. level: of detail. supported: whether anything
-    like these controls was captured. inferred: names of the controls that were not given, and
-    chosen as the most typical for those that were. measured: the controls that the recipe says how
-    to measure, as the answer has them. targets: what the answer was held to.
+    m. warnings: one sentence for each control outside what was sampled, and for each target that
+    is not reached. performer: who was asked for; none for somebody who was never seen. level: of
+    detail. supported: whether anything like these controls was captured. inferred: names of the
+    controls that were not given, and chosen as the most typical for those that were. measured: the
+    controls that the recipe says how to measure, as the answer has them. targets: what the answer
+    was held to.
     """
 
     model: str

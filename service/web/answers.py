@@ -66,6 +66,10 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
         "Posefield-Duration": repr(trust.duration),
     }
     made = Response(content, headers=headers, media_type=encoder.media_type)
+    for met in trust.targets:
+        if not met.reached:
+            said = {"what": met.what, "miss": met.miss, "unit": met.unit}
+            made.headers.append("Posefield-Missed", json.dumps(said))
     return _warning(made, trust.warnings)
 
 

@@ -8,6 +8,8 @@ from starlette.responses import Response
 
 from service.encode import POSE_ENCODERS, PoseEncoder
 from service.encode.media import JSON
+from service.synthesis.exact.goals import Goals
+from service.synthesis.question import Policy
 from service.synthesis.synthesizer import Moments, Synthesizer
 from service.web import answers, body, query, service
 from service.web.query import PoseQuestion
@@ -31,7 +33,10 @@ async def _answer(
 ) -> Response:
     controls, times, policy = question.controls, question.times, question.extrapolate
     asked = model.moments(controls, times, policy, question.performer, question.level)
-    if len(times) > encoder.at_once:
+    goals = model.keeper.goals(asked.question, question.hold)
+    if goals:
+        content = await to_thread.run_sync(_held, model, asked, goals, policy, encoder)
+    elif len(times) > encoder.at_once:
         content = await to_thread.run_sync(_made, model, asked, encoder)
     else:
         content = encoder.encode(model.posed(asked, await served.batcher.row(model, asked)))
@@ -42,6 +47,12 @@ async def _answer(
 
 def _made(model: Synthesizer, asked: Moments, encoder: PoseEncoder) -> bytes:
     return encoder.encode(model.posed(asked, model.poses([asked])[0]))
+
+
+def _held(
+    model: Synthesizer, asked: Moments, goals: Goals, policy: Policy, encoder: PoseEncoder
+) -> bytes:
+    return encoder.encode(model.held_poses(asked, goals, policy))
 
 
 OPERATIONS: dict[str, Handler] = {

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "2.1.0"
+CONTRACT = "2.2.0"
 """Version of the contract that this client was made for."""
 
 
@@ -22,6 +22,21 @@ class Operation(NamedTuple):
     media_types: tuple[str, ...]
 
 
+class Target(Struct, frozen=True, kw_only=True):
+    """A joint that is to be in its place at a moment: at a time, or at the start, the end, the
+    event that the model's recipe names, or where the joint is highest, lowest or farthest from
+    the root. The motion that meets it is the nearest to the predicted one, as captured motions
+    stray from predictions. What lies farther off than they stray is approached as far as they
+    go, and `targets` in Trust says by how much it is missed. A joint has one target at one
+    moment.
+    """
+
+    joint: str
+    position: tuple[float, float, float]
+    time: float | None = None
+    at: str | None = None
+
+
 class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Schema PoseQuestion of the contract."""
 
@@ -30,6 +45,9 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -45,6 +63,9 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
 
@@ -63,6 +84,9 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -90,7 +114,7 @@ class Camera(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One pose of each of many characters. All lists have one length, the number of
     characters, in one order; what is no list holds for each of them. Where nothing is a list
-    there is one character.
+    there is one character. Crowds are the model's predictions: they are held to nothing.
     """
 
     controls: dict[str, float | tuple[float, ...]]
@@ -145,6 +169,17 @@ class ModelList(Struct, frozen=True, kw_only=True):
     models: tuple[ModelSummary, ...]
 
 
+class ControlMeasure(Struct, frozen=True, kw_only=True):
+    """How it is measured on a motion; absent where it is not, and then no motion can be held
+    to it.
+    """
+
+    quantity: str
+    joints: tuple[int, ...] = ()
+    at: str | None = None
+    share: float | None = None
+
+
 class Control(Struct, frozen=True, kw_only=True):
     """One control parameter, its unit and what of it was sampled."""
 
@@ -155,6 +190,7 @@ class Control(Struct, frozen=True, kw_only=True):
     maximum: float
     default: float
     values: tuple[float, ...]
+    measure: ControlMeasure | None = None
 
 
 class Skeleton(Struct, frozen=True, kw_only=True):
@@ -237,6 +273,15 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     event: ModelCardEvent | None = None
 
 
+class Met(Struct, frozen=True, kw_only=True):
+    """Something that a motion was held to."""
+
+    what: str
+    miss: float
+    unit: str
+    reached: bool
+
+
 class Trust(Struct, frozen=True, kw_only=True):
     """Where an answer comes from and what it is worth."""
 
@@ -247,6 +292,9 @@ class Trust(Struct, frozen=True, kw_only=True):
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
+    measured: dict[str, float] = {}
+    targets: tuple[Met, ...] = ()
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -297,6 +345,9 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     duration: float
     sigma: float
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
+    measured: dict[str, float] = {}
+    targets: tuple[Met, ...] = ()
 
 
 class Liveness(Struct, frozen=True, kw_only=True):

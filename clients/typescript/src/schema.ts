@@ -1325,6 +1325,63 @@ export interface components {
          */
         Loop: boolean;
         /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that the
+         *     model can measure on a motion: they have a `measure` on its card), `none`, or their names. The
+         *     motion is the nearest to the predicted one, as captured motions stray from predictions, that
+         *     does.
+         * @default auto
+         */
+        Exact: ("auto" | "none") | components["schemas"]["ControlName"][];
+        /**
+         * @description A joint that is to be in its place at a moment: at a time, or at the start, the end, the event
+         *     that the model's recipe names, or where the joint is highest, lowest or farthest from the root.
+         *     The motion that meets it is the nearest to the predicted one, as captured motions stray from
+         *     predictions. What lies farther off than they stray is approached as far as they go, and
+         *     `targets` in Trust says by how much it is missed. A joint has one target at one moment.
+         */
+        Target: {
+            /**
+             * @description Name of a joint, as the model's own skeleton has it.
+             * @example RightHand
+             */
+            joint: string;
+            /**
+             * @description Where it is to be, x y z, m, in the frame of the clip: that in which the root travels.
+             * @example [
+             *       0.3,
+             *       1.2,
+             *       0.4
+             *     ]
+             */
+            position: number[];
+            /** @description Seconds from the start of the clip, up to its duration. */
+            time?: number;
+            at?: components["schemas"]["Moment"];
+        } & (unknown | unknown);
+        /** @enum {string} */
+        Moment: "start" | "end" | "event" | "highest" | "lowest" | "farthest";
+        /**
+         * @description Joints that are to be in their places. Of a control that the same joint is measured for, the target is the nearer word.
+         * @default []
+         * @example [
+         *       {
+         *         "joint": "RightHand",
+         *         "position": [
+         *           0.3,
+         *           1.2,
+         *           0.4
+         *         ],
+         *         "at": "end"
+         *       }
+         *     ]
+         */
+        Targets: components["schemas"]["Target"][];
+        /**
+         * @description Whether feet that stand stay where they stand.
+         * @default false
+         */
+        PinFeet: boolean;
+        /**
          * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
          * @default null
          * @enum {string|null}
@@ -1337,6 +1394,7 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
+         * @description What to do with controls outside what was sampled, and with targets out of reach.
          * @default warn
          * @enum {string}
          */
@@ -1378,6 +1436,9 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -1402,6 +1463,9 @@ export interface components {
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
         };
@@ -1539,6 +1603,9 @@ export interface components {
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         /** @description One clip of an archive, and how far it may be trusted. */
         ManifestEntry: {
@@ -1559,6 +1626,14 @@ export interface components {
             /** @description As in Trust, m. */
             sigma: number;
             warnings: string[];
+            /** @description As in Trust. */
+            inferred?: string[];
+            /** @description As in Trust. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description As in Trust. */
+            targets?: components["schemas"]["Met"][];
         };
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
@@ -1572,8 +1647,30 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            /** @description One sentence for each control outside what was sampled. */
+            /** @description One sentence for each control outside what was sampled, and for each of `targets` that is not reached. */
             warnings: string[];
+            /** @description Names of the controls that were not given, and chosen as the most typical for those that were; absent where all were given. */
+            inferred?: string[];
+            /** @description The controls that can be measured on a motion, as this one has them, in their units; absent where there are none. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description Measured controls and targets that the motion was held to, and how far it stays from each; absent where there are none. */
+            targets?: components["schemas"]["Met"][];
+        };
+        /** @description Something that a motion was held to. */
+        Met: {
+            /**
+             * @description A control's name, or joint and moment of a target.
+             * @example RightHand at end
+             */
+            what: string;
+            /** @description How far the motion stays from it, in `unit`. */
+            miss: number;
+            /** @description m, m/s or deg. */
+            unit: string;
+            /** @description Whether it is met to a millimetre, or a thousandth of its unit. */
+            reached: boolean;
         };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
@@ -1623,6 +1720,17 @@ export interface components {
             default: number;
             /** @description The distinct sampled values where they are few, else empty. */
             values: number[];
+            /** @description How it is measured on a motion; absent where it is not, and then no motion can be held to it. */
+            measure?: {
+                /** @description left, height or forward (of a joint at a moment), step_length, stride_length, speed, turn, leg_length or stature. */
+                quantity: string;
+                /** @description Indices of the joints that it is measured at; absent where it is of the whole body. */
+                joints?: number[];
+                /** @description The moment: start, end, highest, lowest, farthest, or landmark. */
+                at?: string;
+                /** @description Of a landmark, the share of the clip's canonical time at which it lies. */
+                share?: number;
+            };
         };
         /** @description Joints parents first, their rest offsets, and the end sites that no joint follows. At rest every rotation is the identity. */
         Skeleton: {
@@ -1756,6 +1864,7 @@ export interface components {
         /**
          * @description One pose of each of many characters. All lists have one length, the number of characters, in
          *     one order; what is no list holds for each of them. Where nothing is a list there is one character.
+         *     Crowds are the model's predictions: they are held to nothing.
          */
         CrowdQuestion: {
             /**
@@ -2079,7 +2188,7 @@ export interface components {
         /** @description A problem as RFC 9457 describes it. Every error of this service has this shape. */
         Problem: {
             /** @enum {string} */
-            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
+            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
             title: string;
             status: number;
             /** @description What was found and what was expected, for people. */
@@ -2337,6 +2446,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2449,6 +2559,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2467,6 +2578,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2485,6 +2597,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2503,6 +2616,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2521,6 +2635,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2539,6 +2654,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2557,6 +2673,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2575,6 +2692,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2593,6 +2711,7 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2799,7 +2918,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or, with `extrapolate` refuse, controls outside what was sampled or a target out of reach. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2910,6 +3029,22 @@ export interface components {
         root: components["schemas"]["Root"];
         /** @description Whether the clip is a loop. */
         loop: components["schemas"]["Loop"];
+        /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+         *     the model can measure on a motion), `none`, or names of controls with commas between.
+         * @example none
+         */
+        exact: string;
+        /**
+         * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+         *     moment is its `at`, or its `time` in seconds. Repeated for several.
+         * @example [
+         *       "RightHand@end:0.3,1.2,0.4"
+         *     ]
+         */
+        target: string[];
+        /** @description Whether feet that stand stay where they stand. */
+        pinFeet: components["schemas"]["PinFeet"];
         /** @description The file's unit of length; the format's usual one, if left out. */
         unit: "m" | "cm";
         /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -2918,7 +3053,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+        /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -3043,6 +3178,12 @@ export interface components {
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
         Warning: string;
+        /**
+         * @description One header line for each of `targets` in Trust that is not reached; absent where all are. Each
+         *     is a JSON object in ASCII with `what`, `miss` and `unit`, so that the lines joined by commas and
+         *     put in brackets are a JSON array.
+         */
+        Missed: string;
         /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
         InferenceHeaderLength: number;
     };
@@ -3143,7 +3284,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3153,6 +3294,22 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3239,7 +3396,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3249,6 +3406,22 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3333,7 +3506,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3343,6 +3516,22 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3427,7 +3616,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3437,6 +3626,22 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3521,7 +3726,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3531,6 +3736,22 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3613,7 +3834,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3629,6 +3850,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3713,7 +3950,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3729,6 +3966,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3811,7 +4064,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3827,6 +4080,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3909,7 +4178,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3925,6 +4194,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4007,7 +4292,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4023,6 +4308,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4105,7 +4406,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4121,6 +4422,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4203,7 +4520,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4219,6 +4536,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description glTF has no other unit of length. */
                 unit?: components["parameters"]["unitOfGltf"];
                 /** @description In glTF no other axis is up. */
@@ -4301,7 +4634,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4317,6 +4650,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4399,7 +4748,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4415,6 +4764,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4497,7 +4862,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4513,6 +4878,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -5042,7 +5423,7 @@ export interface operations {
                 controls: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -6035,7 +6416,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "2.1.0";
+export const CONTRACT = "2.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -6197,6 +6578,7 @@ export const PROBLEM_TYPES = [
   "urn:posefield:problem:unsupported-media-type",
   "urn:posefield:problem:invalid-field",
   "urn:posefield:problem:outside-samples",
+  "urn:posefield:problem:out-of-reach",
   "urn:posefield:problem:overloaded",
   "urn:posefield:problem:late",
   "urn:posefield:problem:not-ready",
