@@ -22,7 +22,7 @@ class Operation(NamedTuple):
     media_types: tuple[str, ...]
 
 
-class Target(Struct, frozen=True, kw_only=True):
+class Target(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A joint that is to be in its place at a moment: at a time, or at the start, the end, the
     event that the model's recipe names, or where the joint is highest, lowest or farthest from
     the root. The motion that meets it is the nearest to the predicted one, as captured motions
@@ -33,8 +33,8 @@ class Target(Struct, frozen=True, kw_only=True):
 
     joint: str
     position: tuple[float, float, float]
-    time: float | None = None
-    at: str | None = None
+    time: float | UnsetType = UNSET
+    at: Literal["start", "end", "event", "highest", "lowest", "farthest"] | UnsetType = UNSET
 
 
 class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
