@@ -17,7 +17,7 @@ from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
 from service.synthesis.door import Door, Question
-from service.synthesis.exact import strides
+from service.synthesis.exact import missed, strides
 from service.synthesis.exact.goals import NOTHING, Goals
 from service.synthesis.exact.holding import Held
 from service.synthesis.exact.keeper import Keeper
@@ -130,21 +130,24 @@ class Synthesizer:
         somebody who was never seen, at a level of detail, of a motion that is held to something.
 
         Raises InvalidField for a control, time, performer or level that cannot be used, or for what
-        the motion cannot be held to, OutsideSamples where `extrapolate` is "refuse" and nothing
-        like the controls was captured.
+        the motion cannot be held to; where `extrapolate` is "refuse", OutsideSamples where nothing
+        like the controls was captured and OutOfReach for a goal that is missed.
         """
         asked = self.moments(controls, times, extrapolate, performer, level, hold)
         goals = self.keeper.goals(asked.question, hold)
         if goals:
-            return self.held_poses(asked, goals)
+            return self.held_poses(asked, goals, extrapolate)
         return self.posed(asked, self.poses([asked])[0])
 
-    def held_poses(self, asked: Moments, goals: Goals) -> PoseAnswer[np.float64]:
+    def held_poses(
+        self, asked: Moments, goals: Goals, extrapolate: Policy
+    ) -> PoseAnswer[np.float64]:
         """Poses of a motion that is held to something; raises as `pose`."""
         question = asked.question
-        held = self.keeper.held(question, goals)
+        held = self._meeting(question, goals, extrapolate)
         self._check_times(asked, self._sensible(held.duration))
-        return self.keeper.poses(question, held, asked.when, self._held_trust(question, held))
+        trust = self._held_trust(question, held, extrapolate)
+        return self.keeper.poses(question, held, asked.when, trust)
 
     def moments(
         self,
@@ -282,9 +285,9 @@ class Synthesizer:
         self, question: Question, goals: Goals, asked: ClipQuestion, most: int
     ) -> PoseAnswer[np.float64]:
         """Frames of a clip that is held to something."""
-        held = self.keeper.held(question, goals)
+        held = self._meeting(question, goals, asked.extrapolate)
         when = course.times(asked, self._sensible(held.duration), most)
-        trust = self._held_trust(question, held)
+        trust = self._held_trust(question, held, asked.extrapolate)
         answer = self.keeper.poses(question, held, when, trust)
         routed = asked.loop or asked.root == "in_place"
         return self._routed(answer, strides.of(held), asked) if routed else answer
@@ -305,9 +308,10 @@ class Synthesizer:
         """
         question = self._asked(asked)
         self._joints(asked)
-        times = course.times(asked, self._length(question, asked))
+        duration, misses = self._outlook(question, asked)
+        times = course.times(asked, duration)
         # A loop ends with its first frame again.
-        return Prospect(len(times) + asked.loop, question.warnings)
+        return Prospect(len(times) + asked.loop, question.warnings, misses)
 
     def _asked(self, asked: ClipQuestion) -> Question:
         who, level, policy = asked.performer, asked.level, asked.extrapolate
@@ -330,12 +334,23 @@ class Synthesizer:
         every = self.door.question(found, extrapolate, performer, level)
         return replace(every, inferred=asked.inferred)
 
-    def _length(self, question: Question, asked: ClipQuestion) -> float:
-        """Seconds that a clip takes, which a speed that it is held to changes."""
+    def _outlook(self, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
+        """Seconds that a clip takes, which a speed that it is held to changes, and whether it
+        misses some target."""
         goals = self.keeper.goals(question, asked.hold)
-        if goals and (goals.targets or self.session.card.cyclic):
-            return self._sensible(self.keeper.held(question, goals).duration)
-        return self._duration(question)
+        strict = asked.extrapolate == "refuse" or self.session.card.cyclic
+        if not (goals.targets or (goals and strict)):
+            return self._duration(question), False
+        held = self._meeting(question, goals, asked.extrapolate)
+        misses = not all(met.reached for met in held.met[len(goals.controls) :])
+        return self._sensible(held.duration), misses
+
+    def _meeting(self, question: Question, goals: Goals, extrapolate: Policy) -> Held:
+        """The motion that meets its goals; OutOfReach where it does not and that is refused."""
+        held = self.keeper.held(question, goals)
+        if extrapolate == "refuse":
+            missed.refuse(goals, held.met)
+        return held
 
     def _duration(self, question: Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
@@ -378,10 +393,12 @@ class Synthesizer:
             inferred=question.inferred,
         )
 
-    def _held_trust(self, question: Question, held: Held) -> Trust:
+    def _held_trust(self, question: Question, held: Held, extrapolate: Policy) -> Trust:
         own = self._trust(question, held.duration, held.state.sigma)
         measured = self.keeper.measured(question, held)
-        return replace(own, measured=measured, targets=held.met)
+        said = () if extrapolate == "ok" else missed.sentences(held.met)
+        warnings = (*own.warnings, *said)
+        return replace(own, warnings=warnings, measured=measured, targets=held.met)
 
     def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level

@@ -20,9 +20,11 @@ from posefield_client.generated import (
     Camera,
     Control,
     ManifestEntry,
+    Met,
     ModelCard,
     NamedClipQuestion,
     Reasons,
+    Target,
     Trust,
 )
 from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
@@ -49,6 +51,7 @@ __all__ = [
     "Disk",
     "ManifestEntry",
     "Memory",
+    "Met",
     "Model",
     "ModelCard",
     "NamedClipQuestion",
@@ -60,6 +63,7 @@ __all__ = [
     "Saved",
     "Saving",
     "SigmaGrid",
+    "Target",
     "Trust",
     "errors",
 ]

@@ -1330,6 +1330,63 @@ export interface components {
          */
         JointSigma: boolean;
         /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that the
+         *     model can measure on a motion: they have a `measure` on its card), `none`, or their names. The
+         *     motion is the nearest to the predicted one, as captured motions stray from predictions, that
+         *     does.
+         * @default auto
+         */
+        Exact: ("auto" | "none") | components["schemas"]["ControlName"][];
+        /**
+         * @description A joint that is to be in its place at a moment: at a time, or at the start, the end, the event
+         *     that the model's recipe names, or where the joint is highest, lowest or farthest from the root.
+         *     The motion that meets it is the nearest to the predicted one, as captured motions stray from
+         *     predictions. What lies farther off than they stray is approached as far as they go, and
+         *     `targets` in Trust says by how much it is missed. A joint has one target at one moment.
+         */
+        Target: {
+            /**
+             * @description Name of a joint, as the model's own skeleton has it.
+             * @example RightHand
+             */
+            joint: string;
+            /**
+             * @description Where it is to be, x y z, m, in the frame of the clip: that in which the root travels.
+             * @example [
+             *       0.3,
+             *       1.2,
+             *       0.4
+             *     ]
+             */
+            position: number[];
+            /** @description Seconds from the start of the clip, up to its duration. */
+            time?: number;
+            at?: components["schemas"]["Moment"];
+        } & (unknown | unknown);
+        /** @enum {string} */
+        Moment: "start" | "end" | "event" | "highest" | "lowest" | "farthest";
+        /**
+         * @description Joints that are to be in their places. Of a control that the same joint is measured for, the target is the nearer word.
+         * @default []
+         * @example [
+         *       {
+         *         "joint": "RightHand",
+         *         "position": [
+         *           0.3,
+         *           1.2,
+         *           0.4
+         *         ],
+         *         "at": "end"
+         *       }
+         *     ]
+         */
+        Targets: components["schemas"]["Target"][];
+        /**
+         * @description Whether feet that stand stay where they stand.
+         * @default false
+         */
+        PinFeet: boolean;
+        /**
          * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
          * @default null
          * @enum {string|null}
@@ -1344,7 +1401,7 @@ export interface components {
         /**
          * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
          *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
-         *     a gap of what was sampled; `refuse` answers neither.
+         *     a gap of what was sampled, and one for each target out of reach; `refuse` answers none of these.
          * @default warn
          * @enum {string}
          */
@@ -1388,6 +1445,9 @@ export interface components {
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
             joint_sigma?: components["schemas"]["JointSigma"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -1413,6 +1473,9 @@ export interface components {
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
         };
@@ -1567,6 +1630,9 @@ export interface components {
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         /** @description One clip of an archive, and how far it may be trusted. */
         ManifestEntry: {
@@ -1591,12 +1657,13 @@ export interface components {
             joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
+            /** @description As in Trust. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description As in Trust. */
+            targets?: components["schemas"]["Met"][];
         };
-        /**
-         * @description Names of the controls that were left out, and are the most typical for those that were given;
-         *     not there where none was. Since 2.2.0.
-         */
-        Inferred: string[];
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
             model: components["schemas"]["Identity"];
@@ -1612,16 +1679,41 @@ export interface components {
             supported: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it. */
+            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
+            /** @description The controls that can be measured on a motion, as this one has them, in their units; absent where there are none. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description Measured controls and targets that the motion was held to, and how far it stays from each; absent where there are none. */
+            targets?: components["schemas"]["Met"][];
         };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given and for
+         *     targets; not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
         /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
         Supported: boolean;
         /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
         SigmaByJoint: number[];
         /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
         PerformerSeen: boolean;
+        /** @description Something that a motion was held to. */
+        Met: {
+            /**
+             * @description A control's name, or joint and moment of a target.
+             * @example RightHand at end
+             */
+            what: string;
+            /** @description How far the motion stays from it, in `unit`. */
+            miss: number;
+            /** @description m, m/s or deg. */
+            unit: string;
+            /** @description Whether it is met to a millimetre, or a thousandth of its unit. */
+            reached: boolean;
+        };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
         /** @description For each time the position of the root, m. */
@@ -1826,6 +1918,7 @@ export interface components {
         /**
          * @description One pose of each of many characters. All lists have one length, the number of characters, in
          *     one order; what is no list holds for each of them. Where nothing is a list there is one character.
+         *     Crowds are the model's predictions: they are held to nothing.
          */
         CrowdQuestion: {
             /**
@@ -2151,7 +2244,7 @@ export interface components {
         /** @description A problem as RFC 9457 describes it. Every error of this service has this shape. */
         Problem: {
             /** @enum {string} */
-            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
+            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
             title: string;
             status: number;
             /** @description What was found and what was expected, for people. */
@@ -2411,6 +2504,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2525,6 +2619,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2545,6 +2640,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2565,6 +2661,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2585,6 +2682,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2605,6 +2703,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2625,6 +2724,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2645,6 +2745,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2665,6 +2766,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2685,6 +2787,7 @@ export interface components {
                 "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2891,7 +2994,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls like which nothing was captured with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, something that no motion can be held to, or, with `extrapolate` refuse, controls like which nothing was captured or a target out of reach. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -3007,6 +3110,22 @@ export interface components {
         loop: components["schemas"]["Loop"];
         /** @description Whether the trust says how far each joint may err. */
         jointSigma: components["schemas"]["JointSigma"];
+        /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+         *     the model can measure on a motion), `none`, or names of controls with commas between.
+         * @example none
+         */
+        exact: string;
+        /**
+         * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+         *     moment is its `at`, or its `time` in seconds. Repeated for several.
+         * @example [
+         *       "RightHand@end:0.3,1.2,0.4"
+         *     ]
+         */
+        target: string[];
+        /** @description Whether feet that stand stay where they stand. */
+        pinFeet: components["schemas"]["PinFeet"];
         /** @description The file's unit of length; the format's usual one, if left out. */
         unit: "m" | "cm";
         /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3015,7 +3134,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+        /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -3147,6 +3266,12 @@ export interface components {
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
         Warning: string;
+        /**
+         * @description One header line for each of `targets` in Trust that is not reached; absent where all are. Each
+         *     is a JSON object in ASCII with `what`, `miss` and `unit`, so that the lines joined by commas and
+         *     put in brackets are a JSON array.
+         */
+        Missed: string;
         /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
         InferenceHeaderLength: number;
     };
@@ -3250,7 +3375,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3262,6 +3387,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3351,7 +3492,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3363,6 +3504,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3450,7 +3607,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3462,6 +3619,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3549,7 +3722,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3561,6 +3734,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3648,7 +3837,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3660,6 +3849,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3745,7 +3950,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3763,6 +3968,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3850,7 +4071,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3868,6 +4089,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3953,7 +4190,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3971,6 +4208,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4056,7 +4309,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4074,6 +4327,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4159,7 +4428,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4177,6 +4446,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4262,7 +4547,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4280,6 +4565,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4365,7 +4666,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4383,6 +4684,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description glTF has no other unit of length. */
                 unit?: components["parameters"]["unitOfGltf"];
                 /** @description In glTF no other axis is up. */
@@ -4468,7 +4785,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4486,6 +4803,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4571,7 +4904,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4589,6 +4922,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4674,7 +5023,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4692,6 +5041,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -5224,7 +5589,7 @@ export interface operations {
                 controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -6382,6 +6747,7 @@ export const PROBLEM_TYPES = [
   "urn:posefield:problem:unsupported-media-type",
   "urn:posefield:problem:invalid-field",
   "urn:posefield:problem:outside-samples",
+  "urn:posefield:problem:out-of-reach",
   "urn:posefield:problem:overloaded",
   "urn:posefield:problem:late",
   "urn:posefield:problem:not-ready",
