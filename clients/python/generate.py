@@ -39,6 +39,7 @@ ANSWERS = (
     "ModelCard",
     "Trust",
     "Reasons",
+    "Suggestions",
     "ManifestEntry",
     "Liveness",
     "Readiness",

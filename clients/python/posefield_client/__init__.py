@@ -23,6 +23,7 @@ from posefield_client.generated import (
     ModelCard,
     NamedClipQuestion,
     Reasons,
+    Suggestions,
     Trust,
 )
 from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
@@ -60,6 +61,7 @@ __all__ = [
     "Saved",
     "Saving",
     "SigmaGrid",
+    "Suggestions",
     "Trust",
     "errors",
 ]

@@ -21,6 +21,7 @@ from posefield_client.generated import (
     Readiness,
     Reasons,
     SigmaQuestion,
+    Suggestions,
     WhyQuestion,
 )
 from posefield_client.numbers import Pose, SigmaGrid
@@ -93,6 +94,14 @@ def why(
     return Call(asking.either("Why", model, question), _REASONS)
 
 
+def suggest(
+    model: str, /, *, count: int | None = None, performer: str | None = None
+) -> Call[Suggestions]:
+    """Which clips to capture next; performer: whose alone count as captured."""
+    words = asking.said(count=count, performer=performer)
+    return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
+
+
 def sigma(
     model: str,
     /,
@@ -128,6 +137,7 @@ class _Json:
 
 _LIVENESS, _READINESS = _Json(Liveness), _Json(Readiness)
 _CARD, _REASONS, _LIST = _Json(ModelCard), _Json(Reasons), _Json(ModelList)
+_SUGGESTIONS = _Json(Suggestions)
 
 
 def _models(reply: Reply) -> tuple[ModelSummary, ...]:

@@ -35,6 +35,7 @@ export type {
   Reasons,
   SigmaGrid,
   SigmaQuestion,
+  Suggestions,
   Transfer,
   TransferOptions,
   Trust,

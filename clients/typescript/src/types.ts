@@ -9,6 +9,7 @@ export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
 export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
+export type Suggestions = Schemas["Suggestions"];
 export type SigmaGrid = Schemas["SigmaGrid"];
 export type Trust = Schemas["Trust"];
 
