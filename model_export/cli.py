@@ -18,6 +18,7 @@ from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField, TrainingError
 
 if TYPE_CHECKING:
+    from model_export.evaluate.learning import Learning
     from model_export.export import Exported
     from model_export.recipe import Recipe
     from model_export.train import Trained
@@ -183,6 +184,9 @@ def evaluate(
         Path | None,
         typer.Option(help="another recipe: is the gap between both flagged?", metavar="RECIPE"),
     ] = None,
+    learning: Annotated[
+        bool, typer.Option(help="what suggested clips are worth, on the procedural family")
+    ] = False,
     table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
     scheduler: Scheduler = None,
 ) -> None:
@@ -199,7 +203,7 @@ def evaluate(
         raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
     else:
         asked = [one.value for one in protocol or []]
-        wanted = _Wanted(asked, report, json_file, scheduler, joined)
+        wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
         _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
@@ -214,19 +218,20 @@ def _table1(json_file: Path | None) -> None:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Protocols, all that can for none, what to write, where to work, and the recipe of a family
-    that is joined to this one."""
+    """Protocols, all that can for none, what to write, where to work, the recipe of a family that
+    is joined to this one, and whether suggested clips are tried out."""
 
     protocols: list[str]
     report: Path | None
     json_file: Path | None
     scheduler: str | None
     joined: Path | None
+    learning: bool
 
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import flags, protocol, summary
+    from model_export.evaluate import flags, learning, protocol, summary
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -247,13 +252,29 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
         both = flags.joined(own, examples, other, ingest.ingest(other, data)[0])
         typer.echo(f"\n{own.name} and {other.name} joined, {summary.flags_said(both)}")
         more = {"joined": {"family": other.name, "support": summary.flags_facts(both)}}
+    curve = _learning(own, wanted)
+    if curve:
+        more["learning"] = learning.facts(curve)
+        typer.echo(f"\n{learning.table(curve)}")
     first, *others = map(summary.facts, results)
     if wanted.json_file:
         files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
     if wanted.report:
         from model_export.evaluate import render
 
-        files.write(render.html(own.description, results), wanted.report)
+        files.write(render.html(own.description, results, curve), wanted.report)
+
+
+def _learning(own: "Recipe", wanted: _Wanted) -> "Learning | None":
+    """What suggested clips are worth; none where nobody asks."""
+    from model_export.evaluate import learning
+
+    if not wanted.learning:
+        return None
+    if not own.truth:
+        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
+    with _jobs(wanted.scheduler), _bar("learning") as progress:
+        return learning.measure(progress)
 
 
 def _jobs(scheduler: str | None, shared: Sequence[Any] = ()) -> AbstractContextManager[None]:

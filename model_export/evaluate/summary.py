@@ -204,8 +204,12 @@ def table(result: Result) -> str:
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
-    said = [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
-    return "\n".join([title, "", lines[0], rule, *lines[1:], "", *said])
+    return "\n".join([title, "", lines[0], rule, *lines[1:], "", *trust_said(result)])
+
+
+def trust_said(result: Result) -> list[str]:
+    """How sigma by joint and the support flag do, a sentence each."""
+    return [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
 
 
 LEGEND = (

@@ -1,14 +1,15 @@
 """Which clips to capture next: points all over what was sampled, or such as are given, ranked."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from service.motion.answer import Suggestion, Suggestions
 from service.motion.card import ModelCard
-from service.motion.conventions import Floats, Indices
+from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
+from service.motion.field import Hyper
 from service.motion.support import Support
 from service.motion.worth import Worth, rank
 from service.synthesis import door, limits
@@ -17,12 +18,15 @@ from service.synthesis.synthesizer import Synthesizer
 COUNT, MOST = 10, 200
 DRAWN, GIVEN = 1000, 10_000
 """Candidates that are drawn, and that may be given."""
+# The field of cards that do not say theirs: 5 % of the covariance is left at one over the scale.
+PLAIN_SCALE = 0.4
+PLAIN = Hyper("gaussian", (0,), np.zeros(0), 0.05)
 
 
 @dataclass(frozen=True)
 class SuggestQuestion:
     """How many points, and of which: candidates by their controls, or for none points all over the
-    box that was sampled. performer: whose clips alone count as captured; everybody's for none."""
+    box that was sampled. performer: who is to be captured; for none, clips of all count alike."""
 
     count: int = COUNT
     performer: str | None = None
@@ -36,16 +40,30 @@ class SuggestQuestion:
 def suggest(model: Synthesizer, asked: SuggestQuestion) -> Suggestions:
     """Points to capture, the one that is worth most first, each as if those before it were.
 
-    InvalidField for a performer that there is not, and a candidate that cannot be used.
+    The field is that of the poses, with what training found of it. InvalidField for a performer
+    that there is not, and a candidate that cannot be used.
     """
     card, own = model.session.card, model.door.support
-    door.labels(card.performers, asked.performer)
+    labels = door.labels(card.performers, asked.performer)
     points = _given(model, asked.candidates) if asked.candidates else _drawn(own)
-    captured = _captured(card, asked.performer)
-    samples = own.scaled(np.array(card.examples)[captured])
-    ranked = rank(own.scaled(points), samples, asked.count)
-    found = tuple(_suggestion(card, own, captured, points[at], worth) for at, worth in ranked)
+    hyper, samples = _field(card, own, asked.performer)
+    whose = np.repeat(labels, len(points), axis=0)[:, : samples.shape[1] - points.shape[1]]
+    ranked = rank(hyper, np.hstack([own.scaled(points), whose]), samples, asked.count)
+    found = tuple(_suggestion(card, own, points[at], worth) for at, worth in ranked)
     return Suggestions(model.identity, asked.performer, len(points), found)
+
+
+def _field(card: ModelCard, own: Support, performer: str | None) -> tuple[Hyper, Floats]:
+    """The field of the poses, or where the card does not say it a plain one, and its samples.
+
+    Performers are told apart where one is asked for.
+    """
+    samples = own.scaled(np.array(card.examples))
+    if card.kriging is None:
+        return replace(PLAIN, scales=np.full(len(card.controls), PLAIN_SCALE)), samples
+    if performer is None:
+        return replace(card.kriging, label=0.0), samples
+    return card.kriging, np.hstack([samples, np.eye(len(card.performers))[list(card.moved_by)]])
 
 
 def _given(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
@@ -73,23 +91,13 @@ def _drawn(own: Support) -> Floats:
     return own.low + share * (own.high - own.low)
 
 
-def _captured(card: ModelCard, performer: str | None) -> Indices:
-    """Which of the captured clips count."""
-    if performer is None:
-        return np.arange(len(card.examples))
-    return np.flatnonzero(np.array(card.moved_by) == card.performers.index(performer))
-
-
-def _suggestion(
-    card: ModelCard, own: Support, captured: Indices, point: Floats, worth: Worth
-) -> Suggestion:
+def _suggestion(card: ModelCard, own: Support, point: Floats, worth: Worth) -> Suggestion:
     """A point with what is near it, and what that lacks."""
-    examples = np.array(card.examples)[captured]
-    gaps = 0.5 * np.abs(own.scaled(examples) - own.scaled(point[None]))
+    gaps = 0.5 * np.abs(own.samples - own.scaled(point[None]))
     nearest = int(np.argmin(np.sum(np.square(gaps), axis=1)))
     control = int(np.argmax(gaps[nearest]))
     names = [each.name for each in card.controls]
-    source = card.sources[captured[nearest]] if card.sources else None
+    source = card.sources[nearest] if card.sources else None
     return Suggestion(
         dict(zip(names, point.tolist(), strict=True)),
         worth.gain,

@@ -117,7 +117,7 @@ export class Client {
     return this.#read(asked, (found) => read("Reasons", found), signal);
   }
 
-  /** Which clips to capture next, and of whom: everybody's count as captured, if nobody is named. */
+  /** Which clips to capture next, and of whom. */
   async suggestions(
     model: string,
     asked: { readonly count?: number; readonly performer?: string } = {},
