@@ -244,7 +244,8 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
         for name in wanted.protocols or can:
             with _bar(name) as progress:
                 results.append(protocol.run(own, examples, name, progress))
-            typer.echo(f"{summary.table(results[-1])}\n")
+            trust = "\n".join(summary.trust_said(results[-1]))
+            typer.echo(f"{summary.table(results[-1])}\n\n{trust}\n")
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
     more: dict[str, Any] = {}
     if wanted.joined:

@@ -204,7 +204,7 @@ def table(result: Result) -> str:
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
-    return "\n".join([title, "", lines[0], rule, *lines[1:], "", *trust_said(result)])
+    return "\n".join([title, "", lines[0], rule, *lines[1:]])
 
 
 def trust_said(result: Result) -> list[str]:
