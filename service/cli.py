@@ -18,8 +18,9 @@ import orjson
 import typer
 
 from service import __version__, exports, page
-from service.encode import ENCODERS, Encoder, poses, reasons
+from service.encode import ENCODERS, Encoder, poses, reasons, suggestions
 from service.encode.convention import Unit, Up
+from service.export import queries
 from service.motion import card as cards
 from service.motion import files, measure
 from service.motion.answer import ClipAnswer, Reasons, Trust
@@ -35,6 +36,8 @@ from service.motion.errors import (
 from service.motion.roles import Names
 from service.synthesis import library, pace, session
 from service.synthesis.question import ClipQuestion, Policy, Root
+from service.synthesis.suggest import COUNT, SuggestQuestion
+from service.synthesis.suggest import suggest as find_suggestions
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 from service.synthesis.why import NEAREST, WhyQuestion
@@ -267,6 +270,29 @@ def why(
     found = find_reasons(synthesizer, asked)
     _tell(found)
     typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
+
+
+@app.command()
+def suggest(
+    model: ModelPath,
+    count: Annotated[int, typer.Option(help="points to list")] = COUNT,
+    performer: Annotated[
+        str | None,
+        typer.Option(help="who is to be captured; if not said, clips of all count alike"),
+    ] = None,
+    candidates: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV, Parquet or JSON Lines of points that can be captured", metavar="FILE"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say which clips to capture next: where one more would be worth most, the first first."""
+    synthesizer = open_model(model)
+    given = queries.points(candidates, synthesizer) if candidates else ()
+    found = find_suggestions(synthesizer, SuggestQuestion(count, performer, given))
+    typer.echo(as_json(suggestions.plain(found)) if json else suggestions.text(found))
 
 
 app.command()(exports.export)

@@ -210,9 +210,13 @@ def table(result: Result) -> str:
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
-    said = [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
     rows = columns.even(HEAD, [summary.cells() for summary in of(result)])
-    return "\n".join([title, "", rows, "", *said])
+    return f"{title}\n\n{rows}"
+
+
+def trust_said(result: Result) -> list[str]:
+    """How sigma by joint and the support flag do, a sentence each."""
+    return [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
 
 
 LEGEND = (

@@ -179,3 +179,35 @@ class Reasons:
     others: int
     others_weight: float
     inferred: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A point to capture.
+
+    gain: share by which the mean variance over all that may be asked falls if it is. variance: at
+    the point itself, as a share of the sill. nearest: source of the captured clip nearest to it;
+    none for models that do not keep them. lacking: the control in which that differs most, by
+    `gap`, a share of its range.
+    """
+
+    controls: dict[str, float]
+    gain: float
+    variance: float
+    nearest: str | None
+    lacking: str
+    gap: float
+
+
+@dataclass(frozen=True)
+class Suggestions:
+    """Points to capture next, the one that is worth most first; each as if those before it were.
+
+    model: name@contenthash. performer: who is to be captured; for none clips of all counted alike.
+    candidates: of how many points they were chosen.
+    """
+
+    model: str
+    performer: str | None
+    candidates: int
+    suggestions: tuple[Suggestion, ...]

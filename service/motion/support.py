@@ -38,12 +38,12 @@ class Support:
 
     def beyond(self, points: Floats) -> Floats:
         """How far points (B, d) lie beyond the range of each control (B, d), as shares of it."""
-        return np.maximum(0.5 * (np.abs(self._scaled(points)) - 1.0), 0.0)
+        return np.maximum(0.5 * (np.abs(self.scaled(points)) - 1.0), 0.0)
 
     def variance(self, points: Floats) -> Floats:
         """Variance (B,) of the plain field at points (B, d): from 0 where much was captured to 1
         where nothing was."""
-        near = _covariances(self._scaled(points), self.samples)
+        near = covariances(self.scaled(points), self.samples)
         return 1.0 - np.sum(near @ self._inverse * near, axis=1)
 
     def holds(self, points: Floats) -> Truths:
@@ -79,7 +79,7 @@ class Support:
 
     @cached_property
     def _inverse(self) -> Floats:
-        own = _covariances(self.samples, self.samples) + NUGGET * np.eye(len(self.samples))
+        own = covariances(self.samples, self.samples) + NUGGET * np.eye(len(self.samples))
         return np.asarray(np.linalg.inv(own))
 
     @cached_property
@@ -110,12 +110,13 @@ class Support:
     def _roughly(self, points: Floats) -> Floats:
         """`variance` (B,) in single precision, of points that are not far away."""
         slopes, offsets = self._exponents
-        squared = np.sum(np.square(self._scaled(points)), axis=1)
+        squared = np.sum(np.square(self.scaled(points)), axis=1)
         exponents = points @ slopes.T + offsets - RATE * squared[:, None]
         near = np.exp(exponents.astype(np.float32))
         return 1.0 - np.einsum("bi,bi->b", near @ self._single, near, dtype=np.float64)
 
-    def _scaled(self, points: Floats) -> Floats:
+    def scaled(self, points: Floats) -> Floats:
+        """Points (B, d) in half-ranges."""
         return half_ranges(points, self.low, self.high)
 
 
@@ -125,6 +126,7 @@ def of(controls: Floats) -> Support:
     return Support(low, high, half_ranges(controls, low, high))
 
 
-def _covariances(a: Floats, b: Floats) -> Floats:
+def covariances(a: Floats, b: Floats) -> Floats:
+    """Covariance (A, B) of the plain field between points (A, d) and (B, d) in half-ranges."""
     gaps = a[:, None] - b
     return np.asarray(np.exp(-RATE * np.sum(np.square(gaps), axis=-1)))

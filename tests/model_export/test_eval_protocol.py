@@ -246,6 +246,27 @@ def test_facts_are_what_was_measured(results):
     json.dumps(facts, allow_nan=False)
 
 
+def test_sigma_of_each_joint_is_compared_with_that_joint(results):
+    result = results[0][0]
+    found = summary.facts(result)["joint_sigma_ratio"]
+    assert tuple(found) == result.joints
+    joint = len(result.joints) - 1
+    errors = [error.joints[joint] for error in result.errors["posefield"]]
+    expected = np.mean(errors / result.joint_sigma[:, joint] ** 2)
+    assert found[result.joints[joint]] == pytest.approx(expected, rel=1e-5)
+    # Together they are what the answer as a whole is off by.
+    squares = [np.mean(error.joints) for error in result.errors["posefield"]]
+    assert squares == pytest.approx([error.squared for error in result.errors["posefield"]])
+
+
+def test_the_flag_is_held_to_its_promise_on_the_same_folds(results):
+    result = results[0][0]
+    found = summary.facts(result)["support"]
+    assert result.flags is not None and found["false_alarms"] == result.flags.alarms
+    said = summary.trust_said(result)
+    assert len(said) == 2 and said[1].startswith("support: ")
+
+
 def test_the_table_has_a_row_for_every_method(results):
     lines = summary.table(results[0][0]).splitlines()
     assert len({len(line) for line in lines[2:]}) == 1

@@ -346,6 +346,26 @@ class Reasons(Struct, frozen=True, kw_only=True):
     others: ReasonsOthers
 
 
+class Suggestion(Struct, frozen=True, kw_only=True):
+    """Schema Suggestion of the contract."""
+
+    controls: dict[str, float]
+    gain: float
+    variance: float
+    nearest: str | None
+    lacking: str
+    gap: float
+
+
+class Suggestions(Struct, frozen=True, kw_only=True):
+    """Each point is ranked as if those before it had been captured already."""
+
+    model: str
+    performer: str | None
+    candidates: int
+    suggestions: tuple[Suggestion, ...]
+
+
 class ManifestEntry(Struct, frozen=True, kw_only=True):
     """One clip of an archive, and how far it may be trusted."""
 
@@ -586,6 +606,7 @@ OPERATIONS = {
         Operation("getCrowdUsdz", "GET", "/v1/models/{model}/crowd.usdz", ("model/vnd.usdz+zip",)),
         Operation("getWhy", "GET", "/v1/models/{model}/why", ("application/json",)),
         Operation("queryWhy", "POST", "/v1/models/{model}/why", ("application/json",)),
+        Operation("getSuggestions", "GET", "/v1/models/{model}/suggestions", ("application/json",)),
         Operation(
             "getSigma",
             "GET",

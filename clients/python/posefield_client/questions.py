@@ -21,6 +21,7 @@ from posefield_client.generated import (
     Readiness,
     Reasons,
     SigmaQuestion,
+    Suggestions,
     WhyQuestion,
 )
 from posefield_client.holding import Exact, Targets
@@ -98,6 +99,14 @@ def why(
     return Call(asking.either("Why", model, question), _REASONS)
 
 
+def suggest(
+    model: str, /, *, count: int | None = None, performer: str | None = None
+) -> Call[Suggestions]:
+    """Which clips to capture next; performer: who is to be captured."""
+    words = asking.said(count=count, performer=performer)
+    return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
+
+
 def sigma(
     model: str,
     /,
@@ -133,6 +142,7 @@ class _Json:
 
 _LIVENESS, _READINESS = _Json(Liveness), _Json(Readiness)
 _CARD, _REASONS, _LIST = _Json(ModelCard), _Json(Reasons), _Json(ModelList)
+_SUGGESTIONS = _Json(Suggestions)
 
 
 def _models(reply: Reply) -> tuple[ModelSummary, ...]:

@@ -777,6 +777,32 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/models/{model}/suggestions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description A model's name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        /**
+         * Get which clips to capture next
+         * @description Points within what was sampled at which one more captured clip would say most of what is asked of the model, the one that is worth most first.
+         */
+        get: operations["getSuggestions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/models/{model}/sigma": {
         parameters: {
             query?: never;
@@ -1522,6 +1548,28 @@ export interface components {
             variance: number;
             /** @description The variance above which nothing is supported. */
             most_variance: number;
+        };
+        /** @description Each point is ranked as if those before it had been captured already. */
+        Suggestions: {
+            model: components["schemas"]["Identity"];
+            /** @description Who is to be captured; null where clips of all count alike. */
+            performer: string | null;
+            /** @description Of how many points these were chosen. */
+            candidates: number;
+            /** @description The one that is worth most first. */
+            suggestions: components["schemas"]["Suggestion"][];
+        };
+        Suggestion: {
+            controls: components["schemas"]["Controls"];
+            /** @description Share by which the mean variance of the poses falls over all that may be asked, once this is captured. */
+            gain: number;
+            /** @description At the point itself, before, as a share of the sill. */
+            variance: number;
+            /** @description Source of the captured clip nearest to it; null in models trained before this was kept. */
+            nearest: string | null;
+            lacking: components["schemas"]["ControlName"];
+            /** @description By how much the nearest clip differs in that control, in which it differs most, as a share of its range. */
+            gap: number;
         };
         CapturedClip: {
             /** @description The motion file, and the frames of it where the clip is a part. */
@@ -2519,6 +2567,19 @@ export interface components {
                 "application/vnd.msgpack": string;
             };
         };
+        /** @description Which clips to capture next. */
+        Suggestions: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                ETag: components["headers"]["ETag"];
+                Vary: components["headers"]["Vary"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/json": components["schemas"]["Suggestions"];
+            };
+        };
         /** @description What the answer is made of. */
         Reasons: {
             headers: {
@@ -3153,6 +3214,13 @@ export interface components {
         camera: string;
         /** @description How many captured clips are listed at most, the nearest first. */
         nearest: components["schemas"]["Nearest"];
+        /** @description How many points. */
+        suggestions: number;
+        /**
+         * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+         * @example tall
+         */
+        whose: string;
         /**
          * @description The control that changes from column to column.
          * @example turn
@@ -5657,6 +5725,44 @@ export interface operations {
             503: components["responses"]["Overloaded"];
         };
     };
+    getSuggestions: {
+        parameters: {
+            query?: {
+                /** @description How many points. */
+                count?: components["parameters"]["suggestions"];
+                /**
+                 * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+                 * @example tall
+                 */
+                performer?: components["parameters"]["whose"];
+            };
+            header?: {
+                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
+            };
+            path: {
+                /**
+                 * @description A model's name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Suggestions"];
+            304: components["responses"]["NotModified"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            422: components["responses"]["Unanswerable"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
     getSigma: {
         parameters: {
             query: {
@@ -6663,6 +6769,12 @@ export const REQUIRED = {
     "sigma",
     "inside"
   ],
+  "Suggestions": [
+    "model",
+    "performer",
+    "candidates",
+    "suggestions"
+  ],
   "Trust": [
     "model",
     "controls",
@@ -6708,6 +6820,9 @@ export const LISTS = {
     "along_values",
     "sigma",
     "inside"
+  ],
+  "Suggestions": [
+    "suggestions"
   ],
   "Trust": [
     "warnings"

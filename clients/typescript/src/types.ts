@@ -11,6 +11,7 @@ export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
 export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
+export type Suggestions = Schemas["Suggestions"];
 export type SigmaGrid = Schemas["SigmaGrid"];
 /** A joint that is to be in its place, at a `time` or `at` a moment of the motion. */
 export type Target = Schemas["Target"];
