@@ -60,6 +60,10 @@ class _Part:
     errors: dict[str, list[Errors | None]]
     sigma: Floats
 
+    def of(self, name: str) -> Sequence[Errors | None]:
+        """Errors of a method, none of one that was not asked."""
+        return self.errors.get(name, [None] * len(self.places))
+
 
 def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     """What can be asked of a recipe, the one that counts most first."""
@@ -163,9 +167,9 @@ def _result(recipe: Recipe, protocol: str, names: Sequence[str], parts: Iterator
     """Parts in the order of the clips, whichever came first."""
     listed = list(parts)
     order = np.argsort([place for part in listed for place in part.places])
-    gathered = {
-        name: [error for part in listed for error in part.errors[name]] for name in listed[0].errors
-    }
+    # Where a fold holds the last but one performer out, nobody is told apart in it.
+    methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
+    gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
     return Result(
         recipe.name,
         protocol,
