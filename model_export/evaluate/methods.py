@@ -75,12 +75,6 @@ def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
     return Answers(motions, sigma, sigma[:, None] * trained.joints)
 
 
-def ours(recipe: Recipe, trained: Trained, asked: Asked) -> list[Motion]:
-    """Answers of ours alone."""
-    points = trained.model.bank.points(asked.controls, _labels(trained, asked))
-    return _ours(trained, asked, points, fidelity.moment(recipe, trained.examples))
-
-
 def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:
     """The event of a captured clip, by its own landmarks."""
     found = fidelity.moment(recipe, trained.examples)

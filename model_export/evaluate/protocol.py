@@ -71,6 +71,10 @@ class _Part:
     joint_sigma: Floats
     corrections: list[Correction]
 
+    def of(self, name: str) -> Sequence[Errors | None]:
+        """Errors of a method, none of one that was not asked."""
+        return self.errors.get(name, [None] * len(self.places))
+
 
 @dataclass(frozen=True)
 class _Made:
@@ -216,9 +220,9 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
     listed = list(parts)
     order = np.argsort([place for part in listed for place in part.places])
     corrections = [correction for part in listed for correction in part.corrections]
-    gathered = {
-        name: [error for part in listed for error in part.errors[name]] for name in listed[0].errors
-    }
+    # Where a fold holds the last but one performer out, nobody is told apart in it.
+    methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
+    gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
     return Result(
         recipe.name,
         asked.protocol,
