@@ -20,14 +20,13 @@ class Limb:
     bones: Floats
     reduced: Reduced
 
-    def posed(self, motion: Floats, rows: Floats, gone: Floats) -> "Pose":
-        """The chain in a reduced motion (r2, r1) at time coefficients (S, r2), where the root has
-        got gone (S, 3) of a cycle's travel: to the left and ahead, m, and turned, rad."""
+    def posed(self, moves: Floats, gone: Floats) -> "Pose":
+        """The chain at coefficients (S, r1) of the first mode, where the root has got gone (S, 3)
+        of a cycle's travel: to the left and ahead, m, and turned, rad."""
         joints, reduced = list(self.chain), self.reduced
         numbers = [0, 1, 2, *(3 + 3 * joint + axis for joint in joints for axis in range(3))]
-        moves = rows @ motion
         found = reduced.mean[numbers] + moves @ reduced.directions[:, numbers]
-        vectors = found[:, 3:].reshape(len(rows), len(joints), 3)
+        vectors = found[:, 3:].reshape(len(moves), len(joints), 3)
         turns = quat.mul(reduced.rotations[joints], quat.exp(vectors))
         turns[:, 0] = quat.mul(quat.about(UP, gone[:, 2]), turns[:, 0])
         roots = found[:, :3] + gone[:, :1] * np.array([1.0, 0.0, 0.0])
