@@ -84,27 +84,27 @@ def meet(
 ) -> Corrected:
     """The motion nearest to a predicted one (numbers,) of standard deviation sigma, m, that meets
     the aims, or comes as near as captured motions get, and leaves pins about where they are."""
-    looked = looking.look(aims, scene, begun)
+    looked = looking.look([*aims, *pins], scene, begun)
     found = reach.of(scene, spread, sigma, begun, aims, looked)
     loose = np.repeat([0.0, (LOOSE / sigma) ** 2], [len(found.left), 3 * len(pins)])
-    goal = np.concatenate([looked[0] + found.way, *(pin.goal for pin in pins)])
+    near = looked[0][: len(found.left)] + found.way
+    goal = np.concatenate([near, *(pin.goal for pin in pins)])
     task = _Task(scene, spread, begun, aims, pins, found.worth, loose)
-    numbers, steps = _descend(task, goal)
-    values, _ = looking.look(aims, scene, numbers)
+    numbers, values, steps = _descend(task, looked, goal)
     return Corrected(numbers, tuple(_met(aims, values)), steps, found.distance)
 
 
-def _descend(task: _Task, goal: Floats) -> tuple[Floats, int]:
-    """The corrected numbers, and in how many steps."""
-    numbers, looked, straight = task.begun, task.look(task.begun), True
+def _descend(task: _Task, looked: Looked, goal: Floats) -> tuple[Floats, Floats, int]:
+    """The corrected numbers, their values, and in how many steps."""
+    numbers, whole = task.begun, True
     for step in range(STEPS):
         if np.abs((goal - looked[0])[: task.firm]).max() < CLOSE:
-            return numbers, step
-        moved = _nearer(task, numbers, looked, goal, straight)
+            return numbers, looked[0], step
+        moved = _nearer(task, numbers, looked, goal, whole)
         if moved is None:
-            return numbers, step
-        numbers, looked, straight = moved
-    return numbers, STEPS
+            return numbers, looked[0], step
+        numbers, looked, whole = moved
+    return numbers, looked[0], STEPS
 
 
 def _nearer(
