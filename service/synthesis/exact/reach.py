@@ -1,4 +1,4 @@
-"""How far off aims lie, judged by how captured motions stray, and how much of the way there is gone.
+"""How far off aims lie, judged by how captured motions stray, and how much of the way is gone.
 
 What the others predict for each captured clip misses it by so much in the very values that are
 aimed at: a hand that the controls place strays less than its arm does. Aims that lie farther off
