@@ -18,6 +18,7 @@ from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField, TrainingError
 
 if TYPE_CHECKING:
+    from model_export.evaluate.learning import Learning
     from model_export.export import Exported
     from model_export.recipe import Recipe
     from model_export.train import Trained
@@ -240,6 +241,13 @@ def evaluate(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
     ] = None,
+    joined: Annotated[
+        Path | None,
+        typer.Option(help="another recipe: is the gap between both flagged?", metavar="RECIPE"),
+    ] = None,
+    learning: Annotated[
+        bool, typer.Option(help="what suggested clips are worth, on the procedural family")
+    ] = False,
     table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
     scheduler: Scheduler = None,
 ) -> None:
@@ -256,7 +264,7 @@ def evaluate(
         raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
     else:
         asked = [one.value for one in protocol or []]
-        wanted = _Wanted(asked, report, json_file, scheduler)
+        wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
         _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
@@ -271,17 +279,20 @@ def _table1(json_file: Path | None) -> None:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Protocols, all that can for none, what to write, and where to work."""
+    """Protocols, all that can for none, what to write, where to work, the recipe of a family that
+    is joined to this one, and whether suggested clips are tried out."""
 
     protocols: list[str]
     report: Path | None
     json_file: Path | None
     scheduler: str | None
+    joined: Path | None
+    learning: bool
 
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import protocol, summary, worth
+    from model_export.evaluate import flags, learning, protocol, reach, summary, worth
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -294,18 +305,44 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
         for name in wanted.protocols or can:
             with _bar(name) as progress:
                 results.append(protocol.run(own, examples, name, progress))
-            typer.echo(f"{summary.table(results[-1])}\n")
+            trust = "\n".join(summary.trust_said(results[-1]))
+            typer.echo(f"{summary.table(results[-1])}\n\n{trust}\n")
+            if results[-1].corrections:
+                typer.echo(f"{reach.table(results[-1])}\n")
     for said in worth.said(results):
         typer.echo(said)
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results)}")
+    more: dict[str, Any] = {}
+    if wanted.joined:
+        other = recipe.read(wanted.joined)
+        both = flags.joined(own, examples, other, ingest.ingest(other, data)[0])
+        typer.echo(f"\n{own.name} and {other.name} joined, {summary.flags_said(both)}")
+        more = {"joined": {"family": other.name, "support": summary.flags_facts(both)}}
+    if named := worth.facts(results):
+        more["performers"] = named
+    curve = _learning(own, wanted)
+    if curve:
+        more["learning"] = learning.facts(curve)
+        typer.echo(f"\n{learning.table(curve)}")
     first, *others = map(summary.facts, results)
     if wanted.json_file:
-        named = {"performers": found} if (found := worth.facts(results)) else {}
-        files.write(as_json({**first, "others": others, **named}).encode(), wanted.json_file)
+        files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
     if wanted.report:
         from model_export.evaluate import render
 
-        files.write(render.html(own.description, results), wanted.report)
+        files.write(render.html(own.description, results, curve), wanted.report)
+
+
+def _learning(own: "Recipe", wanted: _Wanted) -> "Learning | None":
+    """What suggested clips are worth; none where nobody asks."""
+    from model_export.evaluate import learning
+
+    if not wanted.learning:
+        return None
+    if not own.truth:
+        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
+    with _jobs(wanted.scheduler), _bar("learning") as progress:
+        return learning.measure(progress)
 
 
 def _jobs(scheduler: str | None, shared: Sequence[Any] = ()) -> AbstractContextManager[None]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import cost, fidelity, levels, phase, samples, strangers, threads
+from model_export import cost, fidelity, levels, measured, phase, samples, strangers, threads
 from model_export.flips import Finding
 from model_export.ingest import Example
 from model_export.kriging import Kriging
@@ -66,12 +66,25 @@ def finished(model: Model, own_card: Callable[[float], ModelCard]) -> Exported:
 
     Raises ExportRefused as `gate` does.
     """
-    about = {"producer_name": "posefield", "producer_version": __version__}
+    about = _about()
     # The gate's finding is part of the card, so the weights are judged before it is written.
     draft = own_card(0.0)
     parity = gate(model, model.onnx(card.dump(draft), about), draft)
     written = own_card(parity)
     return Exported(model, model.onnx(card.dump(written), about), written, parity)
+
+
+@threads.one()
+def finest(recipe: Recipe, trained: Trained) -> bytes:
+    """File of the finest level alone, that no gate has judged: to be measured, not to be served."""
+    alone = recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": []})})
+    laddered = levels.build(alone, trained)
+    own_card = _card(recipe, trained, laddered.levels, [], parity=0.0)
+    return laddered.model.onnx(card.dump(own_card), _about())
+
+
+def _about() -> dict[str, str]:
+    return {"producer_name": "posefield", "producer_version": __version__}
 
 
 def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
@@ -150,7 +163,7 @@ def _card(
     return ModelCard(
         name=recipe.name,
         description=recipe.description,
-        controls=_controls(recipe, np.stack([example.controls for example in examples])),
+        controls=_controls(recipe, trained),
         skeleton=trained.skeleton,
         cyclic=recipe.motion.cyclic,
         root=recipe.motion.root,
@@ -171,6 +184,7 @@ def _card(
         left_out=tuple(map(_round, np.sqrt(trained.missed))),
         event=fidelity.event(recipe, examples),
         beside=_beside(trained),
+        joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
         making=_making(recipe, trained),
     )
 
@@ -206,19 +220,22 @@ def solved_with(hyper: Hyper) -> tuple[float, ...]:
     return (float(f"{hyper.nugget:.6g}"), *hyper.drifts)
 
 
-def _controls(recipe: Recipe, values: Floats) -> tuple[Control, ...]:
+def _controls(recipe: Recipe, trained: Trained) -> tuple[Control, ...]:
+    values = np.stack([example.controls for example in trained.examples])
+    landmarks = np.array([example.landmarks for example in trained.examples])
     controls = []
-    for column, own in zip(recipe.controls, values.T, strict=True):
+    for asked, own in zip(recipe.controls, values.T, strict=True):
         distinct = np.unique(own)
         controls.append(
             Control(
-                column.name,
-                column.unit,
-                column.description,
+                asked.name,
+                asked.unit,
+                asked.description,
                 float(distinct[0]),
                 float(distinct[-1]),
                 float(np.sort(own)[len(own) // 2]),
                 tuple(map(float, distinct)) if len(distinct) <= FEW_VALUES else (),
+                measured.on_the_card(recipe, asked, trained.skeleton, landmarks),
             )
         )
     return tuple(controls)

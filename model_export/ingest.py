@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from model_export import flips, table
+from model_export import flips, measured, table
 from model_export.flips import Finding
 from model_export.recipe import Recipe
 from model_export.table import Row
@@ -25,7 +25,8 @@ RIGID = 1e-4
 class Example:
     """One clip with what it is an example of.
 
-    controls (d,), landmarks: fractions of the clip, in order. jumps: what a solver did to small
+    controls (d,), typed and measured, in the recipe's order. landmarks: fractions of the clip, in
+    order. jumps: what a solver did to small
     joints between two frames, and is undone. shift: the share of a cycle by which it begins later
     than it was cut.
     """
@@ -40,9 +41,7 @@ class Example:
     @property
     def offsets(self) -> Floats:
         """Bone offsets (J, 3) of the performer, the root's zero, m."""
-        offsets = self.clip.translations.mean(axis=0)
-        offsets[0] = 0.0
-        return offsets
+        return measured.bones(self.clip)
 
 
 def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
@@ -87,7 +86,8 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
     in_place = recipe.motion.root == "in_place"
     clip, jumps, said = canonical(clip, row, recipe.motion.cyclic, in_place)
     notes += said
-    return Example(row, clip, row.controls, landmarks(row, last), jumps)
+    marks = landmarks(row, last)
+    return Example(row, clip, measured.controls(recipe, row, clip, marks), marks, jumps)
 
 
 def cut(whole: Clip, row: Row) -> tuple[Clip, int]:
@@ -165,6 +165,8 @@ def _needed(recipe: Recipe) -> set[str]:
     """Joints that a recipe speaks of."""
     event = {recipe.event.joint} if recipe.event else set()
     motion = recipe.motion
+    autos = [control.auto for control in recipe.measured]
+    event |= {joint for auto in autos for joint in (*auto.places, *recipe.ends(auto))}
     return {*motion.joint_weights, *motion.feet, *recipe.roles.values()} | event
 
 

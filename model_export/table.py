@@ -21,8 +21,8 @@ class Row:
     """One clip: where it is, which frames of it, and what it was an example of.
 
     line: in the table, for messages; None where it stands in none. last_frame, counted in, and
-    first_frame index the file's frames from 0; None is the file's own end. controls (d,),
-    landmarks: frames of the file.
+    first_frame index the file's frames from 0; None is the file's own end. controls: those that
+    are typed; landmarks: frames of the file.
     """
 
     place: Place
@@ -170,7 +170,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         clips.file: "clips.file",
         **dict.fromkeys(clips.where, "clips.where"),
         **dict.fromkeys(clips.landmarks, "clips.landmarks"),
-        **{control.column: f"control {control.name}" for control in recipe.controls},
+        **{control.column: f"control {control.name}" for control in recipe.typed},
     }
     for key in ("performer", "first_frame", "last_frame"):
         column = getattr(clips, key)
@@ -192,7 +192,7 @@ def _row(recipe: Recipe, folder: Path, cells: Table, line: int, record: dict[str
         performer=record[clips.performer] if clips.performer else "",
         first_frame=first,
         last_frame=last,
-        controls=np.array([cells.number(line, record, c.column) for c in recipe.controls]),
+        controls=np.array([cells.number(line, record, c.column) for c in recipe.typed]),
         landmarks=tuple(cells.frame(line, record, column) for column in clips.landmarks),
     )
 

@@ -16,11 +16,13 @@ from model_export.train import Trained
 from service.motion import skeleton
 from service.motion.conventions import Floats
 
-OURS, NAIVE = "posefield", "naive"
+OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
 # What would only repeat another row where performers are not told apart.
 LABELLED = ("gp_controls", "nearest_same_performer")
 DEFINITIONS = {
     OURS: "the model as it is exported: truncated, with its own bones and timing",
+    EXACT: "the same, corrected by what the service runs until the event's joint is at its event "
+    "where the captured clip has it",
     "posefield_no_performer": "the same model, asked for nobody in particular",
     **{
         f"posefield_adapt_{count}": f"the same model adapted to the performer by {shown}, each of "
@@ -45,11 +47,12 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answers:
-    """Motions of each method, none where it was not asked, and our own standard deviation (Q,) of
-    each query, m."""
+    """Motions of each method, none where it was not asked, and our own standard deviation of each
+    query (Q,), and of each joint of it (Q, J), m."""
 
     motions: Mapping[str, Sequence[Motion | None]]
     sigma: Floats
+    joint_sigma: Floats
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,8 @@ def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
     motions: dict[str, list[Motion]] = {OURS: ours(recipe, trained, asked)}
     for name, predict in _methods(trained).items():
         motions[name] = _restore(trained, predict(points), event)
-    return Answers(motions, bank.sigma(bank.numpy(points)[VARIANCE]))
+    sigma = bank.sigma(bank.numpy(points)[VARIANCE])
+    return Answers(motions, sigma, sigma[:, None] * trained.joints)
 
 
 def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:

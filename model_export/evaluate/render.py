@@ -6,7 +6,8 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from model_export.evaluate import summary
+from model_export.evaluate import reach, summary
+from model_export.evaluate.learning import Learning
 from model_export.evaluate.methods import DEFINITIONS, OURS
 from model_export.evaluate.protocol import Result
 from model_export.evaluate.summary import Summary
@@ -22,8 +23,8 @@ TITLES = {
 }
 
 
-def html(description: str, results: Sequence[Result]) -> bytes:
-    """Page of a recipe's results; the same results give the same bytes."""
+def html(description: str, results: Sequence[Result], curve: Learning | None = None) -> bytes:
+    """Page of a recipe's results, and of a learning curve; the same results give the same bytes."""
     sections = [part for result in results for part in (_section(result), _spread(result))]
     first = summary.of(results[0])[0]
     figures = [
@@ -32,7 +33,8 @@ def html(description: str, results: Sequence[Result]) -> bytes:
         ("duration error", f"{100 * first.mean.duration:.1f} %"),
         ("sigma ratio (1 is right)", f"{summary.sigma_ratio(results[0]):.2f}"),
     ]
-    body = [*sections, _methods(results)]
+    learnt = [] if curve is None else [_learning(curve)]
+    body = [*sections, *learnt, _methods(results)]
     return page.html("evaluation", results[0].family, description, figures, body).encode()
 
 
@@ -41,10 +43,15 @@ def _section(result: Result) -> Section:
     return Section(
         result.protocol,
         TITLES[result.protocol],
-        (summary.LEGEND, _verdict(found)),
-        (Table(summary.HEAD, tuple(one.cells() for one in found)),),
+        (summary.LEGEND, _verdict(found), *summary.trust_said(result)),
+        (Table(summary.HEAD, tuple(one.cells() for one in found)), *_held(result)),
         (_bars(result, found), _clips(result, found), _calibration(result)),
     )
+
+
+def _held(result: Result) -> list[Table]:
+    rows = reach.rows(result)
+    return [Table(reach.HEAD, rows)] if rows else []
 
 
 def _verdict(found: Sequence[Summary]) -> str:
@@ -161,6 +168,33 @@ def _spread(result: Result) -> Section:
     )
     title = f"Distances in full: {result.protocol.replace('_', ' ')}"
     return Section(f"{result.protocol}-distances", title, words, (Table(heading, tuple(rows)),))
+
+
+def _learning(curve: Learning) -> Section:
+    drawn = picture.draw(
+        "learning",
+        3.2,
+        partial(_paint_learning, curve),
+        "Distance to the truth against the number of samples, suggested and at random.",
+        "Each point is a model trained anew; both ways begin with the same samples.",
+    )
+    words = (
+        f"From {curve.sizes[0]} samples to {curve.sizes[-1]}, added as `posefield suggest` ranks "
+        f"them and as chance has it: suggested ones are at {curve.reached:.0f} where random ones "
+        f"are at {curve.sizes[-1]}, {curve.faster:.1f} times as fast.",
+    )
+    return Section("learning", "What suggested clips are worth", words, (), (drawn,))
+
+
+def _paint_learning(curve: Learning, figure: Figure) -> None:
+    axes = figure.subplots(1, 2)
+    for ax, title, row in zip(axes, ("global", "root-relative"), (0, 1), strict=True):
+        for (way, own), colour in zip(
+            curve.errors.items(), (picture.ORANGE, picture.BLUE), strict=True
+        ):
+            ax.plot(curve.sizes, 100 * own[row], "o-", color=colour, label=way)
+        ax.set(xlabel="samples", ylabel="cm", title=title, ylim=(0, None))
+    axes[0].legend()
 
 
 def _methods(results: Sequence[Result]) -> Section:

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from model_export.evaluate import errors
+from model_export.evaluate import columns, errors, flags, reach
 from model_export.evaluate.errors import Errors
-from model_export.evaluate.methods import DEFINITIONS, OURS
+from model_export.evaluate.flags import Flags
+from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
 from model_export.evaluate.protocol import Result
 from model_export.report import plain
 from service.motion.conventions import Floats
@@ -143,31 +144,79 @@ def sigma_ratio(result: Result) -> float:
     return float(np.mean(squared / np.square(result.sigma)))
 
 
+def joint_sigma_ratios(result: Result) -> dict[str, float]:
+    """The same for each joint alone, by name."""
+    squared = np.stack([error.joints for error in result.of(OURS, result.asked(OURS))])
+    ratios = np.mean(squared / np.square(result.joint_sigma), axis=0)
+    return dict(zip(result.joints, ratios.tolist(), strict=True))
+
+
+def flags_facts(found: Flags) -> dict[str, Any]:
+    """How the support flag does, as JSON holds it."""
+    facts = {
+        "false_alarms": plain.number(found.alarms),
+        "beyond": {name: plain.number(share) for name, share in found.beyond.items()},
+    }
+    if found.gap is None:
+        return facts
+    control, share = found.gap
+    return {**facts, "gap": {"control": control, "flagged": plain.number(share)}}
+
+
+def flags_said(found: Flags) -> str:
+    """The same in a sentence."""
+    beyond = ", ".join(f"{name} {100 * share:.0f}" for name, share in found.beyond.items())
+    said = (
+        f"support: {100 * found.alarms:.1f} % of held-out clips flagged; of those moved "
+        f"{100 * flags.BEYOND:.0f} % of its range beyond a control, %: {beyond}"
+    )
+    if found.gap is None:
+        return said
+    control, share = found.gap
+    return f"{said}; in the gap of {control}, %: {100 * share:.0f}"
+
+
+def _joints_said(result: Result) -> str:
+    """Sigma by joint in a sentence."""
+    ratios = joint_sigma_ratios(result)
+    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    return (
+        f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
+        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
+    )
+
+
 def facts(result: Result) -> dict[str, Any]:
     """Figures of a result as JSON holds them."""
+    held = {} if result.flags is None else {"support": flags_facts(result.flags)}
+    by_joint = joint_sigma_ratios(result)
+    methods = {summary.name: summary.facts() for summary in of(result)}
+    if EXACT in methods:
+        methods[EXACT]["exact"] = reach.facts(result)
     return {
         "family": result.family,
         "protocol": result.protocol,
         "clips": len(result.clips),
         "sigma_ratio": plain.number(sigma_ratio(result)),
-        "methods": {summary.name: summary.facts() for summary in of(result)},
+        "joint_sigma_ratio": {name: plain.number(ratio) for name, ratio in by_joint.items()},
+        **held,
+        "methods": methods,
     }
 
 
 def table(result: Result) -> str:
     """A result in Markdown, the columns even for who reads it as it is."""
-    rows = [HEAD, *(summary.cells() for summary in of(result))]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(HEAD))]
-    lines = [
-        "| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |"
-        for row in rows
-    ]
-    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
     title = (
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
-    return "\n".join([title, "", lines[0], rule, *lines[1:]])
+    rows = columns.even(HEAD, [summary.cells() for summary in of(result)])
+    return f"{title}\n\n{rows}"
+
+
+def trust_said(result: Result) -> list[str]:
+    """How sigma by joint and the support flag do, a sentence each."""
+    return [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
 
 
 LEGEND = (
@@ -175,7 +224,8 @@ LEGEND = (
     "left in; both after slope-limited time warping; plain: at equal shares of the duration. "
     "less ours: the method's relative error less ours, clip by clip. effector: the event's joint "
     "at its event. duration: root mean square of the logarithm. accel., skate: synthesised over "
-    "captured. sigma ratio: squared error over the squared error predicted."
+    "captured. sigma ratio: squared error over the squared error predicted. posefield_exact is "
+    "told where the captured clip has the event's joint; beyond: places farther from the root."
 )
 
 

@@ -84,8 +84,9 @@ class ModelCard:
     others predict for it, root mean square over joints and frames, m; empty in files older than
     this. event: None where the recipe names none, and in files older than this. beside: of a cycle
     a root of the covariance by which captured clips stray in the logarithm of their duration and in
-    their travel, for a sigma of one metre; empty for what is no cycle, and in older files. making:
-    nothing that a client needs; None in files older than this.
+    their travel, for a sigma of one metre; empty for what is no cycle, and in older files.
+    joint_sigma (J,): how far each joint errs, as a share of sigma; empty in files older than this.
+    making: nothing that a client needs; None in files older than this.
     """
 
     name: str
@@ -111,6 +112,7 @@ class ModelCard:
     left_out: tuple[float, ...] = ()
     event: Event | None = None
     beside: tuple[tuple[float, ...], ...] = ()
+    joint_sigma: tuple[float, ...] = ()
     making: Making | None = None
 
     def control(self, name: str) -> Control | None:
@@ -146,6 +148,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "left_out": list(card.left_out),
         "event": asdict(card.event) if card.event else None,
         "beside": [list(row) for row in card.beside],
+        "joint_sigma": list(card.joint_sigma),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -244,6 +247,7 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         left_out=tuple(plain.get("left_out", ())),
         event=_event(plain.get("event")),
         beside=tuple(map(tuple, plain.get("beside", ()))),
+        joint_sigma=tuple(plain.get("joint_sigma", ())),
         making=_making(plain.get("making")),
     )
 

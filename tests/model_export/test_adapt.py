@@ -265,9 +265,9 @@ def test_a_cycle_that_was_cut_elsewhere_is_begun_with_the_family(walkers):
     recipe, trained, shown = walkers
     known = canonical.known(recipe, trained)
     late = [phase.begin(example, 0.3) for example in shown]
-    cut = canonical.move(replace(known, in_phase=False), late)
-    begun = canonical.move(replace(known, in_phase=True), late)
-    right = canonical.move(replace(known, in_phase=False), shown)
+    assert canonical.begin(replace(known, in_phase=False), late) == tuple(late)
+    found = canonical.begin(replace(known, in_phase=True), late)
+    cut, begun, right = (canonical.move(known, clips) for clips in (late, found, shown))
     assert begun.distances.max() < 1.5 * right.distances.max()
     assert cut.distances.min() > 2.0 * begun.distances.max()
     assert [round(example.shift, 1) for example in begun.examples] == [-0.3] * 3

@@ -16,6 +16,7 @@ from model_export.evaluate import (
     motion,
     newcomers,
     protocol,
+    reach,
     render,
     summary,
     worth,
@@ -155,13 +156,53 @@ def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
 
 def test_all_methods_are_asked_the_same_clips(results):
     (clips, performers), _ = results
-    peers = {"posefield", "naive", *methods.PEERS}
+    peers = {"posefield", "posefield_exact", "naive", *methods.PEERS}
     assert set(clips.errors) == {*peers, newcomers.NOBODY}
     assert set(performers.errors) == {*peers, *newcomers.SHOWN}
     assert all(len(found) == CLIPS for r in (clips, performers) for found in r.errors.values())
     assert clips.protocol == "leave_one_clip_out"
     assert performers.protocol == "leave_one_performer_out"
     assert len(clips.sigma) == CLIPS
+
+
+def test_what_is_held_to_the_captured_event_meets_it(results):
+    for result in results[0]:
+        assert len(result.corrections) == CLIPS
+        far = {
+            name: max(error.effector for error in result.errors[name])
+            for name in (methods.OURS, methods.EXACT)
+        }
+        reached = [c.reached for c in result.corrections]
+        # Without a captured clip that is told to be out of reach, all are met.
+        assert all(reached) == (far[methods.EXACT] < 1e-4)
+        assert far[methods.OURS] > 0.005
+
+
+def test_places_a_metre_off_are_told_to_be_out_of_reach(results):
+    """Arms of the small skeleton are shorter than that."""
+    corrections = [c for result in results[0] for c in result.corrections]
+    assert not any(c.far.reached for c in corrections)
+    assert any(c.reached for c in corrections)
+    assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in corrections)
+
+
+def test_without_an_event_nothing_is_held(recipe, family):
+    plain = recipe.model_copy(update={"event": None})
+    found = protocol.run(plain, family, "performer", lambda done, parts: None)
+    assert found.corrections == ()
+    assert methods.EXACT not in found.errors
+    assert "exact" not in str(summary.facts(found)["methods"].keys())
+    assert len(reach.rows(found)) == 0
+
+
+def test_what_was_held_stands_in_table_and_json(results):
+    (clips, _), _ = results
+    told = summary.facts(clips)["methods"]["posefield_exact"]["exact"]
+    steps = [c.steps for c in clips.corrections]
+    assert told["steps_worst"] == max(steps)
+    assert told["steps"] == pytest.approx(np.mean(steps), abs=1e-3)
+    assert f"| {np.mean(steps):.1f} " in reach.table(clips)
+    assert told["far_out_of_reach"] == 1.0
 
 
 def test_an_unknown_performer_is_trusted_less(results):
@@ -277,6 +318,27 @@ def test_facts_are_what_was_measured(results):
         abs=1e-4,
     )
     json.dumps(facts, allow_nan=False)
+
+
+def test_sigma_of_each_joint_is_compared_with_that_joint(results):
+    result = results[0][0]
+    found = summary.facts(result)["joint_sigma_ratio"]
+    assert tuple(found) == result.joints
+    joint = len(result.joints) - 1
+    errors = [error.joints[joint] for error in result.errors["posefield"]]
+    expected = np.mean(errors / result.joint_sigma[:, joint] ** 2)
+    assert found[result.joints[joint]] == pytest.approx(expected, rel=1e-5)
+    # Together they are what the answer as a whole is off by.
+    squares = [np.mean(error.joints) for error in result.errors["posefield"]]
+    assert squares == pytest.approx([error.squared for error in result.errors["posefield"]])
+
+
+def test_the_flag_is_held_to_its_promise_on_the_same_folds(results):
+    result = results[0][0]
+    found = summary.facts(result)["support"]
+    assert result.flags is not None and found["false_alarms"] == result.flags.alarms
+    said = summary.trust_said(result)
+    assert len(said) == 2 and said[1].startswith("support: ")
 
 
 def test_the_table_has_a_row_for_every_method(results):

@@ -82,6 +82,10 @@ class Bench:
         found = meet.meet(begun.scene, self.spread, sigma, numbers, aims, pins)
         return Held(begun.scene, found.numbers, begun.state, found.met, found.steps, found.distance)
 
+    def distance(self, begun: Held, aims: Sequence[Aim]) -> float:
+        """How far off aims lie from a predicted motion, in standard deviations."""
+        return meet.distance(begun.scene, self.spread, begun.state.sigma, begun.numbers, aims)
+
     def pins(self, begun: Held) -> list[Place]:
         """Pins for the feet of a predicted motion."""
         return feet.pins(begun.scene, begun.numbers, self.card.feet)
