@@ -32,7 +32,7 @@ from service.motion.errors import (
     WorkerDied,
 )
 from service.motion.roles import Names
-from service.synthesis import library, pace, session
+from service.synthesis import library, pace, session, spelling
 from service.synthesis.question import ClipQuestion, Policy, Root
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
@@ -56,6 +56,24 @@ LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the fine
 JointNames = Annotated[Names, typer.Option(help="what joints are called")]
 RootMotion = Annotated[Root, typer.Option(help="whether the root travels")]
 Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last frame is its first")]
+ExactControls = Annotated[
+    str | None,
+    typer.Option(
+        "--exact",
+        help="measured controls to be met exactly: auto (those given), none, or names",
+        metavar="auto|none|NAME,NAME",
+    ),
+]
+Targets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--target",
+        help="where a joint is to be, m; MOMENT is seconds, start, end, event, highest, lowest "
+        "or farthest; may be repeated",
+        metavar="JOINT@MOMENT=X,Y,Z",
+    ),
+]
+PinFeet = Annotated[bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -131,11 +149,15 @@ def pose(
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
     level: LevelOfDetail = 0,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
-    answer = synthesizer.pose(asked, times, extrapolate, performer, level)
+    held = spelling.hold(exact, target or (), pin_feet)
+    answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
     _warn(answer.trust.warnings)
     typer.echo(poses.json(answer).decode())
 
@@ -154,6 +176,9 @@ def clip(
     names: JointNames = "own",
     root: RootMotion = "travelling",
     loop: Loop = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -163,8 +188,9 @@ def clip(
     convention = found.convention(unit, up)
     synthesizer = open_model(model)
     controls = numbers(control or [])
+    held = spelling.hold(exact, target or (), pin_feet)
     asked = ClipQuestion(
-        controls, fps, extrapolate, start, end, performer, level, names, root, loop
+        controls, fps, extrapolate, start, end, performer, level, names, root, loop, held
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)
