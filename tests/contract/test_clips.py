@@ -79,7 +79,7 @@ def test_the_manifest_says_what_each_file_is(kind, ask, questions, spec):
     assert [line["name"] for line in lines] == NAMES
     for line, content in zip(lines, found.values(), strict=True):
         jsonschema.validate(line, schema, jsonschema.Draft202012Validator)
-        assert line.keys() == schema["properties"].keys()
+        assert line.keys() == set(schema["required"])
         assert line["sha256"] == hashlib.sha256(content).hexdigest()
         assert line["bytes"] == len(content)
         clip = json.loads(content)
