@@ -250,7 +250,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
-    supported: bool
+    supported: bool | None = None
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
@@ -294,7 +294,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
-    support: Backing
+    support: Backing | None = None
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
 
@@ -334,7 +334,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
-    supported: bool
+    supported: bool | None = None
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]

@@ -1461,7 +1461,7 @@ export interface components {
             performer: string | null;
             /** @description As in Trust. */
             warnings: string[];
-            support: components["schemas"]["Backing"];
+            support?: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1632,7 +1632,7 @@ export interface components {
             duration: number;
             /** @description As in Trust, m. */
             sigma: number;
-            supported: components["schemas"]["Supported"];
+            supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
@@ -1649,13 +1649,13 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            supported: components["schemas"]["Supported"];
+            supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
             /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it. */
             warnings: string[];
         };
-        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
+        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. Always there since 2.2.0. */
         Supported: boolean;
         /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
         SigmaByJoint: number[];
@@ -1971,7 +1971,7 @@ export interface components {
             /** @description As in Trust, m. */
             sigma: number[];
             /** @description As in Trust. */
-            supported: boolean[];
+            supported?: boolean[];
             /** @description The level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers; absent without a camera. */
@@ -3160,7 +3160,7 @@ export interface components {
         Sigma: number;
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
-        /** @description As `supported` in Trust. */
+        /** @description As `supported` in Trust; always there since 2.2.0. */
         Supported: "true" | "false";
         /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
@@ -6244,7 +6244,6 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
-    "supported",
     "warnings"
   ],
   "ModelCard": [
@@ -6292,7 +6291,6 @@ export const REQUIRED = {
     "controls",
     "performer",
     "warnings",
-    "support",
     "nearest",
     "others"
   ],
@@ -6321,7 +6319,6 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
-    "supported",
     "warnings"
   ]
 } as const;
