@@ -1,8 +1,7 @@
 """Universal kriging of many values at once, in its dual form.
 
 The dual weights of the system (service/motion/field.py) answer a query by one product, its inverse
-gives variance and leave-one-out residuals (Dubrule, "Cross validation of kriging in a unique
-neighborhood", Math. Geology 1983). The nugget is filtered: it stands on the diagonal only and not
+gives the variance. The nugget is filtered: it stands on the diagonal only and not
 in the query, so that the answer is continuous in the controls.
 """
 
@@ -11,13 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.motion import field
-from service.motion.conventions import Floats, Indices
+from service.motion.conventions import Floats
 from service.motion.errors import TrainingError
 
 # The service asks for these too; training knows them as a part of kriging.
 from service.motion.field import Hyper as Hyper
 from service.motion.field import covariances as covariances
 from service.motion.field import drift as drift
+from service.motion.field import leave_out as leave_out
+from service.motion.field import left_out_variances as left_out_variances
 from service.motion.field import noisy as noisy
 
 
@@ -49,6 +50,11 @@ class Kriging:
         basis = self._basis(points)
         return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
+    @property
+    def values(self) -> Floats:
+        """What it was laid through (n, m)."""
+        return values(self.hyper, self.samples, self.dual)
+
     def _basis(self, points: Floats) -> Floats:
         return field.basis(self.hyper, points, self.samples)
 
@@ -65,45 +71,12 @@ def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
     return Kriging(hyper, samples, weighing @ values, weighing, form)
 
 
-def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
-    """Matrix (n, n) from values to residuals of each sample predicted from all other groups.
-
-    groups (n,): samples that say too much of each other, such as strides of one take, are left
-    out together. Closed form from the inverse of the whole system (Dubrule 1983, for blocks).
-    """
-    inverse = np.asarray(np.linalg.inv(noisy(hyper, samples)), dtype=np.float64)
-    residuals = {
-        degree: _left_out(_without(inverse, drift(samples, len(hyper.scales), degree)), groups)
-        for degree in sorted(set(hyper.drifts))
-    }
-    return np.mean(np.stack([residuals[degree] for degree in hyper.drifts]), axis=0)
-
-
-def _without(inverse: Floats, functions: Floats) -> Floats:
-    """Block (n, n) of the whole system's inverse, from that of the covariances (n, n).
-
-    functions (n, k): of the drift. One inverse serves the drifts of all degrees.
-    """
-    weighed = inverse @ functions
-    return inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
-
-
-def _left_out(block: Floats, groups: Indices) -> Floats:
-    residual = block / np.diagonal(block)[:, None]
-    _, names, sizes = np.unique(groups, return_inverse=True, return_counts=True)
-    order = np.argsort(names, kind="stable")
-    for size in np.unique(sizes[sizes > 1]):
-        # Groups of one size, a row each.
-        own = order[sizes[names[order]] == size].reshape(-1, size)
-        among = block[own[:, :, None], own[:, None, :]]
-        residual[own] = np.linalg.solve(among, block[own])
-    return residual
-
-
-def left_out_variances(hyper: Hyper, samples: Floats, left_out: Floats) -> Floats:
-    """Variances (n,) of residuals by a matrix (n, n) of `leave_out`, the nugget counted in, as
-    shares of the sill."""
-    return np.sum((left_out @ noisy(hyper, samples)) * left_out, axis=1)
+def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
+    """Values (n, m) at samples (n, d + p) of which dual weights (n + k, m) were made: the system
+    times them."""
+    n, degree = len(samples), max(hyper.drifts)
+    functions = drift(samples, len(hyper.scales), degree)
+    return noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
 
 
 def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:

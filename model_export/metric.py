@@ -49,18 +49,8 @@ def gram(
 
 def _axes(orientations: Floats, vectors: Floats) -> Floats:
     """World axis (P, J, 3 numbers, 3) about which each number of a rotation vector turns."""
-    turned = quat.to_matrix(orientations) @ _right_jacobian(vectors)
+    turned = quat.to_matrix(orientations) @ quat.right_jacobian(vectors)
     return np.swapaxes(turned, -1, -2)
-
-
-def _right_jacobian(v: Floats) -> Floats:
-    """Matrix (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order."""
-    angle = np.linalg.norm(v, axis=-1)[..., None, None]
-    safe = np.maximum(angle, 1e-4)
-    cross = quat.cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
-    first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
-    second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
-    return np.eye(3) - first * cross + second * cross @ cross
 
 
 def _motions(positions: Floats, axes: Floats) -> Floats:

@@ -77,10 +77,14 @@ class Model:
         ladder = Ladder({**field_graph.entries(self.bank, ranks), **self.decoder.entries()})
         ends = ladder.onnx(net)
         fields = field_graph.onnx(self.bank, net, "controls", ends)
+        # What exact controls start from: service/synthesis/exact.
+        fields[POSE] = net.called("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
+        place = net.called("frame", place)
         rotations, root = self.decoder.onnx(net, fields[POSE], place, ends)
         if self.travel:
-            rotations, root, gone = self.travel.onnx(net, rotations, root, fields["travel"], place)
+            way = net.called("way", fields["travel"])
+            rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
         else:
             gone = net("Mul", place, net.weights("no_travel", np.zeros(3)))
         net.named("rotations", rotations)

@@ -35,6 +35,12 @@ class Net:
         self._nodes.append(helper.make_node(operator, inputs, names, **attributes))
         return names
 
+    def called(self, name: str, value: str) -> str:
+        """A value that nobody has used yet under a name of its own, by which it is found later."""
+        for node in self._nodes:
+            node.output[:] = [name if own == value else own for own in node.output]
+        return name
+
     def named(self, name: str, value: str) -> None:
         """Give a value the name under which the graph puts it out."""
         self._nodes.append(helper.make_node("Identity", [value], [name]))

@@ -22,8 +22,8 @@ from service.encode import ENCODERS, Encoder, poses, reasons, suggestions
 from service.encode.convention import Unit, Up
 from service.export import queries
 from service.motion import card as cards
-from service.motion import files
-from service.motion.answer import ClipAnswer
+from service.motion import files, measure
+from service.motion.answer import ClipAnswer, Reasons, Trust
 from service.motion.errors import (
     FileError,
     InvalidField,
@@ -34,7 +34,7 @@ from service.motion.errors import (
     WorkerDied,
 )
 from service.motion.roles import Names
-from service.synthesis import library, pace, session
+from service.synthesis import library, pace, session, spelling
 from service.synthesis.question import ClipQuestion, Policy, Root
 from service.synthesis.suggest import COUNT, SuggestQuestion
 from service.synthesis.suggest import suggest as find_suggestions
@@ -48,7 +48,12 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 ModelPath = Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")]
 Controls = Annotated[
     list[str] | None,
-    typer.Option("--control", "-c", help="NAME=VALUE, once for each control", metavar="NAME=VALUE"),
+    typer.Option(
+        "--control",
+        "-c",
+        help="NAME=VALUE, once for each control; a model chooses what is left out",
+        metavar="NAME=VALUE",
+    ),
 ]
 Extrapolate = Annotated[
     Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
@@ -63,6 +68,24 @@ Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last f
 JointSigma = Annotated[
     bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
 ]
+ExactControls = Annotated[
+    str | None,
+    typer.Option(
+        "--exact",
+        help="measured controls to be met exactly: auto (those given), none, or names",
+        metavar="auto|none|NAME,NAME",
+    ),
+]
+Targets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--target",
+        help="where a joint is to be, m; MOMENT is seconds, start, end, event, highest, lowest "
+        "or farthest; may be repeated",
+        metavar="JOINT@MOMENT=X,Y,Z",
+    ),
+]
+PinFeet = Annotated[bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -139,12 +162,16 @@ def pose(
     performer: Performer = None,
     level: LevelOfDetail = 0,
     joint_sigma: JointSigma = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
-    answer = synthesizer.pose(asked, times, extrapolate, performer, level)
-    _warn(answer.trust.warnings)
+    held = spelling.hold(exact, target or (), pin_feet)
+    answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
+    _tell(answer.trust)
     trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
     typer.echo(poses.json(replace(answer, trust=trust)).decode())
 
@@ -164,6 +191,9 @@ def clip(
     root: RootMotion = "travelling",
     loop: Loop = False,
     joint_sigma: JointSigma = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -173,12 +203,15 @@ def clip(
     convention = found.convention(unit, up)
     synthesizer = open_model(model)
     controls = numbers(control or [])
+    held = spelling.hold(exact, target or (), pin_feet)
     asked = ClipQuestion(
-        controls, fps, extrapolate, start, end, performer, level, names, root, loop, joint_sigma
+        *(controls, fps, extrapolate, start, end, performer, level, names, root, loop),
+        joint_sigma=joint_sigma,
+        hold=held,
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)
-    _warn(answer.trust.warnings)
+    _tell(answer.trust)
     typer.echo(wrote(output, answer, json))
 
 
@@ -263,7 +296,7 @@ def why(
     synthesizer = open_model(model)
     asked = WhyQuestion(numbers(control or []), extrapolate, performer, nearest)
     found = find_reasons(synthesizer, asked)
-    _warn(found.warnings)
+    _tell(found)
     typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
 
 
@@ -393,8 +426,12 @@ def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
     )
 
 
-def _warn(warnings: Sequence[str]) -> None:
-    for warning in warnings:
+def _tell(found: Trust | Reasons) -> None:
+    """Say on standard error what was chosen for whoever asked, and what to beware of."""
+    if found.inferred:
+        chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)
+        typer.echo(f"inferred: {chosen}, most typical for what was given", err=True)
+    for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
 
 
@@ -409,6 +446,14 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
         f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
         f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
     )
+
+
+def _control(plain: dict[str, Any], joints: list[str]) -> str:
+    """A control in a line: what of it was sampled, and how it is measured where it is."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
+    own = plain.get("measure")
+    how = f" (measured: {measure.words(measure.parse(own), joints)})" if own else ""
+    return f"  {plain['name']}: {span}, {plain['description']}{how}"
 
 
 def _summary(plain: dict[str, Any]) -> str:
@@ -426,10 +471,7 @@ def _summary(plain: dict[str, Any]) -> str:
         f"levels of detail, times in batches of {pace.BATCH}:",
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
-        *(
-            f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"
-            for c in plain["controls"]
-        ),
+        *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
         *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),

@@ -33,6 +33,7 @@ QUESTIONS = (
     "SigmaQuestion",
     "WhyQuestion",
     "Camera",
+    "Target",
 )
 ANSWERS = (
     "ModelList",

@@ -67,7 +67,7 @@ def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
         _distances(_apart(own, true)),
         _distances(np.linalg.norm(_rooted(warped) - _rooted(true), axis=-1)[:, :, 1:].max(axis=2)),
         _effector(made.event, captured.event),
-        _acceleration(own) / _acceleration(true),
+        acceleration(own) / acceleration(true),
         skate(made, feet),
         skate(captured, feet),
         float(np.log(made.duration / captured.duration)),
@@ -104,7 +104,8 @@ def _distances(apart: Floats) -> Distances:
     return Distances(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
 
 
-def _acceleration(points: Floats) -> float:
+def acceleration(points: Floats) -> float:
+    """Mean size of a motion's second differences (FRAMES, J, 4, 3), its root taken out, m."""
     joints = _rooted(points)[:, 1:, 0]
     return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
 

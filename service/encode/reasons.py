@@ -18,6 +18,7 @@ def plain(found: Reasons) -> dict[str, Any]:
         "support": _backing(found.backing),
         "nearest": [_clip(clip) for clip in found.nearest],
         "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
+        **({"inferred": list(found.inferred)} if found.inferred else {}),
     }
 
 

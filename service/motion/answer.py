@@ -36,12 +36,13 @@ class Trust:
     duration: natural length of the whole clip at these controls, s. sigma: how far a captured
     clip at these controls would lie from this one, as a root-mean-square over joints and frames,
     m. warnings: one sentence for each control outside what was sampled, or one where the controls
-    lie in a gap of it. performer: who was asked for; none for somebody who was never seen. level:
-    of detail. supported: whether anything like these controls was captured. performer_seen: whether
-    somebody captured was asked for; none where the model tells nobody apart. inferred: names of the
-    controls that were not given, and chosen as the most typical for those that were. measured: the
-    controls that the recipe says how to measure, as the answer has them. targets: what the answer
-    was held to. joint_sigma (J,), m: sigma of each joint, where it was asked for.
+    lie in a gap of it, and one for each target that is not reached. performer: who was asked for;
+    none for somebody who was never seen. level: of detail. supported: whether anything like these
+    controls was captured. performer_seen: whether somebody captured was asked for; none where the
+    model tells nobody apart. inferred: names of the controls that were not given, and chosen as the
+    most typical for those that were. measured: the controls that the recipe says how to measure, as
+    the answer has them. targets: what the answer was held to. joint_sigma (J,), m: sigma of each
+    joint, where it was asked for.
     """
 
     model: str
@@ -165,7 +166,8 @@ class Reasons:
     """Why an answer is as it is: the captured clips nearest to it, the nearest first, and how many
     others there are, with what all of them count for. All weights add up to one.
 
-    model: name@contenthash. warnings: as in Trust.
+    model: name@contenthash. warnings: as in Trust. inferred: names of the controls that were not
+    given, as of an answer.
     """
 
     model: str
@@ -176,6 +178,7 @@ class Reasons:
     nearest: tuple[Captured, ...]
     others: int
     others_weight: float
+    inferred: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

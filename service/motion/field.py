@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 from service.motion.covariance import FORMULAS
 
 
@@ -110,3 +110,45 @@ def weighing(hyper: Hyper, samples: Floats) -> Floats:
         own = invert(hyper, samples, degree)[:, :n]
         found[: len(own)] += own / len(hyper.drifts)
     return found
+
+
+def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
+    """Matrix (n, n) from values to residuals of each sample predicted from all other groups.
+
+    groups (n,): samples that say too much of each other, such as strides of one take, are left
+    out together. Closed form from the inverse of the whole system (Dubrule, "Cross validation of
+    kriging in a unique neighborhood", Math. Geology 1983, for blocks).
+    """
+    inverse = np.asarray(np.linalg.inv(noisy(hyper, samples)), dtype=np.float64)
+    residuals = {
+        degree: _left_out(_without(inverse, drift(samples, len(hyper.scales), degree)), groups)
+        for degree in sorted(set(hyper.drifts))
+    }
+    return np.mean(np.stack([residuals[degree] for degree in hyper.drifts]), axis=0)
+
+
+def _without(inverse: Floats, functions: Floats) -> Floats:
+    """Block (n, n) of the whole system's inverse, from that of the covariances (n, n).
+
+    functions (n, k): of the drift. One inverse serves the drifts of all degrees.
+    """
+    weighed = inverse @ functions
+    return inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
+
+
+def _left_out(block: Floats, groups: Indices) -> Floats:
+    residual = block / np.diagonal(block)[:, None]
+    _, names, sizes = np.unique(groups, return_inverse=True, return_counts=True)
+    order = np.argsort(names, kind="stable")
+    for size in np.unique(sizes[sizes > 1]):
+        # Groups of one size, a row each.
+        own = order[sizes[names[order]] == size].reshape(-1, size)
+        among = block[own[:, :, None], own[:, None, :]]
+        residual[own] = np.linalg.solve(among, block[own])
+    return residual
+
+
+def left_out_variances(hyper: Hyper, samples: Floats, left_out: Floats) -> Floats:
+    """Variances (n,) of residuals by a matrix (n, n) of `leave_out`, the nugget counted in, as
+    shares of the sill."""
+    return np.sum((left_out @ noisy(hyper, samples)) * left_out, axis=1)

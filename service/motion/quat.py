@@ -147,3 +147,13 @@ def to_euler(q: Floats, axes: str) -> Floats:
     first = np.where(locked, np.arctan2(sign * m[..., k, j], m[..., j, j]), first)
     last = np.where(locked, 0.0, np.arctan2(-sign * m[..., i, j], m[..., i, i]))
     return np.stack([first, middle, last], axis=-1)
+
+
+def right_jacobian(v: Floats) -> Floats:
+    """Matrix (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order."""
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    safe = np.maximum(angle, 1e-4)
+    across = cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    return np.eye(3) - first * across + second * across @ across

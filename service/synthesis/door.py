@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,13 +12,15 @@ from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits
 from service.synthesis.question import Policy
+from service.synthesis.typical import Chooser
 
 
 @dataclass(frozen=True)
 class Question:
-    """What has passed the door: controls, in the card's order, and performer as they were given,
-    and as the graph takes them, point (1, d) and labels (1, p); what is warned of; and whether
-    anything like these controls was captured."""
+    """What has passed the door: all controls, in the card's order, and performer as they were
+    given, and as the graph takes them, point (1, d) and labels (1, p); what is warned of; whether
+    anything like these controls was captured. inferred: names of the controls that were not given,
+    and are the most typical for those that were."""
 
     controls: dict[str, float]
     performer: str | None
@@ -26,6 +29,7 @@ class Question:
     labels: Floats
     warnings: tuple[str, ...]
     supported: bool
+    inferred: tuple[str, ...] = ()
 
 
 class Door:
@@ -41,7 +45,8 @@ class Door:
     def question(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> Question:
-        """The question, if it has an answer.
+        """The question, if it has an answer. Controls that are not given are the most typical for
+        those that are, and for the performer.
 
         Raises InvalidField for a control, performer or level that cannot be used, OutsideSamples
         where `extrapolate` is "refuse" and nothing like the controls was captured.
@@ -52,13 +57,17 @@ class Door:
         coarsest = len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-        found = () if self._plain(controls) else self._checked(controls)
+        plain = self._plain(controls)
+        every = controls if plain else self._every(controls, own)
         # However they are put: the same question has the same bytes.
-        given = {name: float(controls[name]) for name, _, _ in self._ranges}
+        given = {name: float(every[name]) for name, _, _ in self._ranges}
         point = list(given.values())
+        found = () if plain else outside(self._card.controls, point)
         supported = self.support.held(point)
         warnings = () if supported and not found else self._said(extrapolate, found, point)
-        return Question(given, performer, level, np.array([point]), own, warnings, supported)
+        inferred = tuple(name for name in given if name not in controls)
+        array = np.array([point])
+        return Question(given, performer, level, array, own, warnings, supported, inferred)
 
     def _plain(self, controls: Mapping[str, float]) -> bool:
         """Whether there is nothing to say of the controls, as of nearly all that are asked for."""
@@ -67,10 +76,19 @@ class Door:
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
-    def _checked(self, controls: Mapping[str, float]) -> tuple[str, ...]:
-        """A sentence for each control outside what was sampled."""
-        values = [required(control, controls) for control in self._card.controls]
-        return outside(self._card.controls, values)
+    def _every(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
+        """All controls, as they were given or as is typical."""
+        given = {
+            control.name: checked(control, controls[control.name])
+            for control in self._card.controls
+            if control.name in controls
+        }
+        return given if len(given) == len(self._names) else self.chooser.fill(given, own)
+
+    @cached_property
+    def chooser(self) -> Chooser:
+        """What chooses controls that are not given."""
+        return Chooser(self._card)
 
     def _said(
         self, extrapolate: Policy, found: tuple[str, ...], point: Sequence[float]
@@ -94,16 +112,10 @@ def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     return np.array([[float(name == asked) for name in performers]])
 
 
-def required(control: Control, controls: Mapping[str, float]) -> float:
-    """Value of a control; InvalidField where there is none, or none that could be answered."""
+def checked(control: Control, given: float) -> float:
+    """Value of a control; InvalidField for one that could not be answered."""
     field = f"controls/{control.name}"
-    if control.name not in controls:
-        raise InvalidField(
-            field,
-            f"missing; give a number in {control.unit}, "
-            f"sampled from {control.minimum:g} to {control.maximum:g}",
-        )
-    value = limits.number(field, controls[control.name])
+    value = limits.number(field, given)
     limits.within(field, value, *limits.reach(control), control.unit)
     return value
 

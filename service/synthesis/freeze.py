@@ -10,11 +10,18 @@ clip takes, asked of the whole graph, costs four times as much.
 """
 
 from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
 
 # Numbers of fields in onnx.proto.
 GRAPH, NODE, INITIALIZER, INPUT, OUTPUT = 7, 1, 5, 11, 12
 NODE_INPUT, NODE_OUTPUT = 1, 2
-TENSOR_TYPE, TENSOR_NAME, TENSOR_BYTES, VALUE_NAME = 2, 8, 9, 1
+TENSOR_AXES, TENSOR_TYPE, TENSOR_NAME, TENSOR_BYTES = 1, 2, 8, 9
+VALUE_NAME, VALUE_TYPE, TYPE_TENSOR, ELEMENT_TYPE = 1, 2, 1, 1
 MADE = {
     NODE: NODE_OUTPUT,
     INITIALIZER: TENSOR_NAME,
@@ -22,7 +29,8 @@ MADE = {
     OUTPUT: VALUE_NAME,
 }
 """Fields of a graph that make names known, and the field in each that holds them."""
-INT64 = 7
+FLOAT, INT64 = 1, 7
+KINDS: dict[int, np.dtype[Any]] = {FLOAT: np.dtype("<f4"), INT64: np.dtype("<i8")}
 VARINT, LENGTH, FIXED = 0, 2, {1: 8, 5: 4}
 
 Field = tuple[int, bytes, bytes]
@@ -37,12 +45,35 @@ def at_level(model: bytes, level: int) -> bytes:
     return _with_graph(model, lambda graph: _frozen(graph, level))
 
 
-def for_output(model: bytes, output: str) -> bytes:
-    """The same model with only that output, and the nodes, weights and inputs that it needs.
+def for_outputs(model: bytes, *outputs: str) -> bytes:
+    """The same model with only those outputs, and the nodes, weights and inputs that they need; an
+    output may be any float32 value of the graph.
 
     Raises ValueError or LookupError where the bytes are no protocol buffer.
     """
-    return _with_graph(model, lambda graph: _leading_to(graph, output.encode()))
+    names = {output.encode() for output in outputs}
+    return _with_graph(model, lambda graph: _leading_to(graph, names))
+
+
+def makes(model: bytes, value: str) -> bool:
+    """Whether some node of the graph makes a value of that name.
+
+    Raises ValueError or LookupError where the bytes are no protocol buffer.
+    """
+    graphs = [content for number, _, content in _fields(model) if number == GRAPH]
+    fields = [field for graph in graphs for field in _fields(graph)]
+    nodes = (own for number, _, own in fields if number == NODE)
+    return any(value.encode() in _named(node, NODE_OUTPUT) for node in nodes)
+
+
+def weights(model: bytes) -> dict[str, Array]:
+    """Constants of the graph by name.
+
+    Raises ValueError or LookupError where the bytes are no protocol buffer.
+    """
+    graphs = [content for number, _, content in _fields(model) if number == GRAPH]
+    fields = [field for graph in graphs for field in _fields(graph)]
+    return dict(_tensor(own) for number, _, own in fields if number == INITIALIZER)
 
 
 def _with_graph(model: bytes, change: Callable[[bytes], bytes]) -> bytes:
@@ -52,18 +83,47 @@ def _with_graph(model: bytes, change: Callable[[bytes], bytes]) -> bytes:
     )
 
 
-def _leading_to(content: bytes, output: bytes) -> bytes:
+def _tensor(content: bytes) -> tuple[str, Array]:
+    """Name and numbers of a constant."""
     fields = list(_fields(content))
-    needed = {output}
+    held = {number: own for number, _, own in fields}
+    kinds = [_varint(whole, 1)[0] for number, whole, _ in fields if number == TENSOR_TYPE]
+    # Axes come one by one, or in one piece.
+    axes: list[int] = []
+    for number, whole, own in fields:
+        if number == TENSOR_AXES:
+            axes += _numbers(own) if own else [_varint(whole, 1)[0]]
+    numbers = np.frombuffer(held.get(TENSOR_BYTES, b""), KINDS[kinds[0]])
+    return held[TENSOR_NAME].decode(), numbers.reshape(axes)
+
+
+def _numbers(packed: bytes) -> Iterator[int]:
+    at = 0
+    while at < len(packed):
+        value, at = _varint(packed, at)
+        yield value
+
+
+def _leading_to(content: bytes, outputs: set[bytes]) -> bytes:
+    fields = list(_fields(content))
+    needed = set(outputs)
     # A node stands before those that need it.
     for number, _, own in reversed(fields):
         if number == NODE and needed & _named(own, NODE_OUTPUT):
             needed |= _named(own, NODE_INPUT)
-    return b"".join(
+    kept = b"".join(
         whole
         for number, whole, own in fields
         if number not in MADE or needed & _named(own, MADE[number])
     )
+    there = {name for number, _, own in fields if number == OUTPUT for name in _named(own, 1)}
+    return kept + b"".join(_field(OUTPUT, _floats(name)) for name in sorted(outputs - there))
+
+
+def _floats(name: bytes) -> bytes:
+    """Description of an output of float32 numbers, whatever its shape."""
+    kind = _field(TYPE_TENSOR, bytes([ELEMENT_TYPE << 3 | VARINT, FLOAT]))
+    return _field(VALUE_NAME, name) + _field(VALUE_TYPE, kind)
 
 
 def _named(content: bytes, key: int) -> set[bytes]:

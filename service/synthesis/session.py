@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as field_of
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,8 +30,21 @@ OUTPUTS = {
     "travel": 3,
 }
 
-# A model of 114 kB with four levels, all asked, takes 3.1 MB: eight sessions, each with weights.
-OWN_MEMORY, COPIES = 2 << 20, 8
+# A model of 114 kB with four levels, all asked, takes 3.1 MB: twelve sessions, each with weights.
+OWN_MEMORY, COPIES = 2 << 20, 12
+
+
+@dataclass(frozen=True)
+class State:
+    """What poses are made of, of one question: sample coefficients (r3,), canonical frames (S,) of
+    its times, the travel (3,) of a cycle, bone offsets (J, 3), m, duration, s, and sigma, m."""
+
+    coefficients: Floats
+    frames: Floats
+    way: Floats
+    bones: Floats
+    duration: float
+    sigma: float
 
 
 class Runtimes(Sequence[Any]):
@@ -59,8 +73,9 @@ class Session:
     """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
 
     runtimes: onnxruntime's sessions, one for each level of detail; clocks: the same of the graphs
-    that tell the duration alone, and gauges of the one that tells the finest level's sigma. size:
-    bytes of the file. golden: what it answers in the middle.
+    that tell the duration alone, gauges of the one that tells the finest level's sigma, and states
+    of those that tell what poses are made of. size: of the file, bytes. content: the file. golden:
+    what it answers in the middle.
     """
 
     card: ModelCard
@@ -69,6 +84,8 @@ class Session:
     clocks: Sequence[Any]
     gauges: Sequence[Any]
     size: int
+    states: Sequence[Any] = ()
+    content: bytes = field_of(default=b"", repr=False)
     golden: bytes = b""
 
     def run(
@@ -96,6 +113,31 @@ class Session:
         answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
         return answers[0]
 
+    def state(
+        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+    ) -> State:
+        """What the poses of one question, controls (1, d) and times (S,), are made of."""
+        feed = self._feed(controls, labels)
+        feed["time"] = time[None].astype(np.float32, copy=False)
+        found = self.states[level].run(list(self._parts), feed)
+        coefficients, frames, bones, durations, sigmas, *ways = (a.astype(float) for a in found)
+        way = ways[0][0] if ways else np.zeros(3)
+        numbers = float(durations[0]), float(sigmas[0])
+        return State(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
+
+    @property
+    def correctable(self) -> bool:
+        """Whether the file tells what poses are made of, and what the captured clips count for; in
+        files older than this it does not."""
+        card = self.card
+        told = card.kriging is not None and len(card.left_out) == len(card.examples)
+        beside = bool(card.beside) or not card.cyclic
+        return told and beside and freeze.makes(self.content, "coefficients")
+
+    @property
+    def _parts(self) -> tuple[str, ...]:
+        return parts(self.card)
+
     def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
         """Sigmas (B,), m, as `run` gives them at level 0, in half of its time."""
         answers: list[Singles] = self.gauges[0].run(["sigma"], self._feed(controls, labels))
@@ -108,9 +150,14 @@ class Session:
         assert own.kriging is not None
         low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
         points = field.half_ranges(np.array(own.examples), low, high)
-        who = np.array(own.moved_by or [0] * len(points))
-        labels = np.eye(max(len(own.performers), 1), len(own.performers))[who]
-        return Weigher(own.kriging, np.hstack([points, labels]))
+        return Weigher(own.kriging, np.hstack([points, self.who]))
+
+    @cached_property
+    def who(self) -> Floats:
+        """Labels (n, p) of who moved in each captured clip."""
+        own = self.card
+        moved = np.array(own.moved_by or [0] * len(own.examples))
+        return np.eye(max(len(own.performers), 1), len(own.performers))[moved]
 
     @property
     def memory(self) -> int:
@@ -133,6 +180,12 @@ class Session:
         return feed
 
 
+def parts(card: ModelCard) -> tuple[str, ...]:
+    """Values of the graph that a State holds."""
+    own = ("coefficients", "frame", "bone_offsets", "duration", "sigma")
+    return (*own, "way") if card.cyclic else own
+
+
 def load(path: Path) -> Session:
     """Session on one thread; ModelError says why a file cannot be served."""
     return open_bytes(read(path), str(path))
@@ -146,9 +199,14 @@ def read(path: Path) -> bytes:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
 
 
+def sha256(content: bytes) -> str:
+    """SHA-256 of a model file, in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
 def digest(content: bytes) -> str:
     """What a model file is told by."""
-    return hashlib.sha256(content).hexdigest()[:16]
+    return sha256(content)[:16]
 
 
 def open_bytes(content: bytes, source: str) -> Session:
@@ -173,13 +231,15 @@ def _levelled(card: ModelCard, content: bytes, source: str) -> Session:
         except (ValueError, LookupError) as fault:
             raise ModelError(source, f"no protocol buffer: {fault}") from fault
 
-    def telling(output: str) -> Callable[[int], Any]:
-        return lambda number: _start(freeze.for_output(level(number), output), source)
+    def telling(*outputs: str) -> Callable[[int], Any]:
+        return lambda number: _start(freeze.for_outputs(level(number), *outputs), source)
 
     count = len(card.levels)
     runtimes = Runtimes(lambda number: _start(level(number), source), count)
     clocks, gauges = Runtimes(telling("duration"), count), Runtimes(telling("sigma"), 1)
-    session = Session(card, digest(content), runtimes, clocks, gauges, len(content))
+    states = Runtimes(telling(*parts(card)), count)
+    own = (runtimes, clocks, gauges, len(content), states, content)
+    session = Session(card, digest(content), *own)
     # Asks the finest level and its clock, and so opens them.
     return replace(session, golden=session.trial())
 

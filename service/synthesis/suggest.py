@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.motion.answer import Suggestion, Suggestions
-from service.motion.card import ModelCard
+from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
 from service.motion.field import Hyper
@@ -73,10 +73,17 @@ def _given(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Flo
     for index, controls in enumerate(candidates):
         try:
             limits.check_names(card, controls)
-            rows.append([door.required(control, controls) for control in card.controls])
+            rows.append([_value(control, controls) for control in card.controls])
         except InvalidField as fault:
             raise InvalidField(f"candidates/{index}/{fault.field}", fault.message) from fault
     return np.array(rows)
+
+
+def _value(control: Control, controls: Mapping[str, float]) -> float:
+    """Value of a control of a candidate, which has all of them."""
+    if control.name not in controls:
+        raise InvalidField(f"controls/{control.name}", f"missing; give a number in {control.unit}")
+    return door.checked(control, controls[control.name])
 
 
 def _drawn(own: Support) -> Floats:

@@ -17,10 +17,15 @@ from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
 from service.synthesis.door import Door, Question
-from service.synthesis.question import ClipQuestion, Policy, Prospect
+from service.synthesis.exact import missed, strides
+from service.synthesis.exact.goals import NOTHING, Goals
+from service.synthesis.exact.holding import Held
+from service.synthesis.exact.keeper import Keeper
+from service.synthesis.question import HOLD, ClipQuestion, Hold, Policy, Prospect
 from service.synthesis.session import Session
 from service.synthesis.view import Ladder
 from service.synthesis.walk import stride
+from service.synthesis.walk.stride import Strides
 
 ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
@@ -119,15 +124,30 @@ class Synthesizer:
         extrapolate: Policy,
         performer: str | None = None,
         level: int = 0,
-    ) -> PoseAnswer[np.float32]:
+        hold: Hold = HOLD,
+    ) -> PoseAnswer[Any]:
         """Poses at times (S,), s from the start of the clip, as a performer of the card moves, or
-        somebody who was never seen, at a level of detail.
+        somebody who was never seen, at a level of detail, of a motion that is held to something.
 
-        Raises InvalidField for a control, time, performer or level that cannot be used,
-        OutsideSamples where `extrapolate` is "refuse" and nothing like the controls was captured.
+        Raises InvalidField for a control, time, performer or level that cannot be used, or for what
+        the motion cannot be held to; where `extrapolate` is "refuse", OutsideSamples where nothing
+        like the controls was captured and OutOfReach for a goal that is missed.
         """
-        asked = self.moments(controls, times, extrapolate, performer, level)
+        asked = self.moments(controls, times, extrapolate, performer, level, hold)
+        goals = self.keeper.goals(asked.question, hold)
+        if goals:
+            return self.held_poses(asked, goals, extrapolate)
         return self.posed(asked, self.poses([asked])[0])
+
+    def held_poses(
+        self, asked: Moments, goals: Goals, extrapolate: Policy
+    ) -> PoseAnswer[np.float64]:
+        """Poses of a motion that is held to something; raises as `pose`."""
+        question = asked.question
+        held = self._meeting(question, goals, extrapolate)
+        self._check_times(asked, self._sensible(held.duration))
+        trust = self._held_trust(question, held, extrapolate)
+        return self.keeper.poses(question, held, asked.when, trust)
 
     def moments(
         self,
@@ -136,9 +156,10 @@ class Synthesizer:
         extrapolate: Policy,
         performer: str | None = None,
         level: int = 0,
+        hold: Hold = HOLD,
     ) -> Moments:
         """The question of `pose` as far as it can be checked before the model is asked."""
-        question = self.door.question(controls, extrapolate, performer, level)
+        question = self.question(controls, extrapolate, performer, level, hold)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
         when = [limits.number(f"times/{i}", value) for i, value in enumerate(times)]
@@ -180,6 +201,11 @@ class Synthesizer:
         return self._exact[level]
 
     @cached_property
+    def keeper(self) -> Keeper:
+        """What answers that are held to something come from."""
+        return Keeper(self.session)
+
+    @cached_property
     def door(self) -> Door:
         """What questions about one character must pass."""
         return Door(self.session.card)
@@ -202,11 +228,14 @@ class Synthesizer:
         """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
         rotations, root, offsets, length, sigma = row
         duration = self._sensible(float(length))
+        self._check_times(asked, duration)
+        trust = self._trust(asked.question, duration, float(sigma))
+        return PoseAnswer(asked.when, rotations, root, offsets, trust)
+
+    def _check_times(self, asked: Moments, duration: float) -> None:
         if not (asked.first >= 0.0 and asked.last <= duration):
             for index, value in enumerate(asked.when):
                 limits.within(f"times/{index}", value, 0.0, duration, "s")
-        trust = self._trust(asked.question, duration, float(sigma))
-        return PoseAnswer(asked.when, rotations, root, offsets, trust)
 
     def clip(self, asked: ClipQuestion, most: int = course.MOST_POSES) -> ClipAnswer:
         """Clip of the question, of at most so many frames; frame i is the pose at start + i / fps.
@@ -216,10 +245,11 @@ class Synthesizer:
         """
         question = self._asked(asked)
         joints = self._joints(asked)
-        when = course.times(asked, self._duration(question), most)
-        answer = self._answer(question, when)
-        if asked.loop or asked.root == "in_place":
-            answer = self._routed(question, answer, asked)
+        goals = self.keeper.goals(question, asked.hold)
+        if goals:
+            answer = self._held(question, goals, asked, most)
+        else:
+            answer = self._plain(question, asked, most)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
         trust = self.by_joint(answer.trust) if asked.joint_sigma else answer.trust
         return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), trust)
@@ -236,10 +266,36 @@ class Synthesizer:
             raise InvalidField("joint_sigma", f"true, but {self.identity} {OLD}")
         return found
 
+    def _plain(self, question: Question, asked: ClipQuestion, most: int) -> PoseAnswer[np.float64]:
+        """Frames of a clip that is held to nothing."""
+        when = course.times(asked, self._duration(question), most)
+        answer = self._answer(question, when)
+        if self.keeper.measures:
+            predicted = self.keeper.held(question, NOTHING)
+            measured = self.keeper.measured(question, predicted)
+            answer = replace(answer, trust=replace(answer.trust, measured=measured))
+        if asked.loop or asked.root == "in_place":
+            card = self.session.card
+            measure = stride.strides if card.cyclic else stride.straight
+            way = measure(self.session, question.point, question.labels, question.level)
+            answer = self._routed(answer, way, asked)
+        return answer
+
+    def _held(
+        self, question: Question, goals: Goals, asked: ClipQuestion, most: int
+    ) -> PoseAnswer[np.float64]:
+        """Frames of a clip that is held to something."""
+        held = self._meeting(question, goals, asked.extrapolate)
+        when = course.times(asked, self._sensible(held.duration), most)
+        trust = self._held_trust(question, held, asked.extrapolate)
+        answer = self.keeper.poses(question, held, when, trust)
+        routed = asked.loop or asked.root == "in_place"
+        return self._routed(answer, strides.of(held), asked) if routed else answer
+
     def check(self, asked: ClipQuestion) -> None:
         """Raise what `clip` would, as far as it can be said before anything is synthesised: how
         long the clip takes is not known yet."""
-        self._asked(asked)
+        self.keeper.goals(self._asked(asked), asked.hold)
         self._joints(asked)
         course.window(asked, limits.durations(self.session.card)[1])
 
@@ -252,13 +308,49 @@ class Synthesizer:
         """
         question = self._asked(asked)
         self._joints(asked)
-        times = course.times(asked, self._duration(question))
+        duration, misses = self._outlook(question, asked)
+        times = course.times(asked, duration)
         # A loop ends with its first frame again.
-        return Prospect(len(times) + asked.loop, question.warnings)
+        return Prospect(len(times) + asked.loop, question.warnings, misses)
 
     def _asked(self, asked: ClipQuestion) -> Question:
-        who, level = asked.performer, asked.level
-        return self.door.question(asked.controls, asked.extrapolate, who, level)
+        who, level, policy = asked.performer, asked.level, asked.extrapolate
+        return self.question(asked.controls, policy, who, level, asked.hold)
+
+    def question(
+        self,
+        controls: Mapping[str, float],
+        extrapolate: Policy,
+        performer: str | None,
+        level: int,
+        hold: Hold,
+    ) -> Question:
+        """The question, its open controls as is most typical for those given and for its targets;
+        raises as the door does."""
+        asked = self.door.question(controls, extrapolate, performer, level)
+        found = self.keeper.controls(asked, hold, self.door.chooser)
+        if found is None:
+            return asked
+        every = self.door.question(found, extrapolate, performer, level)
+        return replace(every, inferred=asked.inferred)
+
+    def _outlook(self, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
+        """Seconds that a clip takes, which a speed that it is held to changes, and whether it
+        misses some target."""
+        goals = self.keeper.goals(question, asked.hold)
+        strict = asked.extrapolate == "refuse" or self.session.card.cyclic
+        if not (goals.targets or (goals and strict)):
+            return self._duration(question), False
+        held = self._meeting(question, goals, asked.extrapolate)
+        misses = not all(met.reached for met in held.met[len(goals.controls) :])
+        return self._sensible(held.duration), misses
+
+    def _meeting(self, question: Question, goals: Goals, extrapolate: Policy) -> Held:
+        """The motion that meets its goals; OutOfReach where it does not and that is refused."""
+        held = self.keeper.held(question, goals)
+        if extrapolate == "refuse":
+            missed.refuse(goals, held.met)
+        return held
 
     def _duration(self, question: Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
@@ -272,13 +364,10 @@ class Synthesizer:
         return duration
 
     def _routed(
-        self, question: Question, answer: PoseAnswer[np.float64], asked: ClipQuestion
+        self, answer: PoseAnswer[np.float64], way: Strides, asked: ClipQuestion
     ) -> PoseAnswer[np.float64]:
         """The answer in place, or closed, as asked for."""
-        card = self.session.card
-        measure = stride.strides if card.cyclic else stride.straight
-        way = measure(self.session, question.point, question.labels, question.level)
-        stays = asked.root == "in_place" and card.root == "travelling"
+        stays = asked.root == "in_place" and self.session.card.root == "travelling"
         answer = course.in_place(answer, way) if stays else answer
         return course.closed(answer, None if stays else way) if asked.loop else answer
 
@@ -301,7 +390,15 @@ class Synthesizer:
             question.level,
             question.supported,
             seen,
+            inferred=question.inferred,
         )
+
+    def _held_trust(self, question: Question, held: Held, extrapolate: Policy) -> Trust:
+        own = self._trust(question, held.duration, held.state.sigma)
+        measured = self.keeper.measured(question, held)
+        said = () if extrapolate == "ok" else missed.sentences(held.met)
+        warnings = (*own.warnings, *said)
+        return replace(own, warnings=warnings, measured=measured, targets=held.met)
 
     def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level

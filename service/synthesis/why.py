@@ -55,8 +55,9 @@ def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
     found = tuple(_captured(card, i, distances[i], weights[i]) for i in near.tolist())
     rest = float(weights[others].sum())
     controls, who, said = question.controls, question.performer, question.warnings
-    backing = _backing(model.door, question)
-    return Reasons(model.identity, controls, who, said, backing, found, len(others), rest)
+    inferred, backing = question.inferred, _backing(model.door, question)
+    rests = len(others), rest
+    return Reasons(model.identity, controls, who, said, backing, found, *rests, inferred)
 
 
 def _backing(door: Door, question: Question) -> Backing:

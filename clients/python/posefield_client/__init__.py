@@ -20,10 +20,12 @@ from posefield_client.generated import (
     Camera,
     Control,
     ManifestEntry,
+    Met,
     ModelCard,
     NamedClipQuestion,
     Reasons,
     Suggestions,
+    Target,
     Trust,
 )
 from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
@@ -50,6 +52,7 @@ __all__ = [
     "Disk",
     "ManifestEntry",
     "Memory",
+    "Met",
     "Model",
     "ModelCard",
     "NamedClipQuestion",
@@ -62,6 +65,7 @@ __all__ = [
     "Saving",
     "SigmaGrid",
     "Suggestions",
+    "Target",
     "Trust",
     "errors",
 ]

@@ -22,6 +22,21 @@ class Operation(NamedTuple):
     media_types: tuple[str, ...]
 
 
+class Target(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A joint that is to be in its place at a moment: at a time, or at the start, the end, the
+    event that the model's recipe names, or where the joint is highest, lowest or farthest from
+    the root. The motion that meets it is the nearest to the predicted one, as captured motions
+    stray from predictions. What lies farther off than they stray is approached as far as they
+    go, and `targets` in Trust says by how much it is missed. A joint has one target at one
+    moment.
+    """
+
+    joint: str
+    position: tuple[float, float, float]
+    time: float | UnsetType = UNSET
+    at: Literal["start", "end", "event", "highest", "lowest", "farthest"] | UnsetType = UNSET
+
+
 class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Schema PoseQuestion of the contract."""
 
@@ -31,6 +46,9 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
     joint_sigma: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,6 +65,9 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
 
@@ -66,6 +87,9 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -93,7 +117,7 @@ class Camera(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One pose of each of many characters. All lists have one length, the number of
     characters, in one order; what is no list holds for each of them. Where nothing is a list
-    there is one character.
+    there is one character. Crowds are the model's predictions: they are held to nothing.
     """
 
     controls: dict[str, float | tuple[float, ...]]
@@ -148,6 +172,15 @@ class ModelList(Struct, frozen=True, kw_only=True):
     models: tuple[ModelSummary, ...]
 
 
+class Measure(Struct, frozen=True, kw_only=True):
+    """How a control is read off a motion; a control that somebody typed has none. Since 2.2.0."""
+
+    quantity: str
+    joints: tuple[int, ...] = ()
+    at: str | None = None
+    share: float | None = None
+
+
 class Control(Struct, frozen=True, kw_only=True):
     """One control parameter, its unit and what of it was sampled."""
 
@@ -158,6 +191,7 @@ class Control(Struct, frozen=True, kw_only=True):
     maximum: float
     default: float
     values: tuple[float, ...]
+    measure: Measure | None = None
 
 
 class Skeleton(Struct, frozen=True, kw_only=True):
@@ -241,6 +275,15 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     event: ModelCardEvent | None = None
 
 
+class Met(Struct, frozen=True, kw_only=True):
+    """Something that a motion was held to."""
+
+    what: str
+    miss: float
+    unit: str
+    reached: bool
+
+
 class Trust(Struct, frozen=True, kw_only=True):
     """Where an answer comes from and what it is worth."""
 
@@ -254,6 +297,9 @@ class Trust(Struct, frozen=True, kw_only=True):
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
+    measured: dict[str, float] = {}
+    targets: tuple[Met, ...] = ()
 
 
 class Backing(Struct, frozen=True, kw_only=True):
@@ -294,6 +340,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
     support: Backing | None = None
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
@@ -338,6 +385,9 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
+    measured: dict[str, float] = {}
+    targets: tuple[Met, ...] = ()
 
 
 class Liveness(Struct, frozen=True, kw_only=True):

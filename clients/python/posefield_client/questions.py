@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 import numpy.typing as npt
 
-from posefield_client import asking, numbers
+from posefield_client import asking, holding, numbers
 from posefield_client.generated import (
     OPERATIONS,
     Liveness,
@@ -24,6 +24,7 @@ from posefield_client.generated import (
     Suggestions,
     WhyQuestion,
 )
+from posefield_client.holding import Exact, Targets
 from posefield_client.numbers import Pose, SigmaGrid
 from posefield_client.wire import Call, Reply, Request
 
@@ -63,15 +64,19 @@ def pose(
     level: int | None = None,
     joint_sigma: bool | None = None,
     extrapolate: Extrapolate | None = None,
+    exact: Exact | None = None,
+    targets: Targets | None = None,
+    pin_feet: bool | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Call[Pose]:
-    """Poses at one or more times, s."""
+    """Poses at one or more times, s, of a motion that is held to targets, if some are given."""
     question = PoseQuestion(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
         **asking.said(joint_sigma=joint_sigma),
+        **holding.said(exact, targets, pin_feet),
     )
     return Call(asking.either("PoseMsgpack", model, question), numbers.pose)
 

@@ -1356,6 +1356,63 @@ export interface components {
          */
         JointSigma: boolean;
         /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that the
+         *     model can measure on a motion: they have a `measure` on its card), `none`, or their names. The
+         *     motion is the nearest to the predicted one, as captured motions stray from predictions, that
+         *     does.
+         * @default auto
+         */
+        Exact: ("auto" | "none") | components["schemas"]["ControlName"][];
+        /**
+         * @description A joint that is to be in its place at a moment: at a time, or at the start, the end, the event
+         *     that the model's recipe names, or where the joint is highest, lowest or farthest from the root.
+         *     The motion that meets it is the nearest to the predicted one, as captured motions stray from
+         *     predictions. What lies farther off than they stray is approached as far as they go, and
+         *     `targets` in Trust says by how much it is missed. A joint has one target at one moment.
+         */
+        Target: {
+            /**
+             * @description Name of a joint, as the model's own skeleton has it.
+             * @example RightHand
+             */
+            joint: string;
+            /**
+             * @description Where it is to be, x y z, m, in the frame of the clip: that in which the root travels.
+             * @example [
+             *       0.3,
+             *       1.2,
+             *       0.4
+             *     ]
+             */
+            position: number[];
+            /** @description Seconds from the start of the clip, up to its duration. */
+            time?: number;
+            at?: components["schemas"]["Moment"];
+        } & (unknown | unknown);
+        /** @enum {string} */
+        Moment: "start" | "end" | "event" | "highest" | "lowest" | "farthest";
+        /**
+         * @description Joints that are to be in their places. Of a control that the same joint is measured for, the target is the nearer word.
+         * @default []
+         * @example [
+         *       {
+         *         "joint": "RightHand",
+         *         "position": [
+         *           0.3,
+         *           1.2,
+         *           0.4
+         *         ],
+         *         "at": "end"
+         *       }
+         *     ]
+         */
+        Targets: components["schemas"]["Target"][];
+        /**
+         * @description Whether feet that stand stay where they stand.
+         * @default false
+         */
+        PinFeet: boolean;
+        /**
          * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
          * @default null
          * @enum {string|null}
@@ -1370,7 +1427,7 @@ export interface components {
         /**
          * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
          *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
-         *     a gap of what was sampled; `refuse` answers neither.
+         *     a gap of what was sampled, and one for each target out of reach; `refuse` answers none of these.
          * @default warn
          * @enum {string}
          */
@@ -1388,7 +1445,8 @@ export interface components {
          */
         LevelNumber: number;
         /**
-         * @description A number for each control of the model, in the control's unit.
+         * @description A number for each control of the model, in the control's unit. In a question some or all of them
+         *     may be left out, of a crowd none: they are then the most typical for those that are given and for the performer.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -1413,6 +1471,9 @@ export interface components {
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
             joint_sigma?: components["schemas"]["JointSigma"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -1438,6 +1499,9 @@ export interface components {
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
         };
@@ -1461,6 +1525,7 @@ export interface components {
             performer: string | null;
             /** @description As in Trust. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
             support?: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
@@ -1613,6 +1678,9 @@ export interface components {
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         /** @description One clip of an archive, and how far it may be trusted. */
         ManifestEntry: {
@@ -1636,6 +1704,13 @@ export interface components {
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
+            /** @description As in Trust. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description As in Trust. */
+            targets?: components["schemas"]["Met"][];
         };
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
@@ -1652,15 +1727,41 @@ export interface components {
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it. */
+            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
+            /** @description The controls that can be measured on a motion, as this one has them, in their units; absent where there are none. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description Measured controls and targets that the motion was held to, and how far it stays from each; absent where there are none. */
+            targets?: components["schemas"]["Met"][];
         };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given and for
+         *     targets; not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
         /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. Always there since 2.2.0. */
         Supported: boolean;
         /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
         SigmaByJoint: number[];
         /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
         PerformerSeen: boolean;
+        /** @description Something that a motion was held to. */
+        Met: {
+            /**
+             * @description A control's name, or joint and moment of a target.
+             * @example RightHand at end
+             */
+            what: string;
+            /** @description How far the motion stays from it, in `unit`. */
+            miss: number;
+            /** @description m, m/s or deg. */
+            unit: string;
+            /** @description Whether it is met to a millimetre, or a thousandth of its unit. */
+            reached: boolean;
+        };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
         /** @description For each time the position of the root, m. */
@@ -1709,6 +1810,27 @@ export interface components {
             default: number;
             /** @description The distinct sampled values where they are few, else empty. */
             values: number[];
+            measure?: components["schemas"]["Measure"];
+        };
+        /** @description How a control is read off a motion; a control that somebody typed has none. Since 2.2.0. */
+        Measure: {
+            /**
+             * @description `left`, `height` and `forward` are where a joint is at a moment, m, from where the root's first pose stands on the
+             *     floor, as it faces; `step_length` is the greatest distance ahead that one foot gets of the other, m; `stride_length`,
+             *     m, `speed`, m/s, and `turn`, degrees to the left, are of a whole cycle; `leg_length` and `stature`, m, are of the
+             *     performer's bones and not of the motion.
+             * @enum {string}
+             */
+            quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "leg_length" | "stature";
+            /** @description Indices of the joints whose middle is looked at, of the two feet of a step, or of the bones of a leg. */
+            joints?: number[];
+            /**
+             * @description The moment of a place; `farthest` is from the root.
+             * @enum {string}
+             */
+            at?: "start" | "end" | "highest" | "lowest" | "farthest" | "landmark";
+            /** @description Of the duration, at which the landmark is in the mean over captured clips. */
+            share?: number;
         };
         /** @description Joints parents first, their rest offsets, and the end sites that no joint follows. At rest every rotation is the identity. */
         Skeleton: {
@@ -1844,10 +1966,11 @@ export interface components {
         /**
          * @description One pose of each of many characters. All lists have one length, the number of characters, in
          *     one order; what is no list holds for each of them. Where nothing is a list there is one character.
+         *     Crowds are the model's predictions: they are held to nothing.
          */
         CrowdQuestion: {
             /**
-             * @description For each control of the model its values, in the control's unit.
+             * @description For each control of the model its values, in the control's unit. None may be left out.
              * @example {
              *       "stature": [
              *         1.72,
@@ -2169,7 +2292,7 @@ export interface components {
         /** @description A problem as RFC 9457 describes it. Every error of this service has this shape. */
         Problem: {
             /** @enum {string} */
-            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
+            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
             title: string;
             status: number;
             /** @description What was found and what was expected, for people. */
@@ -2426,8 +2549,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2552,8 +2677,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2571,8 +2698,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2590,8 +2719,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2609,8 +2740,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2628,8 +2761,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2647,8 +2782,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2666,8 +2803,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2685,8 +2824,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2704,8 +2845,10 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
                 "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2912,7 +3055,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or controls like which nothing was captured with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, something that no motion can be held to, or, with `extrapolate` refuse, controls like which nothing was captured or a target out of reach. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2981,9 +3124,12 @@ export interface components {
         model: string;
         /**
          * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-         *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-         *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-         *     width of the range away. The names of the other parameters are reserved.
+         *     The model's card gives their names, units and sampled ranges; a value outside the range is
+         *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+         *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+         *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+         *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+         *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -3025,6 +3171,22 @@ export interface components {
         loop: components["schemas"]["Loop"];
         /** @description Whether the trust says how far each joint may err. */
         jointSigma: components["schemas"]["JointSigma"];
+        /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+         *     the model can measure on a motion), `none`, or names of controls with commas between.
+         * @example none
+         */
+        exact: string;
+        /**
+         * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+         *     moment is its `at`, or its `time` in seconds. Repeated for several.
+         * @example [
+         *       "RightHand@end:0.3,1.2,0.4"
+         *     ]
+         */
+        target: string[];
+        /** @description Whether feet that stand stay where they stand. */
+        pinFeet: components["schemas"]["PinFeet"];
         /** @description The file's unit of length; the format's usual one, if left out. */
         unit: "m" | "cm";
         /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3033,7 +3195,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+        /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -3160,6 +3322,11 @@ export interface components {
         Sigma: number;
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
+        /**
+         * @description Values of the controls that were left out, and are the most typical for those that were given: a JSON
+         *     object in ASCII; absent where none was. Since 2.2.0.
+         */
+        Inferred: string;
         /** @description As `supported` in Trust; always there since 2.2.0. */
         Supported: "true" | "false";
         /**
@@ -3167,6 +3334,12 @@ export interface components {
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
         Warning: string;
+        /**
+         * @description One header line for each of `targets` in Trust that is not reached; absent where all are. Each
+         *     is a JSON object in ASCII with `what`, `miss` and `unit`, so that the lines joined by commas and
+         *     put in brackets are a JSON array.
+         */
+        Missed: string;
         /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
         InferenceHeaderLength: number;
     };
@@ -3248,9 +3421,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3258,7 +3434,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3267,7 +3443,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3279,6 +3455,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3346,9 +3538,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3356,7 +3551,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3365,7 +3560,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3377,6 +3572,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3442,9 +3653,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3452,7 +3666,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3461,7 +3675,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3473,6 +3687,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3538,9 +3768,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3548,7 +3781,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3557,7 +3790,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3569,6 +3802,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3634,9 +3883,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3644,7 +3896,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3653,7 +3905,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3665,6 +3917,22 @@ export interface operations {
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3727,12 +3995,15 @@ export interface operations {
     };
     getClip: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3740,14 +4011,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3765,6 +4036,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3829,12 +4116,15 @@ export interface operations {
     };
     getClipUsda: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3842,14 +4132,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3867,6 +4157,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3929,12 +4235,15 @@ export interface operations {
     };
     getClipUsdc: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3942,14 +4251,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3967,6 +4276,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4029,12 +4354,15 @@ export interface operations {
     };
     getClipUsdz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4042,14 +4370,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4067,6 +4395,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4129,12 +4473,15 @@ export interface operations {
     };
     getClipJson: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4142,14 +4489,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4167,6 +4514,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4229,12 +4592,15 @@ export interface operations {
     };
     getClipBvh: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4242,14 +4608,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4267,6 +4633,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4329,12 +4711,15 @@ export interface operations {
     };
     getClipGlb: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4342,14 +4727,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4367,6 +4752,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description glTF has no other unit of length. */
                 unit?: components["parameters"]["unitOfGltf"];
                 /** @description In glTF no other axis is up. */
@@ -4429,12 +4830,15 @@ export interface operations {
     };
     getClipNpz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4442,14 +4846,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4467,6 +4871,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4529,12 +4949,15 @@ export interface operations {
     };
     getClipArrow: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4542,14 +4965,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4567,6 +4990,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4629,12 +5068,15 @@ export interface operations {
     };
     getClipMsgpack: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4642,14 +5084,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4667,6 +5109,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -5180,12 +5638,15 @@ export interface operations {
     };
     getWhy: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5193,10 +5654,10 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls like which nothing was captured - answer, answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -6398,6 +6859,7 @@ export const PROBLEM_TYPES = [
   "urn:posefield:problem:unsupported-media-type",
   "urn:posefield:problem:invalid-field",
   "urn:posefield:problem:outside-samples",
+  "urn:posefield:problem:out-of-reach",
   "urn:posefield:problem:overloaded",
   "urn:posefield:problem:late",
   "urn:posefield:problem:not-ready",

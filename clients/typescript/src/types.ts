@@ -5,12 +5,16 @@ import type { components, operations } from "./schema.ts";
 type Schemas = components["schemas"];
 
 export type ManifestEntry = Schemas["ManifestEntry"];
+/** Something that a motion was held to, and by how much it misses it. */
+export type Met = Schemas["Met"];
 export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
 export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
 export type Suggestions = Schemas["Suggestions"];
 export type SigmaGrid = Schemas["SigmaGrid"];
+/** A joint that is to be in its place, at a `time` or `at` a moment of the motion. */
+export type Target = Schemas["Target"];
 export type Trust = Schemas["Trust"];
 
 /** A question as one may write it: what has a default may be left out. */

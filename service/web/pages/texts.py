@@ -3,7 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from service.motion.errors import InvalidField, OutsideSamples, UnknownFormat, UnknownModel
+from service.motion.errors import (
+    InvalidField,
+    OutOfReach,
+    OutsideSamples,
+    UnknownFormat,
+    UnknownModel,
+)
 from service.web import problems
 from service.web.problems import TABLE, Kind
 
@@ -103,8 +109,8 @@ TEXTS: dict[Kind, Text] = {
     ),
     TABLE[InvalidField]: Text(
         "The request keeps the contract, but this model has no answer to it: a control is "
-        "missing or unknown, a value is far outside what was sampled, a time lies outside the "
-        "clip, there would be too many frames, the model knows no such performer.",
+        "unknown (or one of a crowd's missing), a value is far outside what was sampled, a time "
+        "lies outside the clip, there would be too many frames, the model knows no such performer.",
         "Change the field that `errors` names. The model's card says what the model has: its "
         "controls, their ranges, its performers and levels.",
         "fps: 10000 frames a second, expected 1 to 1000 frames a second",
@@ -117,6 +123,14 @@ TEXTS: dict[Kind, Text] = {
         "captured, which `why` names, or ask with `extrapolate=warn`.",
         "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
         {"parameter": "controls"},
+    ),
+    TABLE[OutOfReach]: Text(
+        "The motion cannot meet a target, or a measured control, by going as far as captured "
+        "motions stray, and `extrapolate=refuse` asked for an error rather than a warning.",
+        "Move the target that `errors` names nearer, or ask with `extrapolate=warn`: the answer "
+        "then goes as near as it can, and its trust says by how much it misses.",
+        "targets/0: RightHand at end stays 446.2 cm from its target: out of reach",
+        {"parameter": "target"},
     ),
     problems.HEAD_TOO_LARGE: Text(
         "All header lines together are longer than the service reads. The connection is closed.",

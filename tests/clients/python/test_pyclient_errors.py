@@ -97,17 +97,24 @@ def test_what_can_help_to_ask_again_is_asked_again():
     assert {name.lower() for name in again} == busy | network
 
 
+FAR = {"joint": "RightHand", "position": (0, 1, 5), "at": "end"}
+
+
 @pytest.mark.parametrize(
     ("ask", "kind"),
     [
         (lambda m, c: m("reich").card, errors.UnknownModel),
         (lambda m, c: m("reach@0000000000000000").card, errors.UnknownModel),
-        (lambda m, c: m("reach").pose(0), errors.InvalidField),
+        (lambda m, c: m("reach").pose(0, spin=1), errors.InvalidField),
         (lambda m, c: m("reach").pose(100, **c), errors.InvalidField),
         (lambda m, c: m("reach").pose(0, performer="nobody", **c), errors.InvalidField),
         (
             lambda m, c: m("reach").pose(0, extrapolate="refuse", **c | {"turn": 1000}),
             errors.OutsideSamples,
+        ),
+        (
+            lambda m, c: m("reach").pose(0, extrapolate="refuse", targets=[FAR], **c),
+            errors.OutOfReach,
         ),
         (lambda m, c: m("reach").clip(fps="x", **c).content("usdc"), errors.BadParameter),
         (lambda m, c: m("reach").clip(loop=True, **c).content("usdc"), errors.InvalidField),

@@ -53,14 +53,6 @@ def test_an_unknown_control_is_refused_with_those_there_are(refused):
     )
 
 
-def test_a_missing_control_is_refused_with_its_unit_and_range(refused, model):
-    turn = model.session.card.control("turn")
-    assert refused({name: value for name, value in POINT.items() if name != "turn"}) == (
-        "controls/turn",
-        f"missing; give a number in deg, sampled from {turn.minimum:g} to {turn.maximum:g}",
-    )
-
-
 @pytest.mark.parametrize(
     ("value", "said"),
     [

@@ -1,0 +1,169 @@
+"""What a motion can be held to: each aim says what the motion has instead, and how to change it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from service.motion import measure
+from service.motion.conventions import Floats
+from service.motion.measure import AXES, TRAVELLED, Measure
+from service.synthesis.exact.scene import BESIDE, Scene
+
+Looked = tuple[Floats, Floats]
+"""Values (k,), and their gradients (k, numbers) by the numbers of the motion."""
+
+
+class Aim(Protocol):
+    """Something that can be measured, and the goal (k,) of it."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is said of it: a name for all its values, or one for each."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+
+    @property
+    def goal(self) -> Floats:
+        """The values that are asked for."""
+
+    def look(self, scene: Scene, numbers: Floats) -> Looked:
+        """The values that a motion has, and their gradients."""
+
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """The values (n, k) of other reduced motions (n, r2 r1) that have everything else of this
+        one, at its moment."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the middle of some joints is at a moment, along some axes, m.
+
+    moment: how it is found. at: the canonical frame, where that is given.
+    """
+
+    names: tuple[str, ...]
+    moment: Measure
+    axes: tuple[int, ...]
+    goal: Floats
+    at: float = 0.0
+    unit: str = "m"
+
+    def look(self, scene: Scene, numbers: Floats) -> Looked:
+        """Values and gradients."""
+        joints = self.moment.joints
+        at = _moment(scene, numbers, self.moment, self.at)
+        found = [scene.place(numbers, joint, at) for joint in joints]
+        values = np.mean([value for value, _ in found], axis=0)
+        gradients = np.mean([gradient for _, gradient in found], axis=0)
+        return values[list(self.axes)], gradients[list(self.axes)]
+
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """Values of other motions."""
+        at = _moment(scene, numbers, self.moment, self.at)
+        found = [scene.among(numbers, motions, joint, at) for joint in self.moment.joints]
+        return np.asarray(np.mean(found, axis=0)[:, list(self.axes)], np.float64)
+
+
+@dataclass(frozen=True)
+class Step:
+    """The greatest distance ahead that one foot gets of the other, m."""
+
+    names: tuple[str, ...]
+    moment: Measure
+    goal: Floats
+    unit: str = "m"
+
+    def look(self, scene: Scene, numbers: Floats) -> Looked:
+        """Values and gradients."""
+        at = _moment(scene, numbers, self.moment, 0.0)
+        first, second = (scene.place(numbers, joint, at) for joint in self.moment.joints)
+        ahead = first[0][2] - second[0][2]
+        sign = 1.0 if ahead >= 0.0 else -1.0
+        return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
+
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """Values of other motions."""
+        at = _moment(scene, numbers, self.moment, 0.0)
+        first, second = (scene.among(numbers, motions, j, at) for j in self.moment.joints)
+        return np.abs(first - second)[:, 2:]
+
+
+@dataclass(frozen=True)
+class Travelled:
+    """How far a cycle goes, m, how fast, m/s, or how far it turns, degrees."""
+
+    names: tuple[str, ...]
+    quantity: str
+    goal: Floats
+    unit: str
+
+    def look(self, scene: Scene, numbers: Floats) -> Looked:
+        """Values and gradients."""
+        log_duration, travel = scene.beside(numbers)
+        duration = float(np.exp(log_duration))
+        value = measure.travelled(self.quantity, travel, duration)
+        gradients = np.zeros((1, len(numbers)))
+        way = max(float(np.hypot(*travel[:2])), 1e-9)
+        if self.quantity == "turn":
+            gradients[0, -1] = np.degrees(1.0)
+        else:
+            per = duration if self.quantity == "speed" else 1.0
+            gradients[0, -BESIDE + 1 : -1] = travel[:2] / way / per
+        if self.quantity == "speed":
+            gradients[0, -BESIDE] = -value
+        return np.array([value]), gradients
+
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """Values of other motions: all the same, for none of it is in them."""
+        return np.repeat(self.look(scene, numbers)[0][None], len(motions), axis=0)
+
+
+def look(aims: Sequence[Aim], scene: Scene, numbers: Floats) -> Looked:
+    """Values and gradients of several aims, one after the other."""
+    found = [aim.look(scene, numbers) for aim in aims]
+    return np.concatenate([v for v, _ in found]), np.vstack([g for _, g in found])
+
+
+def of_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> list[Aim]:
+    """Aims of measured controls: name, measure and goal of each.
+
+    Places of the same joints at the same moment are one aim: how far a hand is off counts as one
+    distance.
+    """
+    aims: list[Aim] = []
+    places: dict[Measure, list[tuple[str, int, float]]] = {}
+    for name, own, goal in asked:
+        if own.quantity in TRAVELLED:
+            aims.append(Travelled((name,), own.quantity, np.array([goal]), own.unit))
+        elif own.quantity == "step_length":
+            aims.append(Step((name,), own, np.array([goal])))
+        else:
+            moment = Measure("height", own.joints, own.at, own.share)
+            places.setdefault(moment, []).append((name, AXES[own.quantity], goal))
+    for moment, parts in places.items():
+        names, axes, goals = zip(*parts, strict=True)
+        aims.append(
+            Place(names, moment, axes, np.array(goals), (moment.share or 0.0) * (frames - 1))
+        )
+    return aims
+
+
+def _moment(scene: Scene, numbers: Floats, own: Measure, given: float) -> float:
+    """Canonical frame at which something is measured."""
+    last = scene.reduced.frames - 1
+    if own.at in ("start", "end", "landmark"):
+        return {"start": 0.0, "end": float(last), "landmark": given}[own.at]
+    # Where the moment has to be looked for: of an extreme, the gradient at that frame is that of
+    # the extreme itself.
+    joints = own.joints if own.at != "farthest" else (0, *own.joints)
+    places = np.arange(last + 1.0)
+    positions = np.stack([scene.positions(numbers, joint, places) for joint in joints], axis=1)
+    if own.at == "farthest":
+        away = positions[:, 1:].mean(axis=1) - positions[:, 0]
+        return float(np.argmax(np.sum(np.square(away), axis=-1)))
+    seen = Measure(own.quantity, tuple(range(len(joints))), own.at)
+    return measure.moment(seen, positions, 0.0)

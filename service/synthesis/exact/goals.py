@@ -1,0 +1,156 @@
+"""What a question is held to: checked once, and made into aims."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from service.motion.card import Control, ModelCard
+from service.motion.errors import InvalidField
+from service.motion.measure import Measure
+from service.synthesis import limits
+from service.synthesis.door import Question
+from service.synthesis.question import Hold, Target
+
+# Nobody reaches farther, m; float32 would still hold it.
+FARTHEST = 100.0
+MOST_TARGETS = 32
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A joint that is to be in a place (3,), m: where its moment is looked for, or at which time,
+    s."""
+
+    name: str
+    moment: Measure
+    place: tuple[float, float, float]
+    time: float | None
+
+
+@dataclass(frozen=True)
+class Goals:
+    """What a question is held to: measured controls with their values, targets, and whether feet
+    stay where they stand meanwhile."""
+
+    controls: tuple[tuple[str, Measure, float], ...]
+    targets: tuple[Goal, ...]
+    pin_feet: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.controls or self.targets)
+
+
+NOTHING = Goals((), ())
+
+
+def of(card: ModelCard, question: Question, hold: Hold, correctable: bool) -> Goals:
+    """Goals of a question.
+
+    Raises InvalidField for a control that cannot be measured on a motion, a joint that there is
+    not, a place or time that is none, two targets for one joint at one moment, and whatever has to
+    be exact of a file that cannot say it.
+    """
+    if not correctable:
+        _refuse_old(hold)
+        return NOTHING
+    if hold.pin_feet and not card.feet:
+        raise InvalidField("pin_feet", "true, but this model's recipe names no feet")
+    targets = tuple(_goal(card, i, target) for i, target in enumerate(hold.targets))
+    _refuse_twins(hold.targets, targets)
+    taken = {(goal.moment.joints, goal.moment.at) for goal in targets}
+    named = hold.exact not in ("auto", "none")
+    controls = []
+    for control in _exact(card, question, hold):
+        own = control.measure
+        assert own is not None
+        if own.joints and (own.joints, own.at) in taken:
+            # A target says where the same joint is to be: of controls that were not named it is
+            # the nearer word.
+            if named:
+                raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
+            continue
+        controls.append((control.name, own, question.controls[control.name]))
+    return Goals(tuple(controls), targets, hold.pin_feet)
+
+
+def _refuse_old(hold: Hold) -> None:
+    if hold.targets:
+        raise InvalidField("targets", _OLD)
+    if hold.exact not in ("auto", "none"):
+        raise InvalidField("exact", _OLD)
+    if hold.pin_feet:
+        raise InvalidField("pin_feet", _OLD)
+
+
+_OLD = "this model's file is older than exact controls; expected none, or a model trained anew"
+
+
+def _exact(card: ModelCard, question: Question, hold: Hold) -> Sequence[Control]:
+    """Controls that the answer is held to."""
+    given = [c for c in card.controls if c.name not in question.inferred]
+    if hold.exact == "none":
+        return ()
+    if hold.exact == "auto":
+        return [control for control in given if _movable(control)]
+    for name in hold.exact:
+        control = card.control(name)
+        if control is None:
+            known = ", ".join(c.name for c in card.controls)
+            raise InvalidField("exact", f"{name!r}, expected controls of this model: {known}")
+        if not _movable(control):
+            movable = ", ".join(c.name for c in card.controls if _movable(c))
+            raise InvalidField(
+                "exact",
+                f"{name!r} is not measured on a motion, expected some of: {movable or 'none'}",
+            )
+        if name in question.inferred:
+            raise InvalidField("exact", f"{name!r} was not given, expected a control that was")
+    return [control for control in given if control.name in hold.exact]
+
+
+def _movable(control: Control) -> bool:
+    return control.measure is not None and not control.measure.bodily
+
+
+def _goal(card: ModelCard, index: int, target: Target) -> Goal:
+    field = f"targets/{index}"
+    if index >= MOST_TARGETS:
+        raise InvalidField("targets", f"more than {MOST_TARGETS}")
+    if target.joint not in card.skeleton.names:
+        known = ", ".join(card.skeleton.names)
+        raise InvalidField(f"{field}/joint", f"{target.joint!r}, expected one of {known}")
+    joint = card.skeleton.names.index(target.joint)
+    if len(target.position) != 3:
+        raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
+    x, y, z = (limits.number(f"{field}/position/{a}", v) for a, v in enumerate(target.position))
+    for axis, value in enumerate((x, y, z)):
+        limits.within(f"{field}/position/{axis}", value, -FARTHEST, FARTHEST, "m")
+    when = target.when
+    if not isinstance(when, str):
+        time = limits.number(f"{field}/time", when)
+        longest = limits.durations(card)[1]
+        limits.within(f"{field}/time", time, 0.0, longest, "s")
+        moment = Measure("height", (joint,), "landmark")
+        return Goal(f"{target.joint} at {time:g} s", moment, (x, y, z), time)
+    return Goal(f"{target.joint} at {when}", _moment(card, field, joint, when), (x, y, z), None)
+
+
+def _moment(card: ModelCard, field: str, joint: int, when: str) -> Measure:
+    if when != "event":
+        return Measure("height", (joint,), when)  # type: ignore[arg-type]
+    if card.event is None:
+        raise InvalidField(f"{field}/at", "'event', but this model's recipe names none")
+    if card.event.share == 1.0:
+        return Measure("height", (joint,), "end")
+    return Measure("height", (joint,), "landmark", card.event.share)
+
+
+def _refuse_twins(targets: Sequence[Target], goals: Sequence[Goal]) -> None:
+    seen: dict[object, int] = {}
+    for index, (target, goal) in enumerate(zip(targets, goals, strict=True)):
+        key = (target.joint, goal.time, goal.moment)
+        if key in seen:
+            raise InvalidField(
+                f"targets/{index}",
+                f"{goal.name} has a target already (targets/{seen[key]}), expected one",
+            )
+        seen[key] = index

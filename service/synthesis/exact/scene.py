@@ -1,0 +1,84 @@
+"""A motion that can still be changed, as one row of numbers, and what is seen of it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from service.motion.conventions import Floats
+from service.synthesis.exact import limb
+from service.synthesis.exact.limb import Limb
+from service.synthesis.exact.reduced import Reduced
+
+BESIDE = 4
+"""Numbers beside the reduced motion of a cycle: logarithm of the duration; way to the left and
+ahead, m; change of heading, rad."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Whose motion it is: bones (J, 3), m, and whether it is a cycle, which travels by itself."""
+
+    reduced: Reduced
+    parents: tuple[int, ...]
+    bones: Floats
+    cyclic: bool
+
+    @cached_property
+    def _limbs(self) -> dict[int, Limb]:
+        return {}
+
+    def limb(self, joint: int) -> Limb:
+        """The chain to a joint, made once."""
+        if joint not in self._limbs:
+            self._limbs[joint] = limb.to(joint, self.parents, self.bones, self.reduced)
+        return self._limbs[joint]
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers a motion is."""
+        r2, r1, _ = self.reduced.core.shape
+        return r2 * r1 + BESIDE * self.cyclic
+
+    def motion(self, numbers: Floats) -> Floats:
+        """The reduced motion (r2, r1) among the numbers."""
+        r2, r1, _ = self.reduced.core.shape
+        return numbers[: r2 * r1].reshape(r2, r1)
+
+    def beside(self, numbers: Floats) -> tuple[float, Floats]:
+        """Logarithm of the duration and travel (3,): zeros of what is no cycle."""
+        if not self.cyclic:
+            return 0.0, np.zeros(3)
+        return float(numbers[-BESIDE]), numbers[-BESIDE + 1 :]
+
+    def positions(self, numbers: Floats, joint: int, places: Floats) -> Floats:
+        """Where a joint is (S, 3), m, at canonical frames (S,)."""
+        moves = self.reduced.rows(places) @ self.motion(numbers)
+        return self.limb(joint).posed(moves, self._gone(numbers, places)).positions[:, -1]
+
+    def among(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
+        """Where a joint is (n, 3), m, at a canonical frame of other motions (n, r2 r1) that have
+        everything else of this one."""
+        row, gone = self.reduced.row(at), self._gone(numbers, np.full(len(motions), at))
+        moves = row @ motions.reshape(len(motions), len(row), -1)
+        return self.limb(joint).posed(moves, gone).positions[:, -1]
+
+    def place(self, numbers: Floats, joint: int, at: float) -> tuple[Floats, Floats]:
+        """Where a joint is (3,), m, at a canonical frame, and how it moves with every number of the
+        motion (3, numbers)."""
+        places = np.array([at])
+        row, own = self.reduced.row(at), self.limb(joint)
+        pose = own.posed(row[None] @ self.motion(numbers), self._gone(numbers, places))
+        by_freedoms, by_turn = own.gradient(pose, 0)
+        inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
+        if self.cyclic:
+            share = at / (self.reduced.frames - 1)
+            way = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+            outer = share * np.column_stack([np.zeros(3), way[:, 0], way[:, 1], by_turn])
+            inner = np.hstack([inner, outer])
+        return pose.positions[0, -1], inner
+
+    def _gone(self, numbers: Floats, places: Floats) -> Floats:
+        """How much of the travel (S, 3) lies behind at canonical frames (S,)."""
+        share = places / (self.reduced.frames - 1)
+        return share[:, None] * self.beside(numbers)[1]

@@ -1,0 +1,117 @@
+"""How captured motions stray from what the others predict: the metric of a correction.
+
+The covariance of standardised leave-one-out residuals, as exact-control literature has it for a
+Gaussian conditioned on a target: the least change in this metric is the most probable one. Few
+residuals say little of most directions, so most of it is replaced by what its marginals over time
+and degrees of freedom say, their Kronecker product. Motions vary smoothly, and so do corrections.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion import field
+from service.motion.card import ModelCard
+from service.motion.conventions import Floats, Indices
+from service.synthesis.exact.reduced import Reduced, Weights
+
+# Of the marginals. On real motion all from 0.3 to 1 come as near; the less, the rougher.
+SHRUNK = 0.7
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Covariance of a reduced motion (r2, r1) and what goes beside it, for a sigma of one metre.
+
+    residuals (r2 r1, r3): a root of the covariance of residuals. time (r2, r2), freedoms (r1, r1):
+    its marginals, their product scaled to its trace. beside (b, b): covariance of the logarithm of
+    the duration and of a cycle's travel; empty for what is no cycle. captured (n, r2 r1): reduced
+    motions of the captured clips; predicted: what the others say of each. sigmas (n,): of those, m,
+    times the root of n.
+    """
+
+    residuals: Floats
+    time: Floats
+    freedoms: Floats
+    beside: Floats
+    captured: Floats
+    predicted: Floats
+    sigmas: Floats
+
+    def shrunk(self, gradients: Floats) -> Floats:
+        """Shrunk covariance times gradients (k, r2 r1 + b), transposed: (r2 r1 + b, k)."""
+        inner = gradients[:, : len(self.residuals)]
+        r2, r1 = len(self.time), len(self.freedoms)
+        blocks = self.time @ inner.reshape(-1, r2, r1) @ self.freedoms
+        even = blocks.reshape(len(gradients), -1)
+        own = (inner @ self.residuals) @ self.residuals.T
+        both = SHRUNK * even + (1.0 - SHRUNK) * own
+        return np.hstack([both, gradients[:, len(self.residuals) :] @ self.beside]).T
+
+
+def of(card: ModelCard, weights: Weights, samples: Floats, reduced: Reduced) -> Spread:
+    """Spread of a model's level.
+
+    samples (n, d + p): where the captured clips lie. What they are made of is read off the dual
+    weights: the system times them is the samples.
+    """
+    hyper = card.kriging
+    assert hyper is not None
+    left_out = field.leave_out(hyper, samples, groups(card, samples))
+    variances = field.left_out_variances(hyper, samples, left_out)
+    sill = np.mean(np.square(card.left_out) / variances)
+    r3 = reduced.core.shape[2]
+    held = _coefficients(card, weights, samples)[:, :r3]
+    missed = left_out @ held
+    sigmas = np.sqrt(sill * variances * len(samples))
+    # Residuals of a variance of one each, of a field whose sill is a square metre.
+    strays = missed / sigmas[:, None]
+    root = np.linalg.cholesky(strays.T @ strays + 1e-12 * np.eye(r3))
+    spread = reduced.core @ root
+    time = np.einsum("tdk,sdk->ts", spread, spread)
+    freedoms = np.einsum("tdk,tek->de", spread, spread)
+    own = np.array(card.beside, dtype=float).reshape(len(card.beside), len(card.beside))
+    marginals = time / np.trace(time), freedoms
+    flat = reduced.core.reshape(-1, r3).T
+    motions = held @ flat, (held - missed) @ flat
+    return Spread(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
+
+
+def _coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
+    """Sample coefficients (n, r3) of the captured clips, in the card's order."""
+    hyper = card.kriging
+    assert hyper is not None
+    r3 = weights["core"].shape[2]
+    order = order_of(card, weights, samples)
+    held = samples[order]
+    dual = weights["pose_weights"].astype(np.float64)
+    trend = weights["drift_weights"][:, -r3:].astype(np.float64)
+    functions = field.drift(held, len(card.controls), 1)
+    found = np.empty((len(samples), r3))
+    found[order] = field.noisy(hyper, held) @ dual + functions @ trend
+    return found
+
+
+def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
+    """Place on the card (n,) of each sample of the file, which holds those first that say most."""
+    held = weights["samples"][0].T
+    listed = samples[:, : len(card.controls)].astype(np.float32)
+    whose = weights["whose"] if card.performers else np.zeros(len(held), dtype=np.int64)
+    moved = np.array(card.moved_by or [0] * len(listed))
+    place = np.empty(len(held), dtype=np.int64)
+    place[np.lexsort((*held.T, whose))] = np.lexsort((*listed.T, moved))
+    return place
+
+
+def groups(card: ModelCard, samples: Floats) -> Indices:
+    """Captured clips that are left out together (n,): those of one file, or where the others could
+    not carry the drift then, each by itself."""
+    hyper = card.kriging
+    assert hyper is not None
+    files = [source.partition(", frames ")[0] for source in card.sources]
+    takes = np.unique(files, return_inverse=True)[1]
+    functions = field.drift(samples, len(card.controls), max(hyper.drifts))
+    for take in np.unique(takes):
+        if np.linalg.matrix_rank(functions[takes != take]) < functions.shape[1]:
+            return np.arange(len(samples))
+    return np.asarray(takes, dtype=np.int64)
