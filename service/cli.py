@@ -34,7 +34,7 @@ from service.motion.errors import (
     WorkerDied,
 )
 from service.motion.roles import Names
-from service.synthesis import library, pace, session
+from service.synthesis import library, pace, session, spelling
 from service.synthesis.question import ClipQuestion, Policy, Root
 from service.synthesis.suggest import COUNT, SuggestQuestion
 from service.synthesis.suggest import suggest as find_suggestions
@@ -68,6 +68,24 @@ Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last f
 JointSigma = Annotated[
     bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
 ]
+ExactControls = Annotated[
+    str | None,
+    typer.Option(
+        "--exact",
+        help="measured controls to be met exactly: auto (those given), none, or names",
+        metavar="auto|none|NAME,NAME",
+    ),
+]
+Targets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--target",
+        help="where a joint is to be, m; MOMENT is seconds, start, end, event, highest, lowest "
+        "or farthest; may be repeated",
+        metavar="JOINT@MOMENT=X,Y,Z",
+    ),
+]
+PinFeet = Annotated[bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -144,11 +162,15 @@ def pose(
     performer: Performer = None,
     level: LevelOfDetail = 0,
     joint_sigma: JointSigma = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
-    answer = synthesizer.pose(asked, times, extrapolate, performer, level)
+    held = spelling.hold(exact, target or (), pin_feet)
+    answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
     _tell(answer.trust)
     trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
     typer.echo(poses.json(replace(answer, trust=trust)).decode())
@@ -169,6 +191,9 @@ def clip(
     root: RootMotion = "travelling",
     loop: Loop = False,
     joint_sigma: JointSigma = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -178,8 +203,11 @@ def clip(
     convention = found.convention(unit, up)
     synthesizer = open_model(model)
     controls = numbers(control or [])
+    held = spelling.hold(exact, target or (), pin_feet)
     asked = ClipQuestion(
-        controls, fps, extrapolate, start, end, performer, level, names, root, loop, joint_sigma
+        *(controls, fps, extrapolate, start, end, performer, level, names, root, loop),
+        joint_sigma=joint_sigma,
+        hold=held,
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)

@@ -27,6 +27,7 @@ def pass_all(card: ModelCard, support: Support, values: Values, usual: ClipQuest
         and _within(_column(values, "fps", usual.fps), *course.RATES)
         and _window_passes(card, values, usual)
         and _loops_pass(card, values, usual)
+        and _hold_passes(values)
         and (bool(card.roles) or {*values.get("names", ()), usual.names} <= {"own", None})
     )
 
@@ -59,6 +60,12 @@ def _loops_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
     whole = _column(values, "start", usual.start) <= 0.0
     last = _column(values, "end", math.inf if usual.end is None else usual.end) == math.inf
     return card.cyclic and bool(np.all(~loops | (whole & last)))
+
+
+def _hold_passes(values: Values) -> bool:
+    """Whether no row says what has to be looked at by itself; the usual has been looked at."""
+    plain = {"auto", "none", None}.issuperset(values.get("exact", ()))
+    return plain and not any(values.get("targets", ())) and not any(values.get("pin_feet", ()))
 
 
 def _column(values: Values, field: str, usual: float) -> Floats:

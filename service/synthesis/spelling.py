@@ -6,10 +6,11 @@ clip, m. A moment is seconds from the start of the clip, or one of MOMENTS.
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
 
-from service.synthesis.question import Exact, Moment, Target, When
+from service.motion.errors import InvalidField
+from service.synthesis.question import HOLD, Exact, Hold, Moment, Target, When
 
 MOMENTS: tuple[Moment, ...] = get_args(Moment)
 # What JSON calls a number, so that words read like a body: no nan, inf, 1_000 or blanks.
@@ -29,6 +30,22 @@ def target(words: str, mark: str = ":") -> Target:
             f"{', '.join(MOMENTS)}"
         )
     return Target(joint, cast(tuple[float, float, float], position), when)
+
+
+def hold(exact_words: str | None, targets: Sequence[str], pin_feet: bool) -> Hold:
+    """What a command line says: targets as JOINT@MOMENT=X,Y,Z. InvalidField for words that are
+    none."""
+    if exact_words is None and not targets and not pin_feet:
+        return HOLD
+    try:
+        said = "auto" if exact_words is None else exact(exact_words)
+    except ValueError as fault:
+        raise InvalidField("exact", str(fault)) from fault
+    try:
+        found = tuple(target(words, "=") for words in targets)
+    except ValueError as fault:
+        raise InvalidField("target", str(fault)) from fault
+    return Hold(said, found, pin_feet)
 
 
 def plain_target(found: object) -> Target:

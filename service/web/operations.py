@@ -22,6 +22,7 @@ from service.export import pack as packing
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.course import MOST_POSES
+from service.synthesis.question import HOLD
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
@@ -194,7 +195,11 @@ async def _clip(
     convention = encoder.convention(question.unit, question.up)
     joints = len(model.session.card.skeleton)
     most = poses_within(service.settings.output_limit, joints, encoder.per_joint)
-    answer = model.clip(question.clip, min(most, MOST_POSES))
+    if model.keeper.measures or question.clip.hold != HOLD:
+        # A correction takes some milliseconds, in which others would wait.
+        answer = await to_thread.run_sync(model.clip, question.clip, min(most, MOST_POSES))
+    else:
+        answer = model.clip(question.clip, min(most, MOST_POSES))
     if len(answer.clip) <= encoder.at_once:
         content = encoder.encode(answer, convention)
     else:

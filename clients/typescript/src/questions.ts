@@ -71,7 +71,7 @@ function pairs({ controls, times, targets, camera, ...rest }: Question): string[
 
 /** JOINT@MOMENT:X,Y,Z. */
 function words({ joint, position, time, at }: Target): string {
-  const moment = at ?? plain("target", time as number);
+  const moment = at ?? (time === undefined ? "" : plain("target", time));
   return `${joint}@${moment}:${place("target", position)}`;
 }
 

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 
-import { Client, CONTRACT, type PoseQuestion, Problem } from "../src/index.ts";
+import { Client, CONTRACT, type PoseQuestion, Problem, type Target } from "../src/index.ts";
 import { defaults, observed, URL_OF_SERVICE } from "./service.ts";
 
 const client = new Client(URL_OF_SERVICE);
@@ -36,7 +36,7 @@ test("poses are the numbers that the service says as text", async () => {
 
 test("a motion that is held to targets says by how much it misses them", async () => {
   const { client, sent } = observed();
-  const far = { joint: "RightHand", position: [1e-7, 1, 5], at: "end" } as const;
+  const far: Target = { joint: "RightHand", position: [1e-7, 1, 5], at: "end" };
   const early = { joint: "LeftHand", position: [0.5, 1, 0], time: 0.25 };
   const { trust } = await client.pose("reach", { ...question, targets: [far, early] });
   const said = [...new URL(sent[0]!.path, "http://any").searchParams.getAll("target")];

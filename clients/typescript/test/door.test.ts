@@ -15,7 +15,7 @@ const ASKED: Record<string, Ask> = {
   "a link's time": (client, time) => client.pose("reach", { controls: {}, times: [0, time] }),
   "a link's setting": (client, fps) => client.file("reach", "bvh", { controls: {}, fps }),
   "a target's place": (client, x) =>
-    client.pose("reach", { controls: {}, times: [0], targets: [{ ...HAND, position: [0, x, 0] }] }),
+    client.clip("reach", { controls: {}, targets: [{ ...HAND, position: [0, x, 0], at: "end" }] }),
   "a target's time": (client, time) =>
     client.clip("reach", { controls: {}, targets: [{ ...HAND, time }] }),
   "a camera": (client, x) => client.crowdFile("walk", "usda", { camera: [x, 0, 0] }),

@@ -53,7 +53,8 @@ def words(request):
     for name, text in parse_qsl(urlsplit(request["path"]).query):
         given.setdefault(name, []).append(value(text))
     times = {"times": given.pop("time")} if "time" in given else {}
-    held = {"targets": [target(words) for words in given.pop("target", ())]}
+    targets = [target(words) for words in given.pop("target", ())]
+    held = {"targets": targets} if targets else {}
     return {name: values[0] for name, values in given.items()} | times | held
 
 

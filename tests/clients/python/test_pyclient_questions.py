@@ -92,7 +92,7 @@ def test_targets_and_exact_controls_in_a_query():
         ("a", "1"),
         ("exact", "a,b"),
         ("target", "mixamorig:Hand@end:0.5,-0.0000001,2.0"),
-        ("target", "Foot@0.25:0,0,1"),
+        ("target", "Foot@0.25:0.0,0.0,1.0"),
         ("pin_feet", "true"),
     ]
     assert target(questions.pose("m", 0, exact="a")) == target(questions.pose("m", 0, exact=["a"]))
@@ -123,7 +123,7 @@ def test_targets_and_exact_controls_in_a_body(monkeypatch):
         ([{"joint": "Hand", "position": [0, 1, 2]}], "target 0: expected one of time and at"),
         ([HAND, {**HAND, "time": 0}], "target 1: expected one of time and at"),
         ([{**HAND, "position": [0, 1]}], "target 0: .*length 3"),
-        ([{**HAND, "position": [0, 1, float("nan")]}], "target 0 is nan, expected a finite"),
+        ([{**HAND, "position": [0, 1, float("nan")]}], "position is nan, expected a finite"),
         ([{**HAND, "at": "soon"}], "target 0: Invalid enum value 'soon'"),
         ([{**HAND, "when": 1}], "target 0: .*unknown field `when`"),
     ],
