@@ -79,7 +79,7 @@ def test_positions_are_those_of_the_poses(name, request):
         one, _ = scene.place(numbers, joint, frames[1])
         assert np.abs(one - found[1]).max() < 1e-12
         # Negative control: a hundredth of a frame later they are elsewhere.
-        later = scene.positions(numbers, joint, frames + [0.01, 0.01, -0.01])
+        later = scene.positions(numbers, joint, frames + np.array([0.01, 0.01, -0.01]))
         assert np.abs(later - positions[0, :, joint]).max() > 1e-6
 
 
