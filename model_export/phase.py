@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from model_export import align, ingest
+from model_export import align, ingest, measured
 from model_export.ingest import Example
 from model_export.recipe import Recipe
 from service.motion import quat
@@ -42,9 +42,29 @@ def in_phase(
     traces = np.stack([_even(align.trace(e.clip, np.sqrt(joint_weights))) for e in examples])
     found = shifts(traces, recipe.alignment.rounds)
     in_place = recipe.motion.root == "in_place"
-    begun = tuple(begin(e, share, in_place) for e, share in zip(examples, found, strict=True))
+    begun = tuple(
+        _measured(recipe, begin(example, share, in_place))
+        for example, share in zip(examples, found, strict=True)
+    )
     _refuse_parted_landmarks(begun)
     return begun
+
+
+def _measured(recipe: Recipe, begun: Example) -> Example:
+    """The example with what is measured of it from where it begins now: of a cycle on an arc, the
+    way from one phase is not that from another."""
+    controls = measured.controls(recipe, begun.row, begun.clip, begun.landmarks)
+    return replace(begun, controls=controls)
+
+
+def in_phase_with(
+    examples: Sequence[Example], references: Floats, joint_weights: Floats, in_place: bool
+) -> tuple[Example, ...]:
+    """Cyclic examples that begin at the phase of their references (N, F, features), traces of
+    closed cycles in even steps."""
+    traces = np.stack([_even(align.trace(e.clip, np.sqrt(joint_weights))) for e in examples])
+    found = _to(traces, np.stack([_even(reference) for reference in references]))
+    return tuple(begin(e, share, in_place) for e, share in zip(examples, found, strict=True))
 
 
 def shifts(traces: Floats, rounds: int) -> Floats:

@@ -12,26 +12,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
+from model_export.controls import (
+    COLUMN,
+    MEASURED,
+    MOMENTS,
+    Auto,
+    Control,
+    ControlColumn,
+    ControlMeasured,
+    Part,
+    Text,
+)
+from service.motion import measure
 from service.motion.errors import RecipeError
 from service.motion.roles import Role
 
-# Parameters that a clip query has besides the controls.
-RESERVED = frozenset(
-    "fps start end time times extrapolate performer level format names root loop unit up "
-    "across along columns rows margin nearest exact target targets pin_feet".split()
-)
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
-Text = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Source(_Part):
+class Source(Part):
     """What the motion files leave unsaid; a BVH file knows neither its unit nor its up axis."""
 
     metres_per_unit: Positive = Field(description="length of one unit of the files, m")
@@ -43,7 +44,7 @@ class Source(_Part):
     )
 
 
-class Condition(_Part):
+class Condition(Part):
     """Which rows of the table belong: by listed values, or by a range of a number."""
 
     among: list[str] | None = Field(default=None, description="the cell is one of these")
@@ -52,7 +53,7 @@ class Condition(_Part):
     maximum: float | None = Field(default=None, description="the number is at most this")
 
 
-class Clips(_Part):
+class Clips(Part):
     """Where the table is and which of its columns say what."""
 
     table: Text = Field(description="CSV file, relative to the data folder")
@@ -66,23 +67,7 @@ class Clips(_Part):
     where: dict[str, Condition] = Field(default={}, description="conditions by column")
 
 
-class ControlColumn(_Part):
-    """One control parameter and the column that holds its value for each clip."""
-
-    name: Name
-    column: Text
-    unit: Text
-    description: Text
-
-    @field_validator("name")
-    @classmethod
-    def _not_reserved(cls, name: str) -> str:
-        if name in RESERVED:
-            raise ValueError(f"{name!r} is the name of a query parameter")
-        return name
-
-
-class Motion(_Part):
+class Motion(Part):
     """How clips become a tensor."""
 
     frames: Annotated[int, Field(ge=8, le=1000)] = Field(description="aligned frames T")
@@ -101,7 +86,7 @@ class Motion(_Part):
     )
 
 
-class Alignment(_Part):
+class Alignment(Part):
     """Time warping."""
 
     knots: Annotated[int, Field(ge=3, le=24)] = Field(
@@ -125,7 +110,7 @@ class Alignment(_Part):
 MIXED = (0, 1, 1)
 
 
-class Kriging(_Part):
+class Kriging(Part):
     """The field of the control coefficients."""
 
     covariance: Literal[
@@ -167,7 +152,7 @@ class Kriging(_Part):
         return (MIXED,) if self.drift == "mixed" else ((self.drift,),)
 
 
-class Event(_Part):
+class Event(Part):
     """What a motion is for: a joint that has to be in its place at one moment."""
 
     joint: Text = Field(description="the joint: a hand that reaches, a foot that lands")
@@ -176,7 +161,7 @@ class Event(_Part):
     )
 
 
-class Detail(_Part):
+class Detail(Part):
     """A level of detail below the model's own size."""
 
     times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
@@ -193,7 +178,7 @@ class Detail(_Part):
 DETAILS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
 
 
-class Size(_Part):
+class Size(Part):
     """How much of the tensor is kept: ranks, or the errors that leaving out may cost.
 
     Errors are true distances between joints, by forward kinematics; all budgets given are kept.
@@ -257,7 +242,11 @@ class Size(_Part):
         return self
 
 
-class Recipe(_Part):
+# What only a whole cycle has.
+OF_CYCLES = (*measure.TRAVELLED, "step_length")
+
+
+class Recipe(Part):
     """A whole recipe."""
 
     schema_version: Literal[1] = Field(alias="schema", description="version of this format")
@@ -269,7 +258,7 @@ class Recipe(_Part):
     )
     source: Source
     clips: Clips
-    controls: Annotated[list[ControlColumn], Field(min_length=1)]
+    controls: Annotated[list[Control], Field(min_length=1)]
     motion: Motion
     alignment: Alignment = Alignment()
     kriging: Kriging = Kriging()
@@ -281,6 +270,25 @@ class Recipe(_Part):
     )
     size: Size
 
+    @property
+    def typed(self) -> list[ControlColumn]:
+        """Controls whose values stand in the table."""
+        return [control for control in self.controls if isinstance(control, ControlColumn)]
+
+    @property
+    def measured(self) -> list[ControlMeasured]:
+        """Controls whose values are measured of the clips."""
+        return [control for control in self.controls if isinstance(control, ControlMeasured)]
+
+    def ends(self, auto: Auto) -> list[str]:
+        """Two feet of a step, or the upper and the lower end of a leg; empty for all else."""
+        if auto.quantity == "step_length":
+            return list(auto.joints or self.motion.feet)
+        if auto.quantity == "leg_length":
+            leg = [self.roles.get("leftUpperLeg"), self.roles.get("leftFoot")]
+            return list(auto.joints or filter(None, leg))
+        return []
+
     @model_validator(mode="after")
     def _label_has_a_column(self) -> "Recipe":
         if self.kriging.label and not self.clips.performer:
@@ -289,12 +297,42 @@ class Recipe(_Part):
 
     @field_validator("controls")
     @classmethod
-    def _names_differ(cls, controls: list[ControlColumn]) -> list[ControlColumn]:
+    def _names_differ(cls, controls: list[Control]) -> list[Control]:
         names = [control.name for control in controls]
         twice = {name for name in names if names.count(name) > 1}
         if twice:
             raise ValueError(f"controls named twice: {sorted(twice)}")
         return controls
+
+    @model_validator(mode="after")
+    def _controls_can_be_measured(self) -> "Recipe":
+        for control in self.measured:
+            fault = self._unmeasurable(control.auto)
+            if fault:
+                raise ValueError(f"controls.{control.name}.auto: {fault}")
+        return self
+
+    def _unmeasurable(self, auto: Auto) -> str | None:
+        """Why a quantity cannot be measured of these clips."""
+        quantity, landmarks = auto.quantity, self.clips.landmarks
+        if quantity in OF_CYCLES and not self.motion.cyclic:
+            return (
+                f"found {quantity!r} and motion.cyclic = false, expected a cycle: of a motion that "
+                "ends elsewhere it hangs on where it was cut"
+            )
+        if quantity in ("speed", "stride_length") and self.motion.root == "in_place":
+            return f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
+        if auto.at is not None and auto.at not in (*MOMENTS, *landmarks):
+            known = ", ".join(map(repr, MOMENTS))
+            return f"at: found {auto.at!r}, expected {known} or a column of {landmarks}"
+        if quantity == "step_length" and len(self.ends(auto)) != 2:
+            return f"joints: found none and motion.feet {self.motion.feet}, expected two feet"
+        if quantity == "leg_length" and len(self.ends(auto)) != 2:
+            return (
+                "joints: found none, and not both roles leftUpperLeg and leftFoot; expected the "
+                "upper end of a leg and its lower"
+            )
+        return None
 
     @field_validator("roles")
     @classmethod
@@ -343,8 +381,11 @@ def _line_of(message: str) -> int | None:
 
 def _explain(fault: ValidationError) -> str:
     lines = []
-    for error in fault.errors(include_url=False):
-        key = ".".join(str(part) for part in error["loc"]) or "recipe"
+    # A unit that was left out is not known where what is measured is not: that is said already.
+    errors = fault.errors(include_url=False)
+    for error in (one for one in errors if one["type"] != "default_factory_not_called"):
+        parts = [str(part) for part in error["loc"] if part not in (COLUMN, MEASURED)]
+        key = ".".join(parts) or "recipe"
         found = "" if error["type"] in ("missing", "value_error") else f", found {error['input']!r}"
         lines.append(f"{key}: {error['msg']}{found}")
     return "; ".join(lines)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from model_export import measured
 from model_export.align import Aligned
 from model_export.net import Net
 from service.motion import quat
@@ -25,9 +26,7 @@ def take_out(aligned: Aligned) -> tuple[Aligned, Floats]:
 
     Travel is the way to the left, the way forward, m, and the change of heading, rad.
     """
-    turned = quat.mul(aligned.rotations[:, -1, 0], quat.conj(aligned.rotations[:, 0, 0]))
-    way = aligned.root_path[:, -1] - aligned.root_path[:, 0]
-    travel = np.stack([way[:, 0], way[:, 2], quat.twist(turned, UP)], axis=1)
+    travel = measured.travel(aligned.rotations[:, :, 0], aligned.root_path)
     share = np.linspace(0.0, 1.0, aligned.rotations.shape[1])
     rotations, root_path = put_back(aligned.rotations, aligned.root_path, -travel, share)
     # All else was closed before alignment: what is left is rounding.

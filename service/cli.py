@@ -7,6 +7,7 @@ that died; 128 and a signal's number where that ended an export.
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,11 +18,12 @@ import orjson
 import typer
 
 from service import __version__, exports, page
-from service.encode import ENCODERS, Encoder, poses, reasons
+from service.encode import ENCODERS, Encoder, poses, reasons, suggestions
 from service.encode.convention import Unit, Up
+from service.export import queries
 from service.motion import card as cards
-from service.motion import files
-from service.motion.answer import ClipAnswer
+from service.motion import files, measure
+from service.motion.answer import ClipAnswer, Reasons, Trust
 from service.motion.errors import (
     FileError,
     InvalidField,
@@ -34,6 +36,8 @@ from service.motion.errors import (
 from service.motion.roles import Names
 from service.synthesis import library, pace, session, spelling
 from service.synthesis.question import ClipQuestion, Policy, Root
+from service.synthesis.suggest import COUNT, SuggestQuestion
+from service.synthesis.suggest import suggest as find_suggestions
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 from service.synthesis.why import NEAREST, WhyQuestion
@@ -44,10 +48,15 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 ModelPath = Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")]
 Controls = Annotated[
     list[str] | None,
-    typer.Option("--control", "-c", help="NAME=VALUE, once for each control", metavar="NAME=VALUE"),
+    typer.Option(
+        "--control",
+        "-c",
+        help="NAME=VALUE, once for each control; a model chooses what is left out",
+        metavar="NAME=VALUE",
+    ),
 ]
 Extrapolate = Annotated[
-    Policy, typer.Option(help="what to do with controls outside what was sampled")
+    Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
 ]
 Performer = Annotated[
     str | None, typer.Option(help="who moves, by name; somebody never seen if not said")
@@ -74,6 +83,9 @@ Targets = Annotated[
     ),
 ]
 PinFeet = Annotated[bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")]
+JointSigma = Annotated[
+    bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
+]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -152,14 +164,16 @@ def pose(
     exact: ExactControls = None,
     target: Targets = None,
     pin_feet: PinFeet = False,
+    joint_sigma: JointSigma = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
     held = spelling.hold(exact, target or (), pin_feet)
     answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
-    _warn(answer.trust.warnings)
-    typer.echo(poses.json(answer).decode())
+    _tell(answer.trust)
+    trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
+    typer.echo(poses.json(replace(answer, trust=trust)).decode())
 
 
 @app.command()
@@ -179,6 +193,7 @@ def clip(
     exact: ExactControls = None,
     target: Targets = None,
     pin_feet: PinFeet = False,
+    joint_sigma: JointSigma = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -190,11 +205,22 @@ def clip(
     controls = numbers(control or [])
     held = spelling.hold(exact, target or (), pin_feet)
     asked = ClipQuestion(
-        controls, fps, extrapolate, start, end, performer, level, names, root, loop, held
+        controls,
+        fps,
+        extrapolate,
+        start,
+        end,
+        performer,
+        level,
+        names,
+        root,
+        loop,
+        joint_sigma=joint_sigma,
+        hold=held,
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)
-    _warn(answer.trust.warnings)
+    _tell(answer.trust)
     typer.echo(wrote(output, answer, json))
 
 
@@ -279,8 +305,31 @@ def why(
     synthesizer = open_model(model)
     asked = WhyQuestion(numbers(control or []), extrapolate, performer, nearest)
     found = find_reasons(synthesizer, asked)
-    _warn(found.warnings)
+    _tell(found)
     typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
+
+
+@app.command()
+def suggest(
+    model: ModelPath,
+    count: Annotated[int, typer.Option(help="points to list")] = COUNT,
+    performer: Annotated[
+        str | None,
+        typer.Option(help="who is to be captured; if not said, clips of all count alike"),
+    ] = None,
+    candidates: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV, Parquet or JSON Lines of points that can be captured", metavar="FILE"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say which clips to capture next: where one more would be worth most, the first first."""
+    synthesizer = open_model(model)
+    given = queries.points(candidates, synthesizer) if candidates else ()
+    found = find_suggestions(synthesizer, SuggestQuestion(count, performer, given))
+    typer.echo(as_json(suggestions.plain(found)) if json else suggestions.text(found))
 
 
 app.command()(exports.export)
@@ -386,8 +435,12 @@ def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
     )
 
 
-def _warn(warnings: Sequence[str]) -> None:
-    for warning in warnings:
+def _tell(found: Trust | Reasons) -> None:
+    """Say on standard error what was chosen for whoever asked, and what to beware of."""
+    if found.inferred:
+        chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)
+        typer.echo(f"inferred: {chosen}, most typical for what was given", err=True)
+    for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
 
 
@@ -402,6 +455,14 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
         f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
         f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
     )
+
+
+def _control(plain: dict[str, Any], joints: list[str]) -> str:
+    """A control in a line: what of it was sampled, and how it is measured where it is."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
+    own = plain.get("measure")
+    how = f" (measured: {measure.words(measure.parse(own), joints)})" if own else ""
+    return f"  {plain['name']}: {span}, {plain['description']}{how}"
 
 
 def _summary(plain: dict[str, Any]) -> str:
@@ -419,10 +480,7 @@ def _summary(plain: dict[str, Any]) -> str:
         f"levels of detail, times in batches of {pace.BATCH}:",
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
-        *(
-            f"  {c['name']}: {c['minimum']:g} to {c['maximum']:g} {c['unit']}, {c['description']}"
-            for c in plain["controls"]
-        ),
+        *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
         *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),

@@ -42,7 +42,7 @@ def export(
     level: Annotated[int, typer.Option(help="of detail, where a row says none")] = 0,
     performer: Annotated[str | None, typer.Option(help="who moves, where a row says none")] = None,
     extrapolate: Annotated[
-        Policy, typer.Option(help="what to do with controls outside what was sampled")
+        Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
     ] = POLICY,
     names: Annotated[Names, typer.Option(help="what joints are called")] = NAMES,
     root: Annotated[Root, typer.Option(help="travelling, or in place")] = ROOT,
@@ -164,7 +164,9 @@ def _said(place: str, outcome: Outcome, look: Look) -> str:
     facts = outcome.facts
     said = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
-        said += f", {facts['warned']} of them outside what was sampled or out of reach"
+        said += (
+            f", {facts['warned']} of them outside what was sampled, in a gap of it or out of reach"
+        )
     if facts["skipped"]:
         said += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
     if outcome.before:

@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -122,6 +123,21 @@ def walk_path(strides: list[Example], tmp_path_factory: pytest.TempPathFactory) 
     trained = train.train(stroll.recipe(), strides, lambda _: None)
     path = tmp_path_factory.mktemp("walk") / "stroll.onnx"
     path.write_bytes(export.export(stroll.recipe(), trained, []).content)
+    return path
+
+
+@pytest.fixture(scope="session")
+def measured_walk_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The procedural walk with its speed and turn measured as a file, measured.onnx."""
+    asked = [
+        {"name": name, "auto": {"quantity": name}, "description": name}
+        for name in ("speed", "turn")
+    ]
+    own = Recipe.model_validate({**tomllib.loads(stroll.TOML), "controls": asked})
+    found, _ = ingest.ingest(own, stroll.write(tmp_path_factory.mktemp("measured")))
+    trained = train.train(own, found, lambda _: None)
+    path = tmp_path_factory.mktemp("models") / "measured.onnx"
+    path.write_bytes(export.export(own, trained, []).content)
     return path
 
 

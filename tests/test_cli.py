@@ -325,7 +325,6 @@ def test_pose_without_a_time_is_the_first(posefield, model_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (CONTROLS[:-2], "controls/target_height: missing; give a number in m"),
         ([*CONTROLS, "-c", "speed=1"], "controls/speed: no such control; this model has stature"),
         ([*CONTROLS[:-1], "target_height=high"], "controls/target_height: 'high', expected a num"),
         ([*CONTROLS[:-1], "target_height=nan"], "controls/target_height: nan, expected a finite"),
@@ -336,6 +335,20 @@ def test_pose_without_a_time_is_the_first(posefield, model_path):
 )
 def test_a_question_without_an_answer_is_refused_with_code_2(refused, model_path, words, said):
     assert refused(2, "pose", model_path, *words).startswith(said)
+
+
+def test_controls_left_out_are_chosen_and_said(posefield, model_path):
+    code, out, err = posefield("pose", model_path, *CONTROLS[:-2])
+    trust = json.loads(out)["trust"]
+    assert (code, trust["inferred"]) == (0, ["target_height"])
+    chosen = f"target_height={trust['controls']['target_height']!r}"
+    assert err == f"inferred: {chosen}, most typical for what was given\n"
+    # What was said is what can be asked for, with the same answer.
+    code, again, err = posefield("pose", model_path, *CONTROLS[:-2], "-c", chosen)
+    assert (code, err) == (0, "")
+    whole, asked = json.loads(out), json.loads(again)
+    assert whole["trust"].pop("inferred") and "inferred" not in asked["trust"]
+    assert whole == asked
 
 
 OUTSIDE = [*CONTROLS[:-1], "target_height=2.5"]
@@ -379,6 +392,13 @@ def test_an_unknown_performer_is_refused_with_code_2(refused, labelled_path, mod
     assert not path.exists()
     none = "performer: 'ada', expected none: this model knows none"
     assert refused(2, "pose", model_path, *words) == none
+
+
+def test_inspect_says_how_controls_are_measured(posefield, measured_walk_path, model_path):
+    out = posefield("inspect", measured_walk_path)[1]
+    assert " m/s, speed (measured: speed)\n" in out
+    assert " deg, turn (measured: turn)\n" in out
+    assert "measured" not in posefield("inspect", model_path)[1]
 
 
 def test_inspect_lists_the_performers_there_are(posefield, labelled_path, model_path):
@@ -473,7 +493,7 @@ FAILING = {
     "a rate of zero": [*CONTROLS, "--fps", "0"],
     "a rate of ten thousand": [*CONTROLS, "--fps", "10000"],
     "an end before the start": [*CONTROLS, "--start", "0.5", "--end", "0.1"],
-    "a control that is missing": CONTROLS[:-2],
+    "a control that there is not": [*CONTROLS, "--control", "speed=1"],
     "outside the samples": [*OUTSIDE, "--extrapolate", "refuse"],
 }
 

@@ -40,6 +40,7 @@ ANSWERS = (
     "ModelCard",
     "Trust",
     "Reasons",
+    "Suggestions",
     "ManifestEntry",
     "Liveness",
     "Readiness",

@@ -34,7 +34,7 @@ class Errors:
     there is none. acceleration: mean size of
     the synthesised motion's over the captured one's, at equal durations. skate and skate_captured:
     mean speed, m/s, of feet on the ground. duration: logarithm of synthesised over captured.
-    squared: mean squared absolute distance, m².
+    squared: mean squared absolute distance, m². joints (J,): of each joint, m².
     """
 
     relative: Distances
@@ -47,6 +47,7 @@ class Errors:
     skate: float
     skate_captured: float
     duration: float
+    joints: Floats
 
     @property
     def squared(self) -> float:
@@ -66,10 +67,11 @@ def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
         _distances(_apart(own, true)),
         _distances(np.linalg.norm(_rooted(warped) - _rooted(true), axis=-1)[:, :, 1:].max(axis=2)),
         _effector(made.event, captured.event),
-        _acceleration(own) / _acceleration(true),
+        acceleration(own) / acceleration(true),
         skate(made, feet),
         skate(captured, feet),
         float(np.log(made.duration / captured.duration)),
+        np.mean(np.square(_apart(warped, true)), axis=0),
     )
 
 
@@ -102,7 +104,8 @@ def _distances(apart: Floats) -> Distances:
     return Distances(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
 
 
-def _acceleration(points: Floats) -> float:
+def acceleration(points: Floats) -> float:
+    """Mean size of a motion's second differences (FRAMES, J, 4, 3), its root taken out, m."""
     joints = _rooted(points)[:, 1:, 0]
     return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
 
@@ -133,6 +136,7 @@ def mean(errors: Sequence[Errors]) -> Errors:
         skate=average("skate"),
         skate_captured=average("skate_captured"),
         duration=float(np.sqrt(np.mean(np.square([error.duration for error in errors])))),
+        joints=np.mean([error.joints for error in errors], axis=0),
     )
 
 

@@ -27,10 +27,10 @@ class Order:
 
     @property
     def warnings(self) -> list[str]:
-        """A sentence if some clips are extrapolated, and one if some miss a target; the manifest
-        says which."""
+        """A sentence if some clips are like nothing that was captured, and one if some miss a
+        target; the manifest says which."""
         counts = {
-            "have some control outside what was sampled": sum(
+            "lie outside what was sampled, or in a gap of it": sum(
                 bool(prospect.warnings) for prospect in self.prospects
             ),
             "miss some target": sum(prospect.missed for prospect in self.prospects),

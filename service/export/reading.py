@@ -108,7 +108,8 @@ class Reading:
             table = Table(block, block.values())
         except ValueError:
             return None
-        sound = bounds.pass_all(self.model.session.card, table.values, self.usual.question)
+        card, support = self.model.session.card, self.model.door.support
+        sound = bounds.pass_all(card, support, table.values, self.usual.question)
         return table if sound else None
 
     def _alone(self, block: Block) -> Table | Fault:

@@ -4,7 +4,7 @@ Where a joint is at a moment, how far apart the feet get, how far and how fast a
 large the performer is. The same definitions measure captured clips and answers.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -146,6 +146,15 @@ def _stature(seen: Seen) -> float:
     still[:, 0] = 1.0
     positions, _ = skeleton.forward(seen.parents, still, seen.offsets)
     return float(np.ptp(positions[:, 1]))
+
+
+def words(measure: Measure, names: Sequence[str]) -> str:
+    """A measure in words: "height of rhand at end". names: of all joints."""
+    own = " and ".join(names[joint] for joint in measure.joints)
+    of = f" of {own}" if own else ""
+    at = f" at {measure.at}" if measure.at else ""
+    when = "" if measure.share is None else f" ({measure.share:.0%})"
+    return f"{measure.quantity.replace('_', ' ')}{of}{at}{when}"
 
 
 def plain(measure: Measure) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def _fixed(card: ModelCard, asked: GridQuestion) -> dict[str, float]:
     """Values of the controls that are no axes, in the card's order."""
     usual = {control.name: control.default for control in card.controls} | dict(asked.controls)
     return {
-        control.name: door.required(control, usual)
+        control.name: door.checked(control, usual[control.name])
         for control in card.controls
         if control.name not in (asked.across, asked.along)
     }

@@ -150,9 +150,14 @@ class Session:
         assert own.kriging is not None
         low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
         points = field.half_ranges(np.array(own.examples), low, high)
-        who = np.array(own.moved_by or [0] * len(points))
-        labels = np.eye(max(len(own.performers), 1), len(own.performers))[who]
-        return Weigher(own.kriging, np.hstack([points, labels]))
+        return Weigher(own.kriging, np.hstack([points, self.who]))
+
+    @cached_property
+    def who(self) -> Floats:
+        """Labels (n, p) of who moved in each captured clip."""
+        own = self.card
+        moved = np.array(own.moved_by or [0] * len(own.examples))
+        return np.eye(max(len(own.performers), 1), len(own.performers))[moved]
 
     @property
     def memory(self) -> int:
@@ -194,9 +199,14 @@ def read(path: Path) -> bytes:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
 
 
+def sha256(content: bytes) -> str:
+    """SHA-256 of a model file, in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
 def digest(content: bytes) -> str:
     """What a model file is told by."""
-    return hashlib.sha256(content).hexdigest()[:16]
+    return sha256(content)[:16]
 
 
 def open_bytes(content: bytes, source: str) -> Session:

@@ -47,6 +47,9 @@ class Moments:
         return self.question.level
 
 
+OLD = "does not say how far its joints err; train it again"
+MICROMETRES = 6
+"""Decimals of a metre."""
 SAMPLE = 17
 """Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
 
@@ -101,9 +104,11 @@ class Synthesizer:
         return {"own": self.session.card.skeleton}
 
     def _joints(self, asked: ClipQuestion) -> Skeleton:
-        """The skeleton with the names asked for; InvalidField for names that no role leads to, and
-        for a loop of what is no cycle."""
+        """The skeleton with the names asked for; InvalidField for names that no role leads to, for
+        a loop of what is no cycle, and for sigma by joint of a model that cannot say."""
         card = self.session.card
+        if asked.joint_sigma:
+            self._shares()
         if asked.loop and not card.cyclic:
             raise InvalidField(
                 "loop", "true, expected false: this model's last pose does not lead into its first"
@@ -125,10 +130,10 @@ class Synthesizer:
         somebody who was never seen, at a level of detail, of a motion that is held to something.
 
         Raises InvalidField for a control, time, performer or level that cannot be used, or for what
-        the motion cannot be held to; where `extrapolate` is "refuse", OutsideSamples for a control
-        outside its sampled range and OutOfReach for a goal that is missed.
+        the motion cannot be held to; where `extrapolate` is "refuse", OutsideSamples where nothing
+        like the controls was captured and OutOfReach for a goal that is missed.
         """
-        asked = self.moments(controls, times, extrapolate, performer, level)
+        asked = self.moments(controls, times, extrapolate, performer, level, hold)
         goals = self.keeper.goals(asked.question, hold)
         if goals:
             return self.held_poses(asked, goals, extrapolate)
@@ -141,7 +146,8 @@ class Synthesizer:
         question = asked.question
         held = self._meeting(question, goals, extrapolate)
         self._check_times(asked, self._sensible(held.duration))
-        return self.keeper.poses(question, held, asked.when, self._held_trust(question, held))
+        trust = self._held_trust(question, held, extrapolate)
+        return self.keeper.poses(question, held, asked.when, trust)
 
     def moments(
         self,
@@ -150,9 +156,10 @@ class Synthesizer:
         extrapolate: Policy,
         performer: str | None = None,
         level: int = 0,
+        hold: Hold = HOLD,
     ) -> Moments:
         """The question of `pose` as far as it can be checked before the model is asked."""
-        question = self.door.question(controls, extrapolate, performer, level)
+        question = self.question(controls, extrapolate, performer, level, hold)
         if not 1 <= len(times) <= course.MOST_POSES:
             raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
         when = [limits.number(f"times/{i}", value) for i, value in enumerate(times)]
@@ -215,7 +222,7 @@ class Synthesizer:
         """A question at a share of each control's range, and of the shortest clip."""
         card = self.session.card
         controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
-        return self.moments(controls, [share * card.durations[0]], "warn", None, level)
+        return self.moments(controls, [share * card.durations[0]], "ok", None, level)
 
     def posed(self, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
         """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
@@ -244,7 +251,20 @@ class Synthesizer:
         else:
             answer = self._plain(question, asked, most)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
+        trust = self.by_joint(answer.trust) if asked.joint_sigma else answer.trust
+        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), trust)
+
+    def by_joint(self, trust: Trust) -> Trust:
+        """The same with sigma of each joint; InvalidField for a model that cannot say."""
+        joints = (round(share * trust.sigma, MICROMETRES) for share in self._shares())
+        return replace(trust, joint_sigma=tuple(joints))
+
+    def _shares(self) -> tuple[float, ...]:
+        """Sigma of each joint as a share of sigma."""
+        found = self.session.card.joint_sigma
+        if not found:
+            raise InvalidField("joint_sigma", f"true, but {self.identity} {OLD}")
+        return found
 
     def _plain(self, question: Question, asked: ClipQuestion, most: int) -> PoseAnswer[np.float64]:
         """Frames of a clip that is held to nothing."""
@@ -267,7 +287,7 @@ class Synthesizer:
         """Frames of a clip that is held to something."""
         held = self._meeting(question, goals, asked.extrapolate)
         when = course.times(asked, self._sensible(held.duration), most)
-        trust = self._held_trust(question, held)
+        trust = self._held_trust(question, held, asked.extrapolate)
         answer = self.keeper.poses(question, held, when, trust)
         routed = asked.loop or asked.root == "in_place"
         return self._routed(answer, strides.of(held), asked) if routed else answer
@@ -294,8 +314,25 @@ class Synthesizer:
         return Prospect(len(times) + asked.loop, question.warnings, misses)
 
     def _asked(self, asked: ClipQuestion) -> Question:
-        who, level = asked.performer, asked.level
-        return self.door.question(asked.controls, asked.extrapolate, who, level)
+        who, level, policy = asked.performer, asked.level, asked.extrapolate
+        return self.question(asked.controls, policy, who, level, asked.hold)
+
+    def question(
+        self,
+        controls: Mapping[str, float],
+        extrapolate: Policy,
+        performer: str | None,
+        level: int,
+        hold: Hold,
+    ) -> Question:
+        """The question, its open controls as is most typical for those given and for its targets;
+        raises as the door does."""
+        asked = self.door.question(controls, extrapolate, performer, level)
+        found = self.keeper.controls(asked, hold, self.door.chooser)
+        if found is None:
+            return asked
+        every = self.door.question(found, extrapolate, performer, level)
+        return replace(every, inferred=asked.inferred)
 
     def _outlook(self, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
         """Seconds that a clip takes, which a speed that it is held to changes, and whether it
@@ -341,23 +378,26 @@ class Synthesizer:
         return PoseAnswer(when, rotations, root, offsets, trust)
 
     def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
-        controls, warnings = question.controls, question.warnings
-        who, level = question.performer, question.level
+        who = question.performer
+        seen = who is not None if self.session.card.performers else None
         return Trust(
             self.identity,
-            controls,
+            question.controls,
             duration,
             sigma,
-            warnings,
+            question.warnings,
             who,
-            level,
+            question.level,
+            question.supported,
+            seen,
             inferred=question.inferred,
         )
 
-    def _held_trust(self, question: Question, held: Held) -> Trust:
+    def _held_trust(self, question: Question, held: Held, extrapolate: Policy) -> Trust:
         own = self._trust(question, held.duration, held.state.sigma)
         measured = self.keeper.measured(question, held)
-        warnings = (*own.warnings, *missed.sentences(held.met))
+        said = () if extrapolate == "ok" else missed.sentences(held.met)
+        warnings = (*own.warnings, *said)
         return replace(own, warnings=warnings, measured=measured, targets=held.met)
 
     def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:

@@ -37,6 +37,7 @@ from service.web import (
     query,
     sending,
     sigma_operations,
+    suggestion_operations,
     walk_query,
     why_operations,
 )
@@ -151,6 +152,7 @@ _FIXED: dict[str, Handler] = {
     **pose_operations.OPERATIONS,
     **sigma_operations.OPERATIONS,
     **why_operations.OPERATIONS,
+    **suggestion_operations.OPERATIONS,
     **inference.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},

@@ -49,13 +49,14 @@ FLAGS = {"true": True, "false": False}
 @dataclass(frozen=True)
 class PoseQuestion:
     """Which poses: control values and times, s, who moves, nobody that was seen for none, the
-    level of detail, and what the motion is held to."""
+    level of detail, whether sigma is asked for by joint, and what the motion is held to."""
 
     controls: dict[str, float]
     times: list[float]
     extrapolate: Policy
     performer: str | None = None
     level: int = 0
+    joint_sigma: bool = False
     hold: Hold = HOLD
 
 
@@ -89,6 +90,7 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     extrapolate: Policy = POLICY
     performer: str | None = None
     level: float = 0.0
+    joint_sigma: bool = False
     exact: ExactBody = "auto"
     targets: list[TargetBody] = []
     pin_feet: bool = False
@@ -107,6 +109,7 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+    joint_sigma: bool = False
     exact: ExactBody = "auto"
     targets: list[TargetBody] = []
     pin_feet: bool = False
@@ -143,8 +146,8 @@ def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
     single = unique([pair for pair in pairs if pair[0] not in ("time", "target")])
     policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
-    hold = _hold_of_pairs(pairs, single)
-    return PoseQuestion(numbers_of(single), times, policy, performer, level, hold)
+    by_joint, hold = _flag(single, "joint_sigma"), _hold_of_pairs(pairs, single)
+    return PoseQuestion(numbers_of(single), times, policy, performer, level, by_joint, hold)
 
 
 def file_of_pairs(pairs: Pairs) -> FileQuestion:
@@ -181,7 +184,7 @@ def _clip_of_single(single: dict[str, str], hold: Hold) -> ClipQuestion:
     level = whole("level", single.pop("level", "0"))
     names = _word(single, "names", _choices(Names), NAMES)
     root = _word(single, "root", _choices(Root), ROOT)
-    loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
+    loop, by_joint = _flag(single, "loop"), _flag(single, "joint_sigma")
     numbers = numbers_of(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -194,6 +197,7 @@ def _clip_of_single(single: dict[str, str], hold: Hold) -> ClipQuestion:
         names=names,
         root=root,
         loop=loop,
+        joint_sigma=by_joint,
         hold=hold,
     )
 
@@ -203,7 +207,8 @@ def pose_of_body(content: bytes) -> PoseQuestion:
     body = decoding.decoded(_POSE, content)
     controls = controls_of(body.controls)
     level, hold = _level(body.level), _hold(body)
-    return PoseQuestion(controls, body.times, body.extrapolate, body.performer, level, hold)
+    policy, who, by_joint = body.extrapolate, body.performer, body.joint_sigma
+    return PoseQuestion(controls, body.times, policy, who, level, by_joint, hold)
 
 
 def file_of_body(content: bytes) -> FileQuestion:
@@ -225,6 +230,7 @@ def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
         body.names,
         body.root,
         body.loop,
+        body.joint_sigma,
         _hold(body, *within),
     )
 
@@ -269,6 +275,11 @@ def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Wo
     if text is not usual and text not in choices:
         raise bad_parameter(name, f"{text!r}, expected one of {', '.join(choices)}")
     return cast(Word, text)
+
+
+def _flag(single: dict[str, str], name: str) -> bool:
+    """What is said under that name, which is taken out; false where nothing is."""
+    return FLAGS[_word(single, name, tuple(FLAGS), "false")]
 
 
 def numbers_of(texts: dict[str, str]) -> dict[str, float]:

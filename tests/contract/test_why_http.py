@@ -51,7 +51,7 @@ def test_what_lies_outside_is_warned_of_or_refused(ask, controls):
         ({"nearest": "all"}, 400, "/nearest"),
         ({"performer": "nobody"}, 422, "/performer"),
         ({"time": 0}, 400, "/time"),
-        ({"controls": {}}, 422, "/controls/stature"),
+        ({"controls": {"spin": 1}}, 422, "/controls/spin"),
     ],
 )
 def test_a_wrong_body_is_pointed_at(change, status, pointer, ask, controls):

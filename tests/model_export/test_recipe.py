@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 from minimal import TOML
 
-from model_export import recipe
+from model_export import controls, recipe
 from model_export.covariance import COVARIANCES
 from service.motion.errors import RecipeError
 
@@ -22,6 +22,15 @@ column = "w"
 unit = "m"
 description = "Another"
 """
+COLUMN = 'column = "v"\nunit = "m/s"\n'
+
+
+def measured(auto, changes=()):
+    """The least recipe with its control measured; changes: pairs of texts, old and new."""
+    text = MINIMAL.replace(COLUMN, f"auto = {auto}\n")
+    for old, new in changes:
+        text = text.replace(old, new)
+    return text
 
 
 @pytest.fixture
@@ -255,7 +264,7 @@ def test_an_event_may_be_at_a_landmark(read):
 
 
 def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):
-    for name in recipe.RESERVED:
+    for name in controls.RESERVED:
         with pytest.raises(RecipeError, match=f"controls.0.name.*'{name}'"):
             read(MINIMAL.replace('"speed"', f'"{name}"'))
     assert read(MINIMAL.replace('"speed"', '"pace"')).controls[0].name == "pace"
@@ -288,6 +297,144 @@ def test_text_that_is_not_utf_8_is_refused(read):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(RecipeError, match=r"none\.toml: cannot be read: No such file"):
         recipe.read(tmp_path / "none.toml")
+
+
+CYCLE = ("cyclic = false", "cyclic = true")
+ROLE = ("[size]", '[roles]\nleftUpperLeg = "a"\n[size]')
+# How a control is measured, what else is changed, and what the message must hold.
+UNMEASURABLE = {
+    "unknown quantity": (
+        '{ quantity = "pace" }',
+        [],
+        ["controls.0.auto.quantity", "'left'", "'root_height'", "found 'pace'"],
+    ),
+    "no quantity": ('{ at = "end" }', [], ["controls.0.auto.quantity", "required"]),
+    "unknown key": ('{ quantity = "stature", bone = "a" }', [], ["controls.0.auto.bone"]),
+    "a place without a joint": (
+        '{ quantity = "height", at = "end" }',
+        [],
+        ["controls.0.auto", "found at besides quantity 'height', expected joint and at"],
+    ),
+    "a place without a moment": (
+        '{ quantity = "left", joint = "a" }',
+        [],
+        ["found joint besides quantity 'left', expected joint and at"],
+    ),
+    "the root of another joint": (
+        '{ quantity = "root_height", joint = "a", at = "end" }',
+        [],
+        ["found joint and at besides quantity 'root_height', expected at"],
+    ),
+    "the root away from itself": (
+        '{ quantity = "root_height", at = "farthest" }',
+        [],
+        ["at: found 'farthest', but the root is never away from itself"],
+    ),
+    "a speed of a joint": (
+        '{ quantity = "speed", joint = "a" }',
+        [CYCLE],
+        ["found joint besides quantity 'speed', expected nothing"],
+    ),
+    "a step at a moment": (
+        '{ quantity = "step_length", at = "end" }',
+        [CYCLE],
+        ["found at besides quantity 'step_length', expected joints or nothing"],
+    ),
+    "three feet": (
+        '{ quantity = "step_length", joints = ["a", "b", "c"] }',
+        [CYCLE],
+        ["controls.0.auto.joints", "at most 2"],
+    ),
+    "no joints in a list": (
+        '{ quantity = "left", joint = [], at = "end" }',
+        [],
+        ["controls.0.auto.joint", "at least 1"],
+    ),
+    "a moment that no landmark is": (
+        '{ quantity = "left", joint = "a", at = "hit" }',
+        [("file = ", 'landmarks = ["strike"]\nfile = ')],
+        ["controls.speed.auto: at: found 'hit', expected 'start', 'end'", "column of ['strike']"],
+    ),
+    "a speed of no cycle": (
+        '{ quantity = "speed" }',
+        [],
+        ["controls.speed.auto: found 'speed' and motion.cyclic = false, expected a cycle"],
+    ),
+    "a turn of no cycle": ('{ quantity = "turn" }', [], ["found 'turn' and motion.cyclic"]),
+    "a stride of no cycle": ('{ quantity = "stride_length" }', [], ["motion.cyclic = false"]),
+    "a step of no cycle": (
+        '{ quantity = "step_length", joints = ["a", "b"] }',
+        [],
+        ["found 'step_length' and motion.cyclic = false"],
+    ),
+    "a speed in place": (
+        '{ quantity = "speed" }',
+        [CYCLE, ("travelling", "in_place")],
+        ["found 'speed' and motion.root = 'in_place', expected one that travels"],
+    ),
+    "a step of nobody knows which feet": (
+        '{ quantity = "step_length" }',
+        [CYCLE],
+        ["joints: found none and motion.feet [], expected two feet"],
+    ),
+    "a leg of nobody knows which": (
+        '{ quantity = "leg_length" }',
+        [ROLE],
+        ["found none, and not both roles leftUpperLeg and leftFoot"],
+    ),
+    "another unit": (
+        '{ quantity = "turn" }\nunit = "rad"',
+        [CYCLE],
+        ["controls.0", "unit: found 'rad', expected 'deg', in which turn is measured, or no unit"],
+    ),
+    "both a column and a measure": (
+        '{ quantity = "stature" }\ncolumn = "v"',
+        [],
+        ["controls.0: expected either column, where its values stand, or auto"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", UNMEASURABLE)
+def test_what_cannot_be_measured_is_refused_by_key_found_and_expected(read, fault):
+    auto, changes, said = UNMEASURABLE[fault]
+    with pytest.raises(RecipeError) as caught:
+        read(measured(auto, changes))
+    for words in said:
+        assert words in str(caught.value)
+    assert "(auto)" not in str(caught.value)
+    assert "default factory" not in str(caught.value)
+
+
+def test_neither_a_column_nor_a_measure_is_refused(read):
+    with pytest.raises(RecipeError, match=r"controls\.0: expected either column, .* or auto"):
+        read(MINIMAL.replace('column = "v"\n', ""))
+
+
+@pytest.mark.parametrize(
+    ("auto", "unit"),
+    [
+        ('{ quantity = "left", joint = ["a", "b"], at = "farthest" }', "m"),
+        ('{ quantity = "height", joint = "a", at = "strike" }', "m"),
+        ('{ quantity = "root_height", at = "lowest" }\nunit = "m"', "m"),
+        ('{ quantity = "speed" }', "m/s"),
+        ('{ quantity = "turn" }\nunit = "deg"', "deg"),
+        ('{ quantity = "step_length" }', "m"),
+        ('{ quantity = "leg_length", joints = ["a", "b"] }', "m"),
+        ('{ quantity = "stature" }', "m"),
+    ],
+)
+def test_what_is_measured_knows_its_unit_and_keeps_the_schema(read, schema, auto, unit):
+    changes = [
+        CYCLE,
+        ("file = ", 'landmarks = ["strike"]\nfile = '),
+        ("[size]", 'feet = ["a", "b"]\n[size]'),
+    ]
+    text = measured(auto, changes)
+    found = read(text)
+    assert [control.unit for control in found.measured] == [unit]
+    assert found.typed == []
+    jsonschema.Draft202012Validator(schema).validate(tomllib.loads(text))
 
 
 def test_the_published_schema_is_the_one_of_the_code():

@@ -24,6 +24,7 @@ from posefield_client.generated import (
     ModelCard,
     NamedClipQuestion,
     Reasons,
+    Suggestions,
     Target,
     Trust,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "Saved",
     "Saving",
     "SigmaGrid",
+    "Suggestions",
     "Target",
     "Trust",
     "errors",

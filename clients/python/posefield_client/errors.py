@@ -157,7 +157,7 @@ class InvalidField(Unanswerable, kind="invalid-field"):
 
 
 class OutsideSamples(Unanswerable, kind="outside-samples"):
-    """The controls lie outside what was sampled, and `extrapolate` is "refuse"."""
+    """Nothing like the controls was captured, and `extrapolate` is "refuse"."""
 
 
 class OutOfReach(Unanswerable, kind="out-of-reach"):

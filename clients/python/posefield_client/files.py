@@ -73,6 +73,7 @@ def clip(
     level: int | None = None,
     performer: str | None = None,
     names: Names | None = None,
+    joint_sigma: bool | None = None,
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
     extrapolate: Extrapolate | None = None,
@@ -87,6 +88,7 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
+        **asking.said(joint_sigma=joint_sigma),
         **holding.said(exact, targets, pin_feet),
     )
     return Files(CLIP, lambda ending: asking.either(f"Clip{ending}", model, question))

@@ -42,9 +42,10 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     controls: dict[str, float]
     times: tuple[float, ...]
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
     pin_feet: bool | UnsetType = UNSET
@@ -57,9 +58,10 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
@@ -78,9 +80,10 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
@@ -130,7 +133,7 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     pixels: float | UnsetType | None = UNSET
     budget_ms: float | UnsetType | None = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
 
 
 class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -150,7 +153,7 @@ class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     controls: dict[str, float]
     nearest: int | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
 
 
@@ -169,10 +172,8 @@ class ModelList(Struct, frozen=True, kw_only=True):
     models: tuple[ModelSummary, ...]
 
 
-class ControlMeasure(Struct, frozen=True, kw_only=True):
-    """How it is measured on a motion; absent where it is not, and then no motion can be held
-    to it.
-    """
+class Measure(Struct, frozen=True, kw_only=True):
+    """How a control is read off a motion; a control that somebody typed has none. Since 2.2.0."""
 
     quantity: str
     joints: tuple[int, ...] = ()
@@ -190,7 +191,7 @@ class Control(Struct, frozen=True, kw_only=True):
     maximum: float
     default: float
     values: tuple[float, ...]
-    measure: ControlMeasure | None = None
+    measure: Measure | None = None
 
 
 class Skeleton(Struct, frozen=True, kw_only=True):
@@ -268,6 +269,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     provenance: dict[str, Any]
     roles: dict[str, str]
     sources: tuple[str, ...]
+    joint_sigma: tuple[float, ...] = ()
     kriging: ModelCardKriging | None
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
@@ -291,10 +293,23 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
     measured: dict[str, float] = {}
     targets: tuple[Met, ...] = ()
+
+
+class Backing(Struct, frozen=True, kw_only=True):
+    """Whether anything like these controls was captured, and by what that was told."""
+
+    supported: bool
+    beyond: dict[str, float]
+    most_beyond: float
+    variance: float
+    most_variance: float
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -325,8 +340,30 @@ class Reasons(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
+    inferred: tuple[str, ...] = ()
+    support: Backing
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
+
+
+class Suggestion(Struct, frozen=True, kw_only=True):
+    """Schema Suggestion of the contract."""
+
+    controls: dict[str, float]
+    gain: float
+    variance: float
+    nearest: str | None
+    lacking: str
+    gap: float
+
+
+class Suggestions(Struct, frozen=True, kw_only=True):
+    """Each point is ranked as if those before it had been captured already."""
+
+    model: str
+    performer: str | None
+    candidates: int
+    suggestions: tuple[Suggestion, ...]
 
 
 class ManifestEntry(Struct, frozen=True, kw_only=True):
@@ -344,6 +381,9 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
     measured: dict[str, float] = {}
@@ -566,6 +606,7 @@ OPERATIONS = {
         Operation("getCrowdUsdz", "GET", "/v1/models/{model}/crowd.usdz", ("model/vnd.usdz+zip",)),
         Operation("getWhy", "GET", "/v1/models/{model}/why", ("application/json",)),
         Operation("queryWhy", "POST", "/v1/models/{model}/why", ("application/json",)),
+        Operation("getSuggestions", "GET", "/v1/models/{model}/suggestions", ("application/json",)),
         Operation(
             "getSigma",
             "GET",

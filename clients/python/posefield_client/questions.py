@@ -21,6 +21,7 @@ from posefield_client.generated import (
     Readiness,
     Reasons,
     SigmaQuestion,
+    Suggestions,
     WhyQuestion,
 )
 from posefield_client.holding import Exact, Targets
@@ -29,7 +30,7 @@ from posefield_client.wire import Call, Reply, Request
 
 T = TypeVar("T")
 
-Extrapolate = Literal["warn", "refuse"]
+Extrapolate = Literal["ok", "warn", "refuse"]
 Controls = Mapping[str, float]
 Times = float | Sequence[float] | npt.NDArray[Any]
 
@@ -61,6 +62,7 @@ def pose(
     *,
     performer: str | None = None,
     level: int | None = None,
+    joint_sigma: bool | None = None,
     extrapolate: Extrapolate | None = None,
     exact: Exact | None = None,
     targets: Targets | None = None,
@@ -73,6 +75,7 @@ def pose(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
+        **asking.said(joint_sigma=joint_sigma),
         **holding.said(exact, targets, pin_feet),
     )
     return Call(asking.either("PoseMsgpack", model, question), numbers.pose)
@@ -94,6 +97,14 @@ def why(
         **asking.said(nearest=nearest, extrapolate=extrapolate, performer=performer),
     )
     return Call(asking.either("Why", model, question), _REASONS)
+
+
+def suggest(
+    model: str, /, *, count: int | None = None, performer: str | None = None
+) -> Call[Suggestions]:
+    """Which clips to capture next; performer: who is to be captured."""
+    words = asking.said(count=count, performer=performer)
+    return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
 
 
 def sigma(
@@ -131,6 +142,7 @@ class _Json:
 
 _LIVENESS, _READINESS = _Json(Liveness), _Json(Readiness)
 _CARD, _REASONS, _LIST = _Json(ModelCard), _Json(Reasons), _Json(ModelList)
+_SUGGESTIONS = _Json(Suggestions)
 
 
 def _models(reply: Reply) -> tuple[ModelSummary, ...]:

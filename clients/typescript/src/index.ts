@@ -37,6 +37,7 @@ export type {
   SigmaGrid,
   SigmaQuestion,
   Target,
+  Suggestions,
   Transfer,
   TransferOptions,
   Trust,

@@ -777,6 +777,32 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/models/{model}/suggestions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description A model's name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        /**
+         * Get which clips to capture next
+         * @description Points within what was sampled at which one more captured clip would say most of what is asked of the model, the one that is worth most first.
+         */
+        get: operations["getSuggestions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/models/{model}/sigma": {
         parameters: {
             query?: never;
@@ -1325,6 +1351,11 @@ export interface components {
          */
         Loop: boolean;
         /**
+         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer.
+         * @default false
+         */
+        JointSigma: boolean;
+        /**
          * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that the
          *     model can measure on a motion: they have a `measure` on its card), `none`, or their names. The
          *     motion is the nearest to the predicted one, as captured motions stray from predictions, that
@@ -1394,11 +1425,13 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
-         * @description What to do with controls outside what was sampled, and with targets out of reach.
+         * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
+         *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
+         *     a gap of what was sampled, and one for each target out of reach; `refuse` answers none of these.
          * @default warn
          * @enum {string}
          */
-        Extrapolate: "warn" | "refuse";
+        Extrapolate: "ok" | "warn" | "refuse";
         /**
          * @description Who moves, of the `performers` that the model's card names; null for somebody who was never seen.
          * @default null
@@ -1412,7 +1445,8 @@ export interface components {
          */
         LevelNumber: number;
         /**
-         * @description A number for each control of the model, in the control's unit.
+         * @description A number for each control of the model, in the control's unit. In a question some or all of them
+         *     may be left out, of a crowd none: they are then the most typical for those that are given and for the performer.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -1436,6 +1470,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
             pin_feet?: components["schemas"]["PinFeet"];
@@ -1460,6 +1495,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
@@ -1487,8 +1523,10 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Who was asked for; null for somebody who was never seen. */
             performer: string | null;
-            /** @description One sentence for each control outside what was sampled. */
+            /** @description As in Trust. */
             warnings: string[];
+            inferred?: components["schemas"]["Inferred"];
+            support: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1496,6 +1534,42 @@ export interface components {
                 count: number;
                 weight: number;
             };
+        };
+        /** @description Whether anything like these controls was captured, and by what that was told. */
+        Backing: {
+            supported: components["schemas"]["Supported"];
+            /** @description How far each control lies beyond its sampled range, as a share of it. */
+            beyond: {
+                [key: string]: number;
+            };
+            /** @description The share beyond which nothing is supported. */
+            most_beyond: number;
+            /** @description Of a plain field over the controls of the captured clips, from 0 where many are near to 1 where none is. */
+            variance: number;
+            /** @description The variance above which nothing is supported. */
+            most_variance: number;
+        };
+        /** @description Each point is ranked as if those before it had been captured already. */
+        Suggestions: {
+            model: components["schemas"]["Identity"];
+            /** @description Who is to be captured; null where clips of all count alike. */
+            performer: string | null;
+            /** @description Of how many points these were chosen. */
+            candidates: number;
+            /** @description The one that is worth most first. */
+            suggestions: components["schemas"]["Suggestion"][];
+        };
+        Suggestion: {
+            controls: components["schemas"]["Controls"];
+            /** @description Share by which the mean variance of the poses falls over all that may be asked, once this is captured. */
+            gain: number;
+            /** @description At the point itself, before, as a share of the sill. */
+            variance: number;
+            /** @description Source of the captured clip nearest to it; null in models trained before this was kept. */
+            nearest: string | null;
+            lacking: components["schemas"]["ControlName"];
+            /** @description By how much the nearest clip differs in that control, in which it differs most, as a share of its range. */
+            gap: number;
         };
         CapturedClip: {
             /** @description The motion file, and the frames of it where the clip is a part. */
@@ -1600,6 +1674,7 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
@@ -1625,9 +1700,11 @@ export interface components {
             duration: number;
             /** @description As in Trust, m. */
             sigma: number;
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
-            /** @description As in Trust. */
-            inferred?: string[];
+            inferred?: components["schemas"]["Inferred"];
             /** @description As in Trust. */
             measured?: {
                 [key: string]: number;
@@ -1647,10 +1724,12 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            /** @description One sentence for each control outside what was sampled, and for each of `targets` that is not reached. */
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
+            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
             warnings: string[];
-            /** @description Names of the controls that were not given, and chosen as the most typical for those that were; absent where all were given. */
-            inferred?: string[];
+            inferred?: components["schemas"]["Inferred"];
             /** @description The controls that can be measured on a motion, as this one has them, in their units; absent where there are none. */
             measured?: {
                 [key: string]: number;
@@ -1658,6 +1737,17 @@ export interface components {
             /** @description Measured controls and targets that the motion was held to, and how far it stays from each; absent where there are none. */
             targets?: components["schemas"]["Met"][];
         };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given and for
+         *     targets; not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
+        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
+        Supported: boolean;
+        /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
+        SigmaByJoint: number[];
+        /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
+        PerformerSeen: boolean;
         /** @description Something that a motion was held to. */
         Met: {
             /**
@@ -1720,17 +1810,27 @@ export interface components {
             default: number;
             /** @description The distinct sampled values where they are few, else empty. */
             values: number[];
-            /** @description How it is measured on a motion; absent where it is not, and then no motion can be held to it. */
-            measure?: {
-                /** @description left, height or forward (of a joint at a moment), step_length, stride_length, speed, turn, leg_length or stature. */
-                quantity: string;
-                /** @description Indices of the joints that it is measured at; absent where it is of the whole body. */
-                joints?: number[];
-                /** @description The moment: start, end, highest, lowest, farthest, or landmark. */
-                at?: string;
-                /** @description Of a landmark, the share of the clip's canonical time at which it lies. */
-                share?: number;
-            };
+            measure?: components["schemas"]["Measure"];
+        };
+        /** @description How a control is read off a motion; a control that somebody typed has none. Since 2.2.0. */
+        Measure: {
+            /**
+             * @description `left`, `height` and `forward` are where a joint is at a moment, m, from where the root's first pose stands on the
+             *     floor, as it faces; `step_length` is the greatest distance ahead that one foot gets of the other, m; `stride_length`,
+             *     m, `speed`, m/s, and `turn`, degrees to the left, are of a whole cycle; `leg_length` and `stature`, m, are of the
+             *     performer's bones and not of the motion.
+             * @enum {string}
+             */
+            quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "leg_length" | "stature";
+            /** @description Indices of the joints whose middle is looked at, of the two feet of a step, or of the bones of a leg. */
+            joints?: number[];
+            /**
+             * @description The moment of a place; `farthest` is from the root.
+             * @enum {string}
+             */
+            at?: "start" | "end" | "highest" | "lowest" | "farthest" | "landmark";
+            /** @description Of the duration, at which the landmark is in the mean over captured clips. */
+            share?: number;
         };
         /** @description Joints parents first, their rest offsets, and the end sites that no joint follows. At rest every rotation is the identity. */
         Skeleton: {
@@ -1814,6 +1914,8 @@ export interface components {
             };
             /** @description File and frames of each captured clip; empty in models trained before this was kept. */
             sources: string[];
+            /** @description How far each joint errs, as a share of sigma; empty in models trained before this was kept. */
+            joint_sigma?: number[];
             /** @description What the weights of the captured clips hang on; null in models trained before this was kept. */
             kriging: {
                 /** @enum {string} */
@@ -1868,7 +1970,7 @@ export interface components {
          */
         CrowdQuestion: {
             /**
-             * @description For each control of the model its values, in the control's unit.
+             * @description For each control of the model its values, in the control's unit. None may be left out.
              * @example {
              *       "stature": [
              *         1.72,
@@ -1991,6 +2093,8 @@ export interface components {
             duration: number[];
             /** @description As in Trust, m. */
             sigma: number[];
+            /** @description As in Trust. */
+            supported: boolean[];
             /** @description The level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers; absent without a camera. */
@@ -2445,6 +2549,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2459,6 +2565,19 @@ export interface components {
                 "application/x-npz": string;
                 "application/vnd.apache.arrow.stream": string;
                 "application/vnd.msgpack": string;
+            };
+        };
+        /** @description Which clips to capture next. */
+        Suggestions: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                ETag: components["headers"]["ETag"];
+                Vary: components["headers"]["Vary"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/json": components["schemas"]["Suggestions"];
             };
         };
         /** @description What the answer is made of. */
@@ -2558,6 +2677,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2577,6 +2698,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2596,6 +2719,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2615,6 +2740,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2634,6 +2761,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2653,6 +2782,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2672,6 +2803,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2691,6 +2824,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2710,6 +2845,8 @@ export interface components {
                 "Posefield-Model": components["headers"]["Model"];
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
                 "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
@@ -2918,7 +3055,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control missing, unknown or out of reach, a performer or level it does not know, a time outside the clip, too many frames, or, with `extrapolate` refuse, controls outside what was sampled or a target out of reach. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, something that no motion can be held to, or, with `extrapolate` refuse, controls like which nothing was captured or a target out of reach. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2987,9 +3124,12 @@ export interface components {
         model: string;
         /**
          * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-         *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-         *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-         *     width of the range away. The names of the other parameters are reserved.
+         *     The model's card gives their names, units and sampled ranges; a value outside the range is
+         *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+         *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+         *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+         *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+         *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -3029,6 +3169,8 @@ export interface components {
         root: components["schemas"]["Root"];
         /** @description Whether the clip is a loop. */
         loop: components["schemas"]["Loop"];
+        /** @description Whether the trust says how far each joint may err. */
+        jointSigma: components["schemas"]["JointSigma"];
         /**
          * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
          *     the model can measure on a motion), `none`, or names of controls with commas between.
@@ -3053,7 +3195,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+        /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -3072,6 +3214,13 @@ export interface components {
         camera: string;
         /** @description How many captured clips are listed at most, the nearest first. */
         nearest: components["schemas"]["Nearest"];
+        /** @description How many points. */
+        suggestions: number;
+        /**
+         * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+         * @example tall
+         */
+        whose: string;
         /**
          * @description The control that changes from column to column.
          * @example turn
@@ -3174,6 +3323,13 @@ export interface components {
         /** @description As `duration` in Trust, seconds. */
         Duration: number;
         /**
+         * @description Values of the controls that were left out, and are the most typical for those that were given: a JSON
+         *     object in ASCII; absent where none was. Since 2.2.0.
+         */
+        Inferred: string;
+        /** @description As `supported` in Trust. */
+        Supported: "true" | "false";
+        /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
@@ -3265,9 +3421,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3275,7 +3434,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3284,7 +3443,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3292,6 +3451,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3377,9 +3538,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3387,7 +3551,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3396,7 +3560,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3404,6 +3568,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3487,9 +3653,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3497,7 +3666,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3506,7 +3675,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3514,6 +3683,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3597,9 +3768,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3607,7 +3781,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3616,7 +3790,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3624,6 +3798,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3707,9 +3883,12 @@ export interface operations {
             query: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3717,7 +3896,7 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /**
                  * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
                  * @example [
@@ -3726,7 +3905,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3734,6 +3913,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3814,12 +3995,15 @@ export interface operations {
     };
     getClip: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3827,14 +4011,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3842,6 +4026,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3930,12 +4116,15 @@ export interface operations {
     };
     getClipUsda: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3943,14 +4132,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3958,6 +4147,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4044,12 +4235,15 @@ export interface operations {
     };
     getClipUsdc: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4057,14 +4251,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4072,6 +4266,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4158,12 +4354,15 @@ export interface operations {
     };
     getClipUsdz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4171,14 +4370,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4186,6 +4385,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4272,12 +4473,15 @@ export interface operations {
     };
     getClipJson: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4285,14 +4489,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4300,6 +4504,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4386,12 +4592,15 @@ export interface operations {
     };
     getClipBvh: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4399,14 +4608,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4414,6 +4623,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4500,12 +4711,15 @@ export interface operations {
     };
     getClipGlb: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4513,14 +4727,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4528,6 +4742,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4614,12 +4830,15 @@ export interface operations {
     };
     getClipNpz: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4627,14 +4846,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4642,6 +4861,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4728,12 +4949,15 @@ export interface operations {
     };
     getClipArrow: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4741,14 +4965,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4756,6 +4980,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4842,12 +5068,15 @@ export interface operations {
     };
     getClipMsgpack: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4855,14 +5084,14 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description Frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
                 /** @description Seconds from the start of the whole clip to the first frame. */
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4870,6 +5099,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -5407,12 +5638,15 @@ export interface operations {
     };
     getWhy: {
         parameters: {
-            query: {
+            query?: {
                 /**
                  * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     Every control is needed. The model's card gives their names, units and sampled ranges; a value
-                 *     outside the range is answered with a warning (see `extrapolate`), up to a hundred times the
-                 *     width of the range away. The names of the other parameters are reserved.
+                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
+                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
+                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
+                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
+                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
+                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5420,10 +5654,10 @@ export interface operations {
                  *       "target_height": 1.1
                  *     }
                  */
-                controls: components["parameters"]["controls"];
+                controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls outside what was sampled and targets out of reach - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -5486,6 +5720,44 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["Unanswerable"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
+    getSuggestions: {
+        parameters: {
+            query?: {
+                /** @description How many points. */
+                count?: components["parameters"]["suggestions"];
+                /**
+                 * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+                 * @example tall
+                 */
+                performer?: components["parameters"]["whose"];
+            };
+            header?: {
+                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
+            };
+            path: {
+                /**
+                 * @description A model's name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Suggestions"];
+            304: components["responses"]["NotModified"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
             422: components["responses"]["Unanswerable"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
@@ -6433,6 +6705,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ],
   "ModelCard": [
@@ -6480,6 +6753,7 @@ export const REQUIRED = {
     "controls",
     "performer",
     "warnings",
+    "support",
     "nearest",
     "others"
   ],
@@ -6495,6 +6769,12 @@ export const REQUIRED = {
     "sigma",
     "inside"
   ],
+  "Suggestions": [
+    "model",
+    "performer",
+    "candidates",
+    "suggestions"
+  ],
   "Trust": [
     "model",
     "controls",
@@ -6502,6 +6782,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ]
 } as const;
@@ -6539,6 +6820,9 @@ export const LISTS = {
     "along_values",
     "sigma",
     "inside"
+  ],
+  "Suggestions": [
+    "suggestions"
   ],
   "Trust": [
     "warnings"

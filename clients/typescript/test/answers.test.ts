@@ -147,7 +147,7 @@ test("a refusal says what, where and under which id", async () => {
 });
 
 test("a body's fault is pointed at", async () => {
-  const controls = { stature: 1.7 };
+  const controls = { spin: 1.7 };
   const body = observed(undefined, { longestLink: 0 }).client;
   await assert.rejects(body.pose("reach", { controls, times: [0] }), (fault: unknown) => {
     return fault instanceof Problem && fault.places[0]?.pointer?.startsWith("/controls") === true;

@@ -71,6 +71,7 @@ const REACHED: Record<string, Ask> = {
   getCrowdUsdz: walk("usdz"),
   getWhy: why,
   queryWhy: why,
+  getSuggestions: (client, model, asked) => client.suggestions(model, asked as object),
   getSigmaJson: sigma,
   querySigmaJson: sigma,
   getReadiness: (client) => client.ready(),

@@ -33,6 +33,10 @@ class Aim(Protocol):
     def look(self, scene: Scene, numbers: Floats) -> Looked:
         """The values that a motion has, and their gradients."""
 
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """The values (n, k) of other reduced motions (n, r2 r1) that have everything else of this
+        one, at its moment."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -57,6 +61,12 @@ class Place:
         gradients = np.mean([gradient for _, gradient in found], axis=0)
         return values[list(self.axes)], gradients[list(self.axes)]
 
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """Values of other motions."""
+        at = _moment(scene, numbers, self.moment, self.at)
+        found = [scene.among(numbers, motions, joint, at) for joint in self.moment.joints]
+        return np.asarray(np.mean(found, axis=0)[:, list(self.axes)], np.float64)
+
 
 @dataclass(frozen=True)
 class Step:
@@ -74,6 +84,12 @@ class Step:
         ahead = first[0][2] - second[0][2]
         sign = 1.0 if ahead >= 0.0 else -1.0
         return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
+
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """Values of other motions."""
+        at = _moment(scene, numbers, self.moment, 0.0)
+        first, second = (scene.among(numbers, motions, j, at) for j in self.moment.joints)
+        return np.abs(first - second)[:, 2:]
 
 
 @dataclass(frozen=True)
@@ -100,6 +116,10 @@ class Travelled:
         if self.quantity == "speed":
             gradients[0, -BESIDE] = -value
         return np.array([value]), gradients
+
+    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+        """Values of other motions: all the same, for none of it is in them."""
+        return np.repeat(self.look(scene, numbers)[0][None], len(motions), axis=0)
 
 
 def look(aims: Sequence[Aim], scene: Scene, numbers: Floats) -> Looked:

@@ -28,10 +28,12 @@ class Goal:
 
 @dataclass(frozen=True)
 class Goals:
-    """What a question is held to: measured controls with their values, and targets."""
+    """What a question is held to: measured controls with their values, targets, and whether feet
+    stay where they stand meanwhile."""
 
     controls: tuple[tuple[str, Measure, float], ...]
     targets: tuple[Goal, ...]
+    pin_feet: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.controls or self.targets)
@@ -50,6 +52,8 @@ def of(card: ModelCard, question: Question, hold: Hold, correctable: bool) -> Go
     if not correctable:
         _refuse_old(hold)
         return NOTHING
+    if hold.pin_feet and not card.feet:
+        raise InvalidField("pin_feet", "true, but this model's recipe names no feet")
     targets = tuple(_goal(card, i, target) for i, target in enumerate(hold.targets))
     _refuse_twins(hold.targets, targets)
     taken = {(goal.moment.joints, goal.moment.at) for goal in targets}
@@ -65,7 +69,7 @@ def of(card: ModelCard, question: Question, hold: Hold, correctable: bool) -> Go
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
         controls.append((control.name, own, question.controls[control.name]))
-    return Goals(tuple(controls), targets)
+    return Goals(tuple(controls), targets, hold.pin_feet)
 
 
 def _refuse_old(hold: Hold) -> None:
@@ -115,6 +119,8 @@ def _goal(card: ModelCard, index: int, target: Target) -> Goal:
         known = ", ".join(card.skeleton.names)
         raise InvalidField(f"{field}/joint", f"{target.joint!r}, expected one of {known}")
     joint = card.skeleton.names.index(target.joint)
+    if len(target.position) != 3:
+        raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
     x, y, z = (limits.number(f"{field}/position/{a}", v) for a, v in enumerate(target.position))
     for axis, value in enumerate((x, y, z)):
         limits.within(f"{field}/position/{axis}", value, -FARTHEST, FARTHEST, "m")

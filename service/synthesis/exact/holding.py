@@ -12,8 +12,8 @@ from service.motion.conventions import Floats
 from service.motion.measure import Seen
 from service.synthesis import freeze
 from service.synthesis.exact import aims as looking
-from service.synthesis.exact import meet, reduced, spread, travelling
-from service.synthesis.exact.aims import Aim
+from service.synthesis.exact import feet, meet, reduced, spread, travelling
+from service.synthesis.exact.aims import Aim, Place
 from service.synthesis.exact.reduced import Reduced
 from service.synthesis.exact.scene import Scene
 from service.synthesis.exact.spread import Spread
@@ -76,10 +76,19 @@ class Bench:
         beside = [np.log(state.duration), *state.way] if self.card.cyclic else []
         return Held(scene, np.concatenate([inner, beside]), state, ())
 
-    def held(self, begun: Held, aims: Sequence[Aim]) -> Held:
-        """The motion nearest to a predicted one that meets the aims."""
-        found = meet.meet(begun.scene, self.spread, begun.state.sigma, begun.numbers, aims)
+    def held(self, begun: Held, aims: Sequence[Aim], pins: Sequence[Aim] = ()) -> Held:
+        """The motion nearest to a predicted one that meets the aims, and its pins about."""
+        sigma, numbers = begun.state.sigma, begun.numbers
+        found = meet.meet(begun.scene, self.spread, sigma, numbers, aims, pins)
         return Held(begun.scene, found.numbers, begun.state, found.met, found.steps, found.distance)
+
+    def distance(self, begun: Held, aims: Sequence[Aim]) -> float:
+        """How far off aims lie from a predicted motion, in standard deviations."""
+        return meet.distance(begun.scene, self.spread, begun.state.sigma, begun.numbers, aims)
+
+    def pins(self, begun: Held) -> list[Place]:
+        """Pins for the feet of a predicted motion."""
+        return feet.pins(begun.scene, begun.numbers, self.card.feet)
 
     def measured(self, held: Held) -> dict[str, float]:
         """Values of the card's measured controls in a motion."""

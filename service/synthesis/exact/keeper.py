@@ -1,21 +1,24 @@
 """A model's exact answers: what corrections need, and the last of them."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from service.motion.answer import PoseAnswer, Trust
 from service.motion.conventions import Floats
+from service.motion.measure import Measure
 from service.synthesis import limits
 from service.synthesis.door import Question
 from service.synthesis.exact import aims as looking
-from service.synthesis.exact import goals, holding
+from service.synthesis.exact import goals, holding, inverse
 from service.synthesis.exact.aims import Aim, Place
 from service.synthesis.exact.goals import NOTHING, Goal, Goals
 from service.synthesis.exact.holding import Bench, Held
 from service.synthesis.question import HOLD, Hold
 from service.synthesis.session import Session
+from service.synthesis.typical import Chooser
 
 # Somebody who plays a clip pose by pose, or looks at a few.
 KEPT = 64
@@ -41,6 +44,7 @@ class Keeper:
         self._session = session
         self._benches: dict[int, Bench] = {}
         self._kept = lru_cache(KEPT)(self._held)
+        self._seen = lru_cache(KEPT)(self._places)
 
     @cached_property
     def correctable(self) -> bool:
@@ -57,6 +61,46 @@ class Keeper:
         if hold is HOLD and not self.measures:
             return NOTHING
         return goals.of(self._session.card, question, hold, self.correctable)
+
+    def controls(self, question: Question, hold: Hold, chooser: Chooser) -> dict[str, float] | None:
+        """All controls of a question that leaves some open and names targets, as is most typical
+        for both; None for any other."""
+        if not (question.inferred and hold.targets and self.correctable):
+            return None
+        targets = self.goals(question, Hold("none", hold.targets)).targets
+        open_ = set(question.inferred)
+        given = {name: v for name, v in question.controls.items() if name not in open_}
+        given |= inverse.read_off(self._session.card, given, targets)
+        if len(given) == len(question.controls):
+            return given
+        return self._nearest(question, given, targets, chooser)
+
+    def _nearest(
+        self,
+        question: Question,
+        given: dict[str, float],
+        targets: tuple[Goal, ...],
+        chooser: Chooser,
+    ) -> dict[str, float]:
+        """Controls by which the model itself comes near the targets.
+
+        What is typical is linear, and motions are not: what it misses is asked for in addition,
+        until the targets lie no farther off than captured motions stray. To ask for less would
+        explain by controls what is chance.
+        """
+        seen = np.hstack([self._seen(goal.moment, goal.time) for goal in targets])
+        wanted = asked = inverse.wanted(targets)
+        tried: list[tuple[float, dict[str, float]]] = []
+        for _ in range(ROUNDS):
+            found = chooser.fill_seen(given, question.labels, seen, asked)
+            own = replace(question, controls=found, point=np.array([list(found.values())]))
+            begun = self.held(own, NOTHING)
+            aims = self._targets(own, targets, begun)
+            tried.append((self._bench(question.level).distance(begun, aims), found))
+            if tried[-1][0] <= math.sqrt(len(wanted)):
+                break
+            asked = asked + wanted - looking.look(aims, begun.scene, begun.numbers)[0]
+        return min(tried, key=lambda pair: pair[0])[1]
 
     def held(self, question: Question, found: Goals) -> Held:
         """The motion that meets its goals, or comes as near as captured motions get; the predicted
@@ -78,6 +122,18 @@ class Keeper:
         rotations, roots = held.poses(self._frames(question, held, when))
         return PoseAnswer(when, rotations, roots, held.state.bones, trust)
 
+    def _places(self, moment: Measure, time: float | None) -> Floats:
+        """Where the model puts a joint (n, 3), m, at a moment of each captured clip."""
+        session, bench = self._session, self._bench(0)
+        goal = Goal("", moment, (0.0, 0.0, 0.0), time)
+        found = []
+        for sample, labels in zip(session.card.examples, session.who, strict=True):
+            point = np.array([sample])
+            begun = bench.begun(session.state(point, np.array([time or 0.0]), labels[None]))
+            aim = self._aim(goal, begun, begun.state.frames[0])
+            found.append(aim.look(begun.scene, begun.numbers)[0])
+        return np.array(found)
+
     def _bench(self, level: int) -> Bench:
         if level not in self._benches:
             self._benches[level] = holding.bench(self._session, level)
@@ -96,9 +152,10 @@ class Keeper:
         if not asked.goals:
             return begun
         aims = looking.of_controls(asked.goals.controls, bench.reduced.frames)
+        pins = bench.pins(begun) if asked.goals.pin_feet else []
         for _ in range(ROUNDS):
             aimed = self._targets(question, asked.goals.targets, held)
-            found = bench.held(begun, [*aims, *aimed])
+            found = bench.held(begun, [*aims, *aimed], pins)
             settled = abs(found.duration / held.duration - 1.0) < SAME
             held = found
             if settled:
@@ -110,15 +167,14 @@ class Keeper:
         """Aims of targets; the frames of those at a time are a motion's own."""
         times = np.array([goal.time or 0.0 for goal in targets])
         timed = self._frames(question, held, times) if len(times) else times
+        pairs = zip(targets, timed.tolist(), strict=True)
+        return [self._aim(goal, held, frame) for goal, frame in pairs]
+
+    def _aim(self, goal: Goal, held: Held, frame: float) -> Place:
+        """Aim of a target, which, where it has a time, counts at that canonical frame."""
         last = held.scene.reduced.frames - 1
-        frames = [
-            (goal.moment.share or 0.0) * last if goal.time is None else frame
-            for goal, frame in zip(targets, timed, strict=True)
-        ]
-        return [
-            Place((goal.name,), goal.moment, (0, 1, 2), np.array(goal.place), float(frame))
-            for goal, frame in zip(targets, frames, strict=True)
-        ]
+        at = (goal.moment.share or 0.0) * last if goal.time is None else frame
+        return Place((goal.name,), goal.moment, (0, 1, 2), np.array(goal.place), at)
 
     def _check_times(self, targets: tuple[Goal, ...], held: Held) -> None:
         for index, goal in enumerate(targets):

@@ -14,42 +14,42 @@ from service.synthesis.exact.reduced import Reduced
 
 @dataclass(frozen=True)
 class Limb:
-    """A chain of joints from the root to one, with their bones (C, 3), m."""
+    """A chain of joints from the root to one, with their bones (C, 3), m, and what the reduced
+    tensor says of them.
 
-    chain: tuple[int, ...]
+    rotations (C, 4): mean ones. mean (3 + 3 C,), directions (r1, 3 + 3 C): of the root's position
+    and the chain's rotation vectors.
+    """
+
     bones: Floats
-    reduced: Reduced
+    rotations: Floats
+    mean: Floats
+    directions: Floats
 
-    def posed(self, motion: Floats, rows: Floats, gone: Floats) -> "Pose":
-        """The chain in a reduced motion (r2, r1) at time coefficients (S, r2), where the root has
-        got gone (S, 3) of a cycle's travel: to the left and ahead, m, and turned, rad."""
-        joints, reduced = list(self.chain), self.reduced
-        numbers = [0, 1, 2, *(3 + 3 * joint + axis for joint in joints for axis in range(3))]
-        moves = rows @ motion
-        found = reduced.mean[numbers] + moves @ reduced.directions[:, numbers]
-        vectors = found[:, 3:].reshape(len(rows), len(joints), 3)
-        turns = quat.mul(reduced.rotations[joints], quat.exp(vectors))
+    def posed(self, moves: Floats, gone: Floats) -> "Pose":
+        """The chain at coefficients (S, r1) of the first mode, where the root has got gone (S, 3)
+        of a cycle's travel: to the left and ahead, m, and turned, rad."""
+        found = self.mean + moves @ self.directions
+        vectors = found[:, 3:].reshape(len(moves), -1, 3)
+        turns = quat.mul(self.rotations, quat.exp(vectors))
         turns[:, 0] = quat.mul(quat.about(UP, gone[:, 2]), turns[:, 0])
-        roots = found[:, :3] + gone[:, :1] * np.array([1.0, 0.0, 0.0])
-        roots[:, 2] += gone[:, 1]
-        return _forward(self, vectors, turns, roots)
+        roots = found[:, :3].copy()
+        roots[:, [0, 2]] += gone[:, :2]
+        return _forward(self.bones, vectors, quat.to_matrix(turns), roots)
 
     def gradient(self, pose: "Pose", row: int) -> tuple[Floats, Floats]:
         """How the last joint moves with the coefficients of the first mode (3, r1), m, and with the
         turn of the travel (3,), m for a radian, in one of the poses."""
-        axes = quat.to_matrix(pose.turned[row]) @ quat.right_jacobian(pose.vectors[row])
+        axes = pose.turned[row] @ quat.right_jacobian(pose.vectors[row])
         arms = pose.positions[row, -1] - pose.positions[row]
         moved = quat.cross(np.swapaxes(axes, -1, -2), arms[:, None])
-        joints = np.array(self.chain)
-        numbers = (3 + 3 * joints[:, None] + np.arange(3)).ravel()
-        directions = self.reduced.directions
-        by_turning = moved.reshape(-1, 3).T @ directions[:, numbers].T
-        return by_turning + directions[:, :3].T, quat.cross(UP, arms[0])
+        by_turning = moved.reshape(-1, 3).T @ self.directions[:, 3:].T
+        return by_turning + self.directions[:, :3].T, quat.cross(UP, arms[0])
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A chain in S poses: rotation vectors (S, C, 3), orientations (S, C, 4), positions
+    """A chain in S poses: rotation vectors (S, C, 3), orientations (S, C, 3, 3), positions
     (S, C, 3)."""
 
     vectors: Floats
@@ -62,14 +62,16 @@ def to(joint: int, parents: tuple[int, ...], bones: Floats, reduced: Reduced) ->
     chain = [joint]
     while chain[0]:
         chain.insert(0, parents[chain[0]])
-    return Limb(tuple(chain), bones[chain], reduced)
+    numbers = [0, 1, 2, *(3 + 3 * link + axis for link in chain for axis in range(3))]
+    mean, directions = reduced.mean[numbers], reduced.directions[:, numbers]
+    return Limb(bones[chain], reduced.rotations[chain], mean, directions)
 
 
-def _forward(limb: Limb, vectors: Floats, turns: Floats, roots: Floats) -> Pose:
-    turned, positions = np.empty_like(turns), np.empty_like(vectors)
-    turned[:, 0], positions[:, 0] = turns[:, 0], roots
-    for link in range(1, len(limb.chain)):
+def _forward(bones: Floats, vectors: Floats, turns: Floats, roots: Floats) -> Pose:
+    turned, positions = turns.copy(), np.empty_like(vectors)
+    positions[:, 0] = roots
+    for link in range(1, len(bones)):
         above = turned[:, link - 1]
-        positions[:, link] = positions[:, link - 1] + quat.rotate(above, limb.bones[link])
-        turned[:, link] = quat.mul(above, turns[:, link])
+        positions[:, link] = positions[:, link - 1] + above @ bones[link]
+        turned[:, link] = above @ turns[:, link]
     return Pose(vectors, turned, positions)

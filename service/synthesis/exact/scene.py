@@ -53,16 +53,22 @@ class Scene:
 
     def positions(self, numbers: Floats, joint: int, places: Floats) -> Floats:
         """Where a joint is (S, 3), m, at canonical frames (S,)."""
-        motion, gone = self.motion(numbers), self._gone(numbers, places)
-        rows = self.reduced.rows(places)
-        return self.limb(joint).posed(motion, rows, gone).positions[:, -1]
+        moves = self.reduced.rows(places) @ self.motion(numbers)
+        return self.limb(joint).posed(moves, self._gone(numbers, places)).positions[:, -1]
+
+    def among(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
+        """Where a joint is (n, 3), m, at a canonical frame of other motions (n, r2 r1) that have
+        everything else of this one."""
+        row, gone = self.reduced.row(at), self._gone(numbers, np.full(len(motions), at))
+        moves = row @ motions.reshape(len(motions), len(row), -1)
+        return self.limb(joint).posed(moves, gone).positions[:, -1]
 
     def place(self, numbers: Floats, joint: int, at: float) -> tuple[Floats, Floats]:
         """Where a joint is (3,), m, at a canonical frame, and how it moves with every number of the
         motion (3, numbers)."""
         places = np.array([at])
         row, own = self.reduced.row(at), self.limb(joint)
-        pose = own.posed(self.motion(numbers), row[None], self._gone(numbers, places))
+        pose = own.posed(row[None] @ self.motion(numbers), self._gone(numbers, places))
         by_freedoms, by_turn = own.gradient(pose, 0)
         inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
         if self.cyclic:

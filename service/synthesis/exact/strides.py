@@ -8,7 +8,7 @@ from service.synthesis.walk.stride import Strides
 
 
 def of(held: Held) -> Strides:
-    """The cycle of a motion; of what is no cycle the straight way from first pose to last."""
+    """The cycle of a motion, or the straight way of what is no cycle from first pose to last."""
     last = held.scene.reduced.frames - 1.0
     roots = plane.of(held.poses(np.array([0.0, last]))[1])
     durations, turns = np.array([held.duration]), held.travel[2:]

@@ -109,17 +109,18 @@ TEXTS: dict[Kind, Text] = {
     ),
     TABLE[InvalidField]: Text(
         "The request keeps the contract, but this model has no answer to it: a control is "
-        "missing or unknown, a value is far outside what was sampled, a time lies outside the "
-        "clip, there would be too many frames, the model knows no such performer.",
+        "unknown (or one of a crowd's missing), a value is far outside what was sampled, a time "
+        "lies outside the clip, there would be too many frames, the model knows no such performer.",
         "Change the field that `errors` names. The model's card says what the model has: its "
         "controls, their ranges, its performers and levels.",
         "fps: 10000 frames a second, expected 1 to 1000 frames a second",
         {"parameter": "fps"},
     ),
     TABLE[OutsideSamples]: Text(
-        "Controls lie outside what the model was trained from, and `extrapolate=refuse` asked "
-        "for an error rather than a warning.",
-        "Move the controls into the ranges on the model's card, or ask with `extrapolate=warn`.",
+        "Controls lie outside what the model was trained from, or in a gap of it, and "
+        "`extrapolate=refuse` asked for an error rather than a warning.",
+        "Move the controls into the ranges on the model's card and near to clips that were "
+        "captured, which `why` names, or ask with `extrapolate=warn`.",
         "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
         {"parameter": "controls"},
     ),

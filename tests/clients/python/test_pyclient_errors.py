@@ -105,7 +105,7 @@ FAR = {"joint": "RightHand", "position": (0, 1, 5), "at": "end"}
     [
         (lambda m, c: m("reich").card, errors.UnknownModel),
         (lambda m, c: m("reach@0000000000000000").card, errors.UnknownModel),
-        (lambda m, c: m("reach").pose(0), errors.InvalidField),
+        (lambda m, c: m("reach").pose(0, spin=1), errors.InvalidField),
         (lambda m, c: m("reach").pose(100, **c), errors.InvalidField),
         (lambda m, c: m("reach").pose(0, performer="nobody", **c), errors.InvalidField),
         (

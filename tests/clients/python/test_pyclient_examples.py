@@ -96,6 +96,7 @@ CALLS = {
     "queryPoseMsgpack": lambda client, r: model(client, r).pose(**words(r)),
     "getWhy": lambda client, r: model(client, r).why(**words(r)),
     "queryWhy": lambda client, r: model(client, r).why(**words(r)),
+    "getSuggestions": lambda client, r: model(client, r).suggest(**words(r)),
     "getSigmaMsgpack": lambda client, r: model(client, r).sigma(**words(r)),
     "querySigmaMsgpack": lambda client, r: model(client, r).sigma(**words(r)),
     "queryCrowdMsgpack": lambda client, r: model(client, r).crowd(**words(r)).numbers,

@@ -46,6 +46,7 @@ CARD = ModelCard(
     sources=("a.bvh", "b.bvh, frames 3 to 90", "c.bvh"),
     kriging=Hyper("matern52", (0, 1), np.array([0.3, 0.1 + 0.2]), 1e-3, 0.7),
     left_out=(0.01, 0.02, 0.5),
+    beside=((0.1, 0.0), (0.2, 0.3)),
     event=Event(1, 0.75),
 )
 
@@ -68,7 +69,7 @@ def test_card_read_is_the_card_written():
     assert replace(read, skeleton=CARD.skeleton, kriging=CARD.kriging) == CARD
 
 
-OPTIONAL = ("performers", "roles", "sources", "kriging", "left_out", "event")
+OPTIONAL = ("performers", "roles", "sources", "kriging", "left_out", "event", "beside")
 
 
 @pytest.mark.parametrize("field", [f.name for f in fields(ModelCard) if f.name not in OPTIONAL])
@@ -87,11 +88,12 @@ def test_a_card_that_says_nothing_of_roles_has_none():
 
 
 def test_an_older_card_has_none_of_what_it_could_not_say():
-    none = {"sources": "[]", "kriging": "null", "left_out": "[]", "event": "null"}
+    none = {"sources": "[]", "kriging": "null", "left_out": "[]", "event": "null", "beside": "[]"}
     none = {f"posefield.{name}": text for name, text in none.items()}
     older = {key: text for key, text in card.dump(CARD).items() if key not in none}
     read = card.load(older)
     assert (read.sources, read.kriging, read.left_out, read.event) == ((), None, (), None)
+    assert read.beside == ()
     assert card.dump(read) == older | none
 
 

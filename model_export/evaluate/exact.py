@@ -1,0 +1,183 @@
+"""The model's answer held to the captured place of the event's joint, by what the service runs.
+
+Beside the motions: how the correction fared, and what becomes of places that are out of reach.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import fidelity, samples
+from model_export.evaluate import errors, motion
+from model_export.evaluate.methods import Asked
+from model_export.evaluate.motion import EVEN, Event, Motion
+from model_export.recipe import Recipe
+from model_export.train import Trained
+from service.motion import skeleton
+from service.motion.conventions import Floats
+from service.motion.measure import Measure
+from service.synthesis import session
+from service.synthesis.exact import holding
+from service.synthesis.exact.aims import Place
+from service.synthesis.exact.holding import Bench, Held
+from service.synthesis.session import OUTPUTS, Session, State
+
+# How much farther from the root than the captured place, m: what should be told to be too far, and
+# what certainly is.
+BEYOND, FAR = (0.1, 0.2, 0.3), 1.0
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Where a captured clip has the event's joint (3,) and the root (3,) at the event, m."""
+
+    joint: Floats
+    root: Floats
+
+    def farther(self, metres: float) -> Floats:
+        """A place so much farther from the root (3,)."""
+        away = self.joint - self.root
+        return np.asarray(self.joint + metres * away / np.linalg.norm(away), np.float64)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """How one clip was corrected.
+
+    miss, m, that is left. steps. distance: of the captured place from the predicted one, in
+    standard deviations. reached: whether that counts as within reach. beyond: whether the same is
+    said of places BEYOND it. acceleration: after over before. seconds: that the clip took, its
+    prediction counted in; plain_seconds: that it takes uncorrected.
+    """
+
+    miss: float
+    steps: int
+    distance: float
+    reached: bool
+    beyond: tuple[bool, ...]
+    acceleration: float
+    seconds: float
+    plain_seconds: float
+    far: "Far"
+
+
+@dataclass(frozen=True)
+class Far:
+    """The same for a place FAR beyond: whether it counts as reached, acceleration after over
+    before, how far the root was moved, m, and steps."""
+
+    reached: bool
+    acceleration: float
+    root: float
+    steps: int
+
+
+@dataclass(frozen=True)
+class Exact:
+    """Corrected motions, and how each was corrected."""
+
+    motions: list[Motion]
+    corrections: list[Correction]
+
+
+@dataclass(frozen=True)
+class _Desk:
+    """An opened model, its bench, and the event with the canonical frame at which it is."""
+
+    opened: Session
+    bench: Bench
+    event: fidelity.Moment
+
+    def state(self, controls: Floats, labels: Floats) -> State:
+        """State at even shares of the duration."""
+        durations = self.opened.durations(controls, labels)
+        return self.opened.state(controls, EVEN * durations, labels)
+
+    def held(self, begun: Held, place: Floats) -> Held:
+        """The motion whose event's joint is at a place (3,) at the event."""
+        own = Measure("height", (self.event.joint,), "landmark")
+        return self.bench.held(begun, [Place(("event",), own, (0, 1, 2), place, self.event.frame)])
+
+    def motion(self, held: Held) -> Motion:
+        """What is compared of a held motion."""
+        state, parents = held.state, self.opened.card.skeleton.parents
+        rotations, path = held.poses(state.frames)
+        translations = skeleton.translations(state.bones, path)
+        share = float(np.interp(self.event.frame, state.frames, EVEN))
+        own = Event(self.event.joint, share)
+        return motion.posed(parents, rotations, translations, held.duration, own)
+
+
+def goal(captured: Motion, event: Event) -> Goal:
+    """Goal that a captured motion gives."""
+    return Goal(event.of(captured.joints), Event(0, event.share).of(captured.joints))
+
+
+def answers(
+    recipe: Recipe, trained: Trained, file: bytes, asked: Asked, wanted: Sequence[Goal]
+) -> Exact:
+    """Answers of a model file, each held to its goal."""
+    event = fidelity.moment(recipe, trained.examples)
+    assert event is not None
+    opened = session.open_bytes(file, recipe.name)
+    desk = _Desk(opened, holding.bench(opened, 0), event)
+    labels = samples.labels(asked.performers, opened.card.performers)
+    clips = zip(asked.controls[:, None], labels[:, None], wanted, strict=True)
+    motions, corrections = zip(*(_corrected(desk, *clip) for clip in clips), strict=True)
+    return Exact(list(motions), list(corrections))
+
+
+def _corrected(
+    desk: _Desk, controls: Floats, labels: Floats, wanted: Goal
+) -> tuple[Motion, Correction]:
+    begun = desk.bench.begun(desk.state(controls, labels))
+    held = desk.held(begun, wanted.joint)
+    before, after = desk.motion(begun), desk.motion(held)
+    beyond = [desk.held(begun, wanted.farther(metres)) for metres in BEYOND]
+    correction = Correction(
+        held.met[0].miss,
+        held.steps,
+        held.distance,
+        _reached(held),
+        tuple(map(_reached, beyond)),
+        _rougher(after, before),
+        _seconds(lambda: _clip(desk, controls, labels, wanted)),
+        _seconds(lambda: _plain(desk, controls, labels)),
+        _far(desk, begun, before, wanted),
+    )
+    return after, correction
+
+
+def _clip(desk: _Desk, controls: Floats, labels: Floats, wanted: Goal) -> None:
+    state = desk.state(controls, labels)
+    desk.held(desk.bench.begun(state), wanted.joint).poses(state.frames)
+
+
+def _plain(desk: _Desk, controls: Floats, labels: Floats) -> None:
+    times = EVEN * desk.opened.durations(controls, labels)[:, None]
+    desk.opened.run(controls, times, *OUTPUTS, labels=labels)
+
+
+def _seconds(run: Callable[[], None]) -> float:
+    # What is opened when it is first asked is open by then.
+    run()
+    start = time.perf_counter()
+    run()
+    return time.perf_counter() - start
+
+
+def _far(desk: _Desk, begun: Held, before: Motion, wanted: Goal) -> Far:
+    held = desk.held(begun, wanted.farther(FAR))
+    after = desk.motion(held)
+    moved = np.linalg.norm(after.joints[:, 0] - before.joints[:, 0], axis=-1)
+    return Far(_reached(held), _rougher(after, before), float(moved.max()), held.steps)
+
+
+def _rougher(after: Motion, before: Motion) -> float:
+    return errors.acceleration(after.points) / errors.acceleration(before.points)
+
+
+def _reached(held: Held) -> bool:
+    return all(met.reached for met in held.met)

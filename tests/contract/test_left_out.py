@@ -1,0 +1,100 @@
+"""Controls that a request leaves out are chosen, and every format says so."""
+
+import io
+import json
+from urllib.parse import urlencode
+
+import msgspec
+import numpy as np
+import pyarrow as pa
+import pytest
+from asking import unpacked
+
+MODEL = "/v1/models/reach"
+GIVEN = {"turn": 20.0, "target_height": 1.1}
+LEFT_OUT = ["stature", "hip_height"]
+
+
+def asked(path, given=GIVEN, **more):
+    return f"{MODEL}/{path}?{urlencode({**given, **more})}"
+
+
+@pytest.fixture(scope="module")
+def chosen(ask):
+    """Trust of a pose for which two controls were left out."""
+    return ask("GET", asked("pose.json", time=0)).json()["trust"]
+
+
+def test_what_was_chosen_asks_for_the_same(ask, chosen):
+    assert chosen["inferred"] == LEFT_OUT
+    assert list(chosen["controls"]) == ["stature", "hip_height", "turn", "target_height"]
+    assert chosen["controls"].items() >= GIVEN.items()
+    part = ask("GET", asked("pose.json", time=0)).json()
+    whole = ask("GET", asked("pose.json", chosen["controls"], time=0)).json()
+    assert part["trust"].pop("inferred") and "inferred" not in whole["trust"]
+    assert part == whole
+
+
+def test_nothing_at_all_may_be_given(ask):
+    by_query = ask("GET", f"{MODEL}/pose.json?time=0").json()
+    by_body = ask("POST", f"{MODEL}/pose.json", json={"controls": {}, "times": [0]}).json()
+    assert by_query == by_body
+    assert by_query["trust"]["inferred"] == [*LEFT_OUT, *GIVEN]
+    tall = ask("GET", f"{MODEL}/pose.json?time=0&performer=tall").json()["trust"]
+    short = ask("GET", f"{MODEL}/pose.json?time=0&performer=short").json()["trust"]
+    assert short["controls"]["stature"] < tall["controls"]["stature"]
+
+
+TRUSTS = {
+    "pose.json": lambda content: json.loads(content)["trust"],
+    "pose.msgpack": lambda content: msgspec.msgpack.decode(content)["trust"],
+    "pose.npz": lambda content: json.loads(str(np.load(io.BytesIO(content))["trust"])),
+    "pose.arrow": lambda content: json.loads(
+        pa.ipc.open_stream(content).schema.metadata[b"posefield.trust"]
+    ),
+    "clip.json": lambda content: json.loads(content)["trust"],
+    "clip.msgpack": lambda content: msgspec.msgpack.decode(content)["trust"],
+    "why": json.loads,
+}
+
+
+@pytest.mark.parametrize("path", TRUSTS)
+def test_formats_with_room_for_it_say_it(path, ask, chosen, controls):
+    more = {"time": 0} if "pose" in path else {}
+    trust = TRUSTS[path](ask("GET", asked(path, **more)).content)
+    assert (trust["inferred"], trust["controls"]) == (LEFT_OUT, chosen["controls"])
+    assert "inferred" not in TRUSTS[path](ask("GET", asked(path, controls, **more)).content)
+
+
+@pytest.mark.parametrize("extension", ["usda", "usdc", "glb", "bvh"])
+def test_a_file_says_it_in_a_header(extension, ask, chosen, controls):
+    found = ask("GET", asked(f"clip.{extension}"))
+    values = {name: chosen["controls"][name] for name in LEFT_OUT}
+    assert json.loads(found.headers["posefield-inferred"]) == values
+    whole = ask("GET", asked(f"clip.{extension}", chosen["controls"]))
+    assert "posefield-inferred" not in whole.headers
+    if extension == "bvh":
+        assert found.content == whole.content
+    else:
+        assert b"inferred" in found.content and b"inferred" not in whole.content
+
+
+def test_an_archive_says_it_of_each_clip(ask, chosen, controls):
+    clips = [{"controls": GIVEN, "fps": 10}, {"controls": controls, "fps": 10}]
+    answer = ask("POST", f"{MODEL}/clips.zip", json={"format": "bvh", "clips": clips})
+    lines = unpacked("zip", answer.content)["manifest.jsonl"].splitlines()
+    first, second = map(json.loads, lines)
+    assert (first["inferred"], first["controls"]) == (LEFT_OUT, chosen["controls"])
+    assert "inferred" not in second
+
+
+def test_an_unknown_control_is_refused_all_the_same(ask):
+    refused = ask("GET", asked("pose", {**GIVEN, "spin": 1}, time=0))
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["parameter"] == "spin"
+
+
+def test_a_crowd_needs_every_control(ask):
+    refused = ask("POST", f"{MODEL}/crowd.json", json={"controls": GIVEN, "time": 0})
+    assert refused.status_code == 422, refused.text
+    assert refused.json()["errors"][0]["pointer"] == "/controls/stature"

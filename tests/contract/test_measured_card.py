@@ -1,0 +1,45 @@
+"""The card over HTTP says how a control is measured, and of none that was typed."""
+
+import jsonschema
+import pytest
+from asking import asker
+
+from service.motion import measure
+from service.motion.measure import MOMENTS, QUANTITIES, Measure
+from service.synthesis import library
+from service.web.app import create_app
+from service.web.settings import Settings
+
+
+@pytest.fixture(scope="module")
+def card(measured_walk_path):
+    app = create_app(library.load([measured_walk_path]), Settings())
+    return asker(app)("GET", "/v1/models/measured").json()
+
+
+def valid(spec, name, value):
+    schema = {"$ref": f"#/components/schemas/{name}", "components": spec["components"]}
+    jsonschema.Draft202012Validator(schema).validate(value)
+
+
+def test_a_measured_control_says_how(card, spec):
+    assert [control["measure"] for control in card["controls"]] == [
+        {"quantity": "speed"},
+        {"quantity": "turn"},
+    ]
+    assert [control["unit"] for control in card["controls"]] == ["m/s", "deg"]
+    valid(spec, "ModelCard", card)
+
+
+def test_a_typed_control_says_nothing_of_it(ask):
+    controls = ask("GET", "/v1/models/reach").json()["controls"]
+    assert controls and not any("measure" in control for control in controls)
+
+
+def test_the_contract_knows_all_that_can_be_measured(spec):
+    known = spec["components"]["schemas"]["Measure"]["properties"]
+    assert tuple(known["quantity"]["enum"]) == QUANTITIES
+    assert tuple(known["at"]["enum"]) == MOMENTS
+    valid(spec, "Measure", measure.plain(Measure("height", (3, 4), "landmark", 0.25)))
+    with pytest.raises(jsonschema.ValidationError):
+        valid(spec, "Measure", {"quantity": "pace"})

@@ -1,0 +1,224 @@
+"""Controls that a recipe says how to measure are those of the very clips that training sees."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from minimal import SKELETON, plain_recipe, recipe_with, small_clip, write_clips
+from test_phase import cycle
+
+from model_export import export, ingest, measured, phase, train
+from model_export.recipe import Recipe
+from model_export.sample import stroll
+from service.motion import card, measure
+from service.motion.errors import RecipeError, TrainingError
+from service.motion.measure import Measure, Seen
+
+# Half of the last decimal that is kept.
+KEPT = 0.5000001 * 10.0**-measured.DECIMALS
+# A file keeps a millionth of a degree and of a metre; a stride's way adds a few of them.
+WRITTEN = 1e-5
+
+
+def control(name, **auto):
+    return {"name": name, "description": name, "auto": auto}
+
+
+AUTO = [
+    control("speed", quantity="speed"),
+    control("turn", quantity="turn"),
+    {**stroll.recipe().controls[0].model_dump(), "name": "typed"},
+    control("stride", quantity="stride_length"),
+    control("step", quantity="step_length"),
+    control("lift", quantity="height", joint=["LeftFoot", "RightFoot"], at="highest"),
+    control("hips", quantity="root_height", at="down"),
+]
+LEG = control("leg", quantity="leg_length", joints=["LeftUpLeg", "LeftFoot"])
+
+
+def auto_recipe(*controls, **sections):
+    plain = tomllib.loads(stroll.TOML)
+    plain["controls"] = list(controls)
+    for section, values in sections.items():
+        plain[section] = {**plain.get(section, {}), **values}
+    return Recipe.model_validate(plain)
+
+
+@pytest.fixture(scope="module")
+def strides(tmp_path_factory):
+    """Folder of the stroll with a frame in the middle of each stride as a landmark, down."""
+    folder = stroll.write(tmp_path_factory.mktemp("strides"))
+    first, *rows = (folder / "strides.csv").read_text().splitlines()
+    rows = [f"{row},{20 + index % 3}" for index, row in enumerate(rows)]
+    (folder / "strides.csv").write_text("\n".join([f"{first},down", *rows]) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def own():
+    return auto_recipe(*AUTO, clips={"landmarks": ["down"]})
+
+
+@pytest.fixture(scope="module")
+def examples(own, strides):
+    return ingest.ingest(own, strides)[0]
+
+
+def seen(example):
+    clip = example.clip
+    gone = measured.travel(clip.rotations[:, 0], clip.root_path)
+    at = example.landmarks[0] * (len(clip) - 1)
+    parents = clip.skeleton.parents
+    return Seen(clip.positions(), clip.duration, gone, parents, example.offsets, at)
+
+
+MEASURES = {
+    "speed": Measure("speed"),
+    "turn": Measure("turn"),
+    "stride": Measure("stride_length"),
+    "step": Measure("step_length", (3, 6)),
+    "lift": Measure("height", (3, 6), "highest"),
+    "hips": Measure("height", (0,), "landmark"),
+}
+
+
+def columns(own, examples):
+    names = [control.name for control in own.controls]
+    return dict(zip(names, np.transpose([e.controls for e in examples]), strict=True))
+
+
+def test_controls_are_what_is_measured_of_the_clips_in_the_recipes_order(own, examples):
+    found = columns(own, examples)
+    for name, asked in MEASURES.items():
+        expected = np.array([measure.value(asked, seen(example)) for example in examples])
+        assert np.abs(found[name] - expected).max() < KEPT, name
+        assert np.ptp(expected) > 10 * KEPT, "negative control: it is not the same in all"
+
+
+def test_what_is_typed_stays_what_was_typed(own, examples):
+    found = columns(own, examples)["typed"]
+    assert found.tolist() == [example.row.controls[0] for example in examples]
+    assert all(len(example.row.controls) == 1 for example in examples)
+
+
+def test_measured_strides_are_those_that_were_made(own, examples):
+    found, haste = columns(own, examples), columns(own, examples)["typed"] / 3.6
+    veer = np.array([-0.5, -0.2, 0.2, 0.5] * 5)
+    assert np.abs(found["turn"] - np.degrees(veer)).max() < 100 * WRITTEN
+    chord = haste * np.sinc(veer / (2 * np.pi))
+    assert np.abs(found["speed"] - chord).max() < WRITTEN
+    assert np.abs(found["speed"] - haste).max() > 100 * WRITTEN, "negative control: arcs"
+
+
+def test_a_clip_elsewhere_that_faces_another_way_measures_the_same(tmp_path):
+    own = recipe_with()
+    plain = plain_recipe()
+    plain["controls"] = [
+        control("left", quantity="left", joint="LeftHand", at="end"),
+        control("ahead", quantity="forward", joint="LeftHand", at="farthest"),
+        control("low", quantity="height", joint="LeftHand", at="lowest"),
+    ]
+    plain["motion"] = own.motion.model_dump()
+    write_clips(tmp_path, [small_clip(heading=0.3), small_clip(heading=2.0), small_clip(1.0)])
+    found = [e.controls for e in ingest.ingest(Recipe.model_validate(plain), tmp_path)[0]]
+    assert np.abs(found[0] - found[1]).max() < WRITTEN
+    assert np.abs(found[0] - found[2]).max() > 100 * WRITTEN, "negative control"
+
+
+def test_one_performers_legs_have_one_length(strides):
+    found = columns(auto_recipe(LEG), ingest.ingest(auto_recipe(LEG), strides)[0])["leg"]
+    assert np.unique(found).tolist() == [stroll.THIGH + stroll.SHIN]
+
+
+def test_a_leg_is_that_of_the_roles_where_no_joints_are_named(strides):
+    roles = {"leftUpperLeg": "RightUpLeg", "leftFoot": "RightFoot"}
+    own = auto_recipe(control("leg", quantity="leg_length"), roles=roles)
+    joints = ingest.ingest(own, strides)[0][0].clip.skeleton
+    assert measured.of(own, own.measured[0], joints) == Measure("leg_length", (5, 6))
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        (["LeftFoot", "LeftUpLeg"], "'LeftUpLeg' does not hang below 'LeftFoot'"),
+        (["LeftUpLeg", "RightFoot"], "'RightFoot' does not hang below 'LeftUpLeg'"),
+        (["LeftFoot", "LeftFoot"], "'LeftFoot' does not hang below 'LeftFoot'"),
+    ],
+)
+def test_a_leg_of_no_chain_is_refused(strides, ends, said):
+    own = auto_recipe(control("leg", quantity="leg_length", joints=ends))
+    with pytest.raises(TrainingError, match=f"controls.leg.auto: {said}, expected the upper end"):
+        ingest.ingest(own, strides)
+
+
+def test_a_joint_that_is_not_there_is_named(strides):
+    own = auto_recipe(control("hand", quantity="height", joint=["LeftFoot", "Hand"], at="end"))
+    with pytest.raises(RecipeError, match=r"has no joints \['Hand'\] that the recipe names"):
+        ingest.ingest(own, strides)
+
+
+def test_a_joint_that_is_dropped_cannot_be_measured(strides):
+    asked = control("foot", quantity="height", joint="LeftFoot", at="end")
+    own = auto_recipe(asked, motion={"drop_joints": ["LeftLeg"], "feet": []})
+    with pytest.raises(RecipeError, match=r"joints \['LeftFoot'\] are dropped, and named"):
+        ingest.ingest(own, strides)
+
+
+def test_a_cycle_begun_elsewhere_is_measured_from_there():
+    own = recipe_with(motion={"cyclic": True}, alignment={"begin": "in_phase"})
+    plain = own.model_dump(by_alias=True, mode="json")
+    plain["controls"] = [
+        control("hand", quantity="height", joint="LeftHand", at="start"),
+        control("turn", quantity="turn"),
+    ]
+    auto = Recipe.model_validate(plain)
+    cuts = np.array([-12, 4, 8, -3, 3]) / 100
+    family = [cycle(cut) for cut in cuts]
+    family = [replace(e, controls=measured.controls(auto, e.row, e.clip, ())) for e in family]
+    begun = phase.in_phase(auto, tuple(family), np.ones(len(SKELETON)))
+    for before, after in zip(family, begun, strict=True):
+        again = measured.controls(auto, after.row, after.clip, after.landmarks)
+        assert np.array_equal(after.controls, again)
+        assert after.controls[1] == pytest.approx(before.controls[1], abs=1e-6)
+    hands = np.array([[e.controls[0] for e in own] for own in (family, begun)])
+    # In phase they begin alike; as they were cut they do not.
+    assert np.ptp(hands[1]) < 0.02 < 0.1 < np.ptp(hands[0])
+
+
+def test_the_same_speeds_are_not_a_control(strides, examples):
+    own = auto_recipe(control("speed", quantity="speed"), LEG)
+    found = ingest.ingest(own, strides)[0]
+    with pytest.raises(TrainingError, match=r"control 'leg' has the value 0\.9 in all 20 samples"):
+        train.train(own, found, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def made(strides):
+    own = auto_recipe(*AUTO[:2])
+    found, notes = ingest.ingest(own, strides)
+    trained = train.train(own, found, lambda _: None)
+    return own, trained, export.export(own, trained, notes).card
+
+
+def test_a_models_examples_are_what_is_measured_of_its_clips(made):
+    _, trained, own_card = made
+    asked = [control.measure for control in own_card.controls]
+    assert asked == [MEASURES["speed"], MEASURES["turn"]]
+    assert [control.unit for control in own_card.controls] == ["m/s", "deg"]
+    for example, kept in zip(trained.examples, own_card.examples, strict=True):
+        clip = replace(example, landmarks=(0.0,))
+        expected = [measure.value(one, seen(clip)) for one in asked]
+        assert np.abs(np.array(kept) - expected).max() < KEPT
+    again = card.load(card.dump(own_card))
+    assert [control.measure for control in again.controls] == asked
+
+
+def test_the_card_has_a_landmark_where_canonical_time_has_it(own, examples, strides):
+    joints = examples[0].clip.skeleton
+    marks = np.array([example.landmarks for example in examples])
+    hips = own.measured[-1]
+    found = measured.on_the_card(own, hips, joints, marks)
+    assert found == Measure("height", (0,), "landmark", round(float(marks.mean()), 4))
+    assert measured.on_the_card(own, own.typed[0], joints, marks) is None
+    assert found.share != round(float(marks[0, 0]), 4), "negative control: clips differ"

@@ -1,0 +1,175 @@
+"""What is measured of a motion is what was put into it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model_export.measured import travel
+from model_export.sample import stroll
+from service.motion import measure, quat
+from service.motion.conventions import UP
+from service.motion.measure import Measure, Seen
+
+# Sums and roots of numbers near one, in double precision.
+ROUNDING = 1e-12
+PARENTS = (-1, 0, 0)
+OFFSETS = np.array([(0.0, 0.0, 0.0), (0.3, 0.4, 0.0), (0.0, -0.8, 0.1)])
+FRAMES = 101
+TOP = 0.3
+"""Share of the motion at which the thrown joint is at its highest."""
+
+
+def thrown():
+    """A root that walks to the left and a joint that flies on a parabola ahead of it."""
+    t = np.linspace(0.0, 1.0, FRAMES)
+    root = np.stack([0.5 * t, np.full(FRAMES, 0.9), 0 * t], axis=1)
+    ball = np.stack([0 * t, 2.0 - 4.0 * (t - TOP) ** 2, 3.0 * t], axis=1)
+    foot = np.stack([0 * t, 0 * t, np.sin(2 * np.pi * t)], axis=1)
+    positions = np.stack([root, ball, foot], axis=1)
+    return Seen(positions, 2.0, np.array([0.5, 0.0, np.pi / 6]), PARENTS, OFFSETS, 25.5)
+
+
+def of(quantity, *joints, at=None, seen=None):
+    return measure.value(Measure(quantity, joints, at), thrown() if seen is None else seen)
+
+
+def test_the_highest_moment_is_the_top_of_the_parabola():
+    assert of("height", 1, at="highest") == pytest.approx(2.0, abs=ROUNDING)
+    assert of("forward", 1, at="highest") == pytest.approx(3.0 * TOP, abs=ROUNDING)
+    # Negative control: it comes down, and the lowest place is the farther end.
+    assert of("height", 1, at="lowest") == pytest.approx(2.0 - 4.0 * (1.0 - TOP) ** 2)
+    assert of("forward", 1, at="lowest") == pytest.approx(3.0)
+
+
+def test_places_are_those_of_their_moment_and_axis():
+    assert of("left", 0, at="start") == 0.0
+    assert of("left", 0, at="end") == pytest.approx(0.5)
+    assert of("height", 0, at="end") == pytest.approx(0.9)
+    # A landmark lies between two frames as on a straight line.
+    assert of("forward", 1, at="landmark") == pytest.approx(3.0 * 0.255)
+    assert of("left", 0, 1, at="end") == pytest.approx(0.25), "the middle of two"
+
+
+def test_farthest_is_from_the_root():
+    # The foot swings as far back as ahead, and the root has gone farther when it is back.
+    assert of("forward", 2, at="farthest") == pytest.approx(-1.0, abs=1e-3)
+    assert of("forward", 1, at="farthest") == pytest.approx(3.0)
+    seen = thrown()
+    seen.positions[:, 0, 0] *= -1.0
+    seen.positions[:, 0, 0] += 0.5
+    # Negative control: of a root that comes back it is the other end.
+    assert of("forward", 2, at="farthest", seen=seen) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_speed_is_way_over_time_and_turn_is_in_degrees():
+    assert of("stride_length") == pytest.approx(0.5)
+    assert of("speed") == pytest.approx(0.25)
+    assert of("turn") == pytest.approx(30.0)
+    twice = replace(thrown(), duration=4.0)
+    assert of("speed", seen=twice) == pytest.approx(0.125)
+    assert of("stride_length", seen=twice) == pytest.approx(0.5)
+
+
+def test_bodily_quantities_hang_on_bones_alone():
+    assert of("leg_length", 2) == pytest.approx(np.hypot(0.8, 0.1))
+    assert of("leg_length", 1, 2) == pytest.approx(0.5 + np.hypot(0.8, 0.1))
+    assert of("stature") == pytest.approx(0.4 + 0.8)
+    moved = replace(thrown(), positions=np.zeros((3, 3, 3)), duration=9.0, travel=np.ones(3))
+    assert of("stature", seen=moved) == of("stature")
+    taller = replace(thrown(), offsets=2.0 * OFFSETS)
+    assert of("stature", seen=taller) == pytest.approx(2.0 * of("stature"))
+
+
+INSENSITIVE = [
+    Measure("step_length", (1, 2)),
+    Measure("stride_length"),
+    Measure("speed"),
+    Measure("turn"),
+    Measure("leg_length", (2,)),
+    Measure("stature"),
+]
+
+
+@pytest.mark.parametrize("asked", INSENSITIVE, ids=lambda asked: asked.quantity)
+def test_what_is_no_place_does_not_hang_on_where_it_happens(asked):
+    seen = thrown()
+    elsewhere = replace(seen, positions=seen.positions + np.array([3.0, 1.0, -7.0]))
+    assert measure.value(asked, elsewhere) == pytest.approx(measure.value(asked, seen), rel=1e-9)
+
+
+@pytest.mark.parametrize("at", [m for m in measure.MOMENTS if m != "landmark"])
+@pytest.mark.parametrize("quantity", measure.AXES)
+def test_a_place_moves_with_the_motion_and_its_moment_does_not(quantity, at):
+    seen, way = thrown(), np.array([3.0, 1.0, -7.0])
+    elsewhere = replace(seen, positions=seen.positions + way)
+    gone = of(quantity, 1, at=at, seen=elsewhere) - of(quantity, 1, at=at)
+    assert gone == pytest.approx(way[measure.AXES[quantity]], abs=1e-9)
+
+
+def strolled(speed, turn):
+    clip = stroll.stride(speed, turn, 0.02)
+    gone = travel(clip.rotations[:, 0], clip.root_path)
+    offsets = stroll.SKELETON.offsets
+    return Seen(clip.positions(), clip.duration, gone, stroll.SKELETON.parents, offsets), clip
+
+
+def test_a_stroll_is_as_fast_and_turns_as_much_as_it_was_made_to():
+    for speed, turn in ((0.7, -0.5), (1.5, 0.0), (1.1, 0.2)):
+        seen, _ = strolled(speed, turn)
+        assert measure.value(Measure("turn"), seen) == pytest.approx(np.degrees(turn), abs=1e-9)
+        # Its way is the chord of an arc as long as its speed says.
+        arc = speed * seen.duration
+        chord = arc * np.sinc(turn / (2 * np.pi))
+        assert measure.value(Measure("stride_length"), seen) == pytest.approx(chord, abs=1e-9)
+        assert measure.value(Measure("speed"), seen) == pytest.approx(chord / seen.duration)
+    assert arc - chord > 1e-3, "negative control: an arc is longer than its chord"
+
+
+def test_a_step_of_the_stroll_is_half_its_stride():
+    seen, clip = strolled(1.1, 0.0)
+    feet = Measure("step_length", (3, 6))
+    length = measure.value(Measure("stride_length"), seen)
+    # Walking straight, a foot that came down half a stride after the other is that far ahead, when
+    # it has stopped; the frames of 1/60 s see that within what the foot moves in one.
+    assert measure.value(feet, seen) == pytest.approx(0.5 * length, rel=0.02)
+    ahead = clip.positions()[:, 3, 2] - clip.positions()[:, 6, 2]
+    assert abs(ahead.mean()) < 0.1 * length < np.abs(ahead).max(), "negative control"
+    swapped = Measure("step_length", (6, 3))
+    assert measure.value(swapped, seen) == measure.value(feet, seen)
+
+
+def test_heading_is_the_roots_own_and_not_its_sway():
+    t = np.linspace(0.0, 1.0, 11)
+    rolled = quat.about(np.array([0.0, 0.0, 1.0]), 0.2 * np.sin(2 * np.pi * t))
+    roots = quat.mul(quat.about(UP, 0.7 * t), rolled)
+    assert travel(roots, np.zeros((11, 3)))[2] == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit"), [("speed", "m/s"), ("turn", "deg"), ("height", "m"), ("stature", "m")]
+)
+def test_units_are_those_of_the_values(quantity, unit):
+    assert Measure(quantity).unit == unit
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        Measure("height", (4, 5), "landmark", 0.25),
+        Measure("left", (0,), "farthest"),
+        Measure("turn"),
+        Measure("leg_length", (2, 3)),
+    ],
+)
+def test_a_measure_read_is_the_measure_written(asked):
+    assert measure.parse(measure.plain(asked)) == asked
+    assert all(value not in (None, []) for value in measure.plain(asked).values())
+
+
+def test_a_measure_can_be_said():
+    names = ("hips", "hand", "foot")
+    assert measure.words(Measure("turn"), names) == "turn"
+    assert measure.words(Measure("step_length", (1, 2)), names) == "step length of hand and foot"
+    at_end = Measure("height", (1,), "landmark", 0.254)
+    assert measure.words(at_end, names) == "height of hand at landmark (25%)"

@@ -1,0 +1,127 @@
+"""What a question can be held to: what is refused, and what a query means."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from service.motion.card import Event
+from service.motion.errors import InvalidField
+from service.motion.measure import Measure
+from service.synthesis import session
+from service.synthesis.door import Door
+from service.synthesis.exact import goals
+from service.synthesis.question import Hold, Target
+
+PLACE = (0.3, 1.2, 0.4)
+
+
+@pytest.fixture(scope="module")
+def card(labelled_path):
+    """A card two of whose controls are measured: one on the motion, one on the body."""
+    own = session.load(labelled_path).card
+    hand = own.skeleton.names.index("RightHand")
+    measures = {"target_height": Measure("height", (hand,), "end"), "stature": Measure("stature")}
+    controls = tuple(replace(c, measure=measures.get(c.name)) for c in own.controls)
+    return replace(own, controls=controls)
+
+
+def question(card, **changed):
+    controls = {control.name: control.default for control in card.controls}
+    return replace(Door(card).question(controls, "warn", None, 0), **changed)
+
+
+def found(card, *targets, exact="auto"):
+    return goals.of(card, question(card), Hold(exact, targets), correctable=True)
+
+
+def test_auto_holds_to_what_is_measured_on_the_motion(card):
+    assert [name for name, _, _ in found(card).controls] == ["target_height"]
+    assert found(card, exact="none") == goals.NOTHING
+    assert not found(card, exact="none")
+
+
+def test_auto_does_not_hold_to_what_nobody_gave(card):
+    inferred = question(card, inferred=("target_height",))
+    assert not goals.of(card, inferred, Hold(), correctable=True)
+
+
+@pytest.mark.parametrize(
+    ("exact", "said"),
+    [
+        (("tallness",), "'tallness', expected controls of this model: stature"),
+        (("turn",), "'turn' is not measured on a motion, expected some of: target_height"),
+        (("stature",), "'stature' is not measured on a motion, expected some of: target_height"),
+    ],
+)
+def test_a_control_that_cannot_be_exact_is_named(card, exact, said):
+    with pytest.raises(InvalidField, match=said) as fault:
+        found(card, exact=exact)
+    assert fault.value.field == "exact"
+
+
+def test_a_control_that_was_not_given_cannot_be_exact(card):
+    inferred = question(card, inferred=("target_height",))
+    with pytest.raises(InvalidField, match="was not given"):
+        goals.of(card, inferred, Hold(("target_height",)), correctable=True)
+
+
+@pytest.mark.parametrize(
+    ("target", "field", "said"),
+    [
+        (Target("Tail", PLACE, "end"), "targets/0/joint", "'Tail', expected one of Hips"),
+        (Target("LeftHand", (0.0, math.nan, 1.0), "end"), "targets/0/position/1", "nan, expected"),
+        (Target("LeftHand", (0.0, math.inf, 1.0), "end"), "targets/0/position/1", "inf, expected"),
+        (Target("LeftHand", (0.0, 1.0, 1e4), "end"), "targets/0/position/2", "-100 to 100 m"),
+        (Target("LeftHand", (0.0, 1.0), "end"), "targets/0/position", "2 numbers, expected three"),
+        (Target("LeftHand", PLACE, -0.1), "targets/0/time", "-0.1 s, expected 0 to"),
+        (Target("LeftHand", PLACE, 1e9), "targets/0/time", "1e.09 s, expected 0 to"),
+        (Target("LeftHand", PLACE, math.nan), "targets/0/time", "nan, expected"),
+    ],
+)
+def test_a_target_that_is_none_is_named(card, target, field, said):
+    with pytest.raises(InvalidField, match=said) as fault:
+        found(card, target)
+    assert fault.value.field == field
+
+
+@pytest.mark.parametrize("when", ["end", 0.5])
+def test_a_joint_has_one_target_at_a_moment(card, when):
+    twins = Target("LeftHand", PLACE, when), Target("LeftHand", (0.0, 1.0, 0.0), when)
+    with pytest.raises(InvalidField, match="has a target already") as fault:
+        found(card, *twins)
+    assert fault.value.field == "targets/1"
+    assert len(found(card, twins[0], Target("RightHand", PLACE, when)).targets) == 2
+
+
+def test_more_targets_than_anybody_has_joints_for_are_refused(card):
+    many = [Target("LeftHand", PLACE, 0.01 * i) for i in range(goals.MOST_TARGETS + 1)]
+    with pytest.raises(InvalidField, match="more than 32"):
+        found(card, *many)
+    assert len(found(card, *many[:-1]).targets) == goals.MOST_TARGETS
+
+
+def test_a_target_counts_before_the_control_of_the_same_joint(card):
+    held = found(card, Target("RightHand", PLACE, "end"))
+    assert held.controls == () and len(held.targets) == 1
+    assert len(found(card, Target("RightHand", PLACE, "start")).controls) == 1
+    with pytest.raises(InvalidField, match="for whose joint there is a target"):
+        found(card, Target("RightHand", PLACE, "end"), exact=("target_height",))
+
+
+def test_the_event_is_the_cards_own(card):
+    middle = replace(card, event=Event(card.skeleton.names.index("RightHand"), 0.4))
+    asked = Target("LeftHand", PLACE, "event")
+    assert found(middle, asked).targets[0].moment.share == 0.4
+    ends = replace(card, event=Event(0, 1.0))
+    assert found(ends, asked).targets[0].moment.at == "end"
+    with pytest.raises(InvalidField, match="names none") as fault:
+        found(replace(card, event=None), asked)
+    assert fault.value.field == "targets/0/at"
+
+
+def test_an_old_file_is_held_to_nothing(card):
+    assert not goals.of(card, question(card), Hold(), correctable=False)
+    for hold in (Hold(("target_height",)), Hold(targets=(Target("LeftHand", PLACE, "end"),))):
+        with pytest.raises(InvalidField, match="older than exact controls"):
+            goals.of(card, question(card), hold, correctable=False)

@@ -1,0 +1,79 @@
+"""Questions that give targets instead of controls."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.motion.measure import Measure
+from service.synthesis import session
+from service.synthesis.question import ClipQuestion, Hold, Target
+from service.synthesis.synthesizer import Synthesizer
+
+
+@pytest.fixture(scope="module")
+def reach(labelled_path) -> Synthesizer:
+    """A model of a reach, one of whose controls is where the hand ends."""
+    opened = session.load(labelled_path)
+    hand = opened.card.skeleton.names.index("RightHand")
+    measures = {"target_height": Measure("height", (hand,), "end")}
+    controls = tuple(replace(c, measure=measures.get(c.name)) for c in opened.card.controls)
+    return Synthesizer("reach", replace(opened, card=replace(opened.card, controls=controls)))
+
+
+def captured(model, index):
+    """Controls of a captured clip, and where the model puts the hand there."""
+    card = model.session.card
+    controls = {c.name: v for c, v in zip(card.controls, card.examples[index], strict=True)}
+    clip = model.clip(ClipQuestion(controls, fps=200.0, hold=Hold("none"))).clip
+    return controls, clip.positions()[-1, card.skeleton.names.index("RightHand")]
+
+
+def asked(model, place, joint="RightHand", **given):
+    hold = Hold(targets=(Target(joint, tuple(place), "end"),))
+    return model.clip(ClipQuestion(given, hold=hold)).trust
+
+
+def off(model, controls, truth):
+    """Distance of those controls from others that a hand tells of, in ranges."""
+    ranges = {c.name: c.maximum - c.minimum for c in model.session.card.controls}
+    told = ("turn", "target_height")
+    return np.linalg.norm([(controls[n] - truth[n]) / ranges[n] for n in told])
+
+
+def test_controls_are_those_of_motions_that_get_there(reach):
+    gains, misses = [], []
+    for index in range(0, 46, 5):
+        truth, place = captured(reach, index)
+        found = asked(reach, place)
+        nothing = reach.clip(ClipQuestion({})).trust
+        gains.append(off(reach, found.controls, truth) / off(reach, nothing.controls, truth))
+        assert set(found.inferred) == set(truth)
+        misses.append(found.targets[0].miss)
+    # Who stands or sits, and how tall they are, no hand tells: the rest is found.
+    assert np.median(gains) < 0.4
+    assert np.median(misses) < 1e-3
+
+
+def test_a_control_that_the_target_is_about_is_read_off_it(reach):
+    _, place = captured(reach, 12)
+    found = asked(reach, place)
+    assert found.controls["target_height"] == place[1]
+    other = asked(reach, place, joint="LeftHand")
+    assert other.controls["target_height"] != place[1]
+
+
+def test_what_is_given_stays(reach):
+    truth, place = captured(reach, 12)
+    found = asked(reach, place, hip_height=truth["hip_height"])
+    assert found.controls["hip_height"] == truth["hip_height"]
+    assert "hip_height" not in found.inferred and len(found.inferred) == 3
+
+
+def test_the_chosen_controls_give_the_same_clip(reach):
+    _, place = captured(reach, 30)
+    hold = Hold(targets=(Target("RightHand", tuple(place), "end"),))
+    partial = reach.clip(ClipQuestion({}, hold=hold))
+    whole = reach.clip(ClipQuestion(partial.trust.controls, hold=hold))
+    assert np.array_equal(partial.clip.rotations, whole.clip.rotations)
+    assert whole.trust.inferred == ()

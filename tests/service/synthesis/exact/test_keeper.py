@@ -1,0 +1,210 @@
+"""Answers that are held to something, as clips and poses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.motion import skeleton
+from service.motion.card import Event
+from service.motion.errors import InvalidField
+from service.motion.measure import Measure
+from service.synthesis import session
+from service.synthesis.exact.goals import NOTHING, Goals
+from service.synthesis.question import ClipQuestion, Hold, Target
+from service.synthesis.session import Session
+from service.synthesis.synthesizer import Synthesizer
+
+FREE = Hold("none")
+
+
+def measured(path, measures) -> Synthesizer:
+    opened: Session = session.load(path)
+    controls = tuple(replace(c, measure=measures.get(c.name)) for c in opened.card.controls)
+    card = replace(opened.card, controls=controls)
+    return Synthesizer(path.stem, replace(opened, card=card))
+
+
+@pytest.fixture(scope="module")
+def reach(labelled_path) -> Synthesizer:
+    """A model of a reach whose hand can be held to its height."""
+    names = session.load(labelled_path).card.skeleton.names
+    return measured(
+        labelled_path, {"target_height": Measure("height", (names.index("RightHand"),), "end")}
+    )
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path) -> Synthesizer:
+    """A model of a walk."""
+    return Synthesizer("walk", session.load(walk_path))
+
+
+def middle(model, **changed):
+    return {c.name: c.default for c in model.session.card.controls} | changed
+
+
+def joint(model, answer, name) -> np.ndarray:
+    """Path (F, 3) of a joint of a clip."""
+    return answer.clip.positions()[:, model.session.card.skeleton.names.index(name)]
+
+
+def test_a_hand_ends_where_it_is_told_to(reach):
+    controls = middle(reach)
+    free = reach.clip(ClipQuestion(controls, hold=FREE))
+    goal = joint(reach, free, "RightHand")[-1] + [0.03, 0.02, -0.04]
+    target = Target("RightHand", tuple(goal), free.trust.duration)
+    held = reach.clip(
+        ClipQuestion(controls, fps=10 / free.trust.duration, hold=Hold(FREE.exact, (target,)))
+    )
+    assert np.linalg.norm(joint(reach, held, "RightHand")[-1] - goal) < 1e-4
+    assert np.linalg.norm(joint(reach, free, "RightHand")[-1] - goal) > 0.05
+    (met,) = held.trust.targets
+    assert met.reached and met.miss < 1e-4 and met.unit == "m" and free.trust.targets == ()
+
+
+def test_a_measured_control_is_met_unless_asked_otherwise(reach):
+    controls = middle(reach)
+    held, free = (reach.clip(ClipQuestion(controls, hold=hold)) for hold in (Hold(), FREE))
+    off = free.trust.measured["target_height"] - controls["target_height"]
+    assert abs(off) > 1e-3
+    assert held.trust.measured["target_height"] == pytest.approx(
+        controls["target_height"], abs=1e-4
+    )
+    assert [met.what for met in held.trust.targets] == ["target_height"]
+
+
+def test_what_is_measured_is_what_the_clip_shows(reach):
+    answer = reach.clip(ClipQuestion(middle(reach), fps=240.0, hold=FREE))
+    shown = joint(reach, answer, "RightHand")[-1, 1]
+    # The last frame of 240 a second is up to 4 ms before the end.
+    assert answer.trust.measured["target_height"] == pytest.approx(shown, abs=5e-3)
+    assert abs(joint(reach, answer, "LeftHand")[-1, 1] - shown) > 5e-2
+
+
+def test_poses_and_clips_of_a_held_motion_agree(reach):
+    controls = middle(reach)
+    hold = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), 0.5),))
+    clip = reach.clip(ClipQuestion(controls, fps=10.0, hold=hold))
+    pose = reach.pose(controls, [0.0, 0.5], "warn", None, 0, hold)
+    assert np.array_equal(pose.rotations[1], clip.clip.rotations[5])
+    translations = skeleton.translations(pose.bone_offsets, pose.root_position)
+    card = reach.session.card
+    places, _ = skeleton.forward(card.skeleton.parents, pose.rotations, translations)
+    hand = places[1, card.skeleton.names.index("LeftHand")]
+    miss = np.linalg.norm(hand - [0.3, 1.2, 0.4])
+    assert miss == pytest.approx(pose.trust.targets[-1].miss, abs=1e-6)
+
+
+@pytest.mark.parametrize("level", [0, 1, 3])
+def test_every_level_of_detail_meets_its_targets(reach, level):
+    controls = middle(reach)
+    free = reach.pose(controls, [0.5], "warn", None, level, FREE)
+    root = free.root_position[0].astype(float)
+    target = Target("Hips", tuple(np.add(root, [0.003, -0.003, 0.002])), 0.5)
+    held = reach.pose(controls, [0.5], "warn", None, level, Hold("none", (target,)))
+    assert np.linalg.norm(held.root_position[0] - root - [0.003, -0.003, 0.002]) < 1e-4
+    assert held.trust.level == level
+
+
+def test_a_time_after_the_end_is_refused(reach):
+    late = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), 5.0),))
+    with pytest.raises(InvalidField, match="expected 0 to") as fault:
+        reach.clip(ClipQuestion(middle(reach), hold=late))
+    assert fault.value.field == "targets/0/time"
+
+
+def test_a_speed_is_met_by_way_and_duration(walk):
+    question = walk.door.question(middle(walk), "warn", None, 0)
+    free = walk.keeper.held(question, NOTHING)
+    before = np.hypot(*free.travel[:2]) / free.duration
+    goals = Goals((("haste", Measure("speed"), 1.02 * before),), ())
+    held = walk.keeper.held(question, goals)
+    assert np.hypot(*held.travel[:2]) / held.duration == pytest.approx(1.02 * before, rel=1e-5)
+    assert held.met[0].reached and held.met[0].unit == "m/s"
+    # Captured walkers who are faster take longer steps and shorter ones in time.
+    assert held.duration < free.duration and np.hypot(*held.travel[:2]) > np.hypot(*free.travel[:2])
+    assert np.array_equal(held.scene.motion(held.numbers), free.scene.motion(free.numbers))
+
+
+def test_a_held_cycle_closes(walk):
+    controls = middle(walk)
+    place = joint(walk, walk.clip(ClipQuestion(controls)), "LeftFoot")[0] + [0.02, 0.02, 0.0]
+    hold = Hold("none", (Target("LeftFoot", tuple(place), 0.2),))
+    loop = walk.clip(ClipQuestion(controls, root="in_place", loop=True, hold=hold)).clip
+    assert np.abs(loop.positions()[0] - loop.positions()[-1]).max() < 1e-9
+    assert np.abs(loop.positions()[0] - loop.positions()[5]).max() > 1e-2
+    free = walk.clip(ClipQuestion(controls, root="in_place", loop=True, hold=FREE)).clip
+    assert np.abs(free.positions() - loop.positions()).max() > 1e-3
+
+
+def test_what_is_held_to_nothing_is_what_the_graph_says(reach, labelled_path):
+    controls = middle(reach)
+    plain = Synthesizer("reach", session.load(labelled_path))
+    graph, own = (model.clip(ClipQuestion(controls, hold=FREE)).clip for model in (plain, reach))
+    assert np.array_equal(graph.rotations, own.rotations)
+    held = reach.clip(ClipQuestion(controls)).clip
+    assert not np.array_equal(graph.rotations, held.rotations)
+
+
+def test_the_same_question_gives_the_same_numbers(reach, labelled_path):
+    hold = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), "event"),))
+    names = session.load(labelled_path).card.skeleton.names
+    other = measured(
+        labelled_path, {"target_height": Measure("height", (names.index("RightHand"),), "end")}
+    )
+    both = [m.clip(ClipQuestion(middle(m), hold=hold)).clip for m in (reach, other, reach)]
+    assert np.array_equal(both[0].rotations, both[1].rotations)
+    assert np.array_equal(both[0].rotations, both[2].rotations)
+
+
+def test_an_extreme_is_met_where_it_is(reach):
+    controls = middle(reach)
+    free = reach.clip(ClipQuestion(controls, fps=200.0, hold=FREE))
+    path = joint(reach, free, "LeftHand")
+    top = path[np.argmax(path[:, 1])]
+    target = Target("LeftHand", tuple(np.add(top, [0.0, 0.03, 0.0])), "highest")
+    held = reach.clip(ClipQuestion(controls, fps=200.0, hold=Hold("none", (target,))))
+    assert joint(reach, held, "LeftHand")[:, 1].max() == pytest.approx(top[1] + 0.03, abs=2e-3)
+    assert held.trust.targets[0].reached
+
+
+def test_the_event_needs_no_landmark(reach):
+    card = replace(reach.session.card, event=Event(0, 0.5))
+    model = Synthesizer("reach", replace(reach.session, card=card))
+    hold = Hold("none", (Target("LeftHand", (0.3, 1.1, 0.2), "event"),))
+    assert (
+        model.clip(ClipQuestion(middle(model), hold=hold)).trust.targets[0].what
+        == "LeftHand at event"
+    )
+
+
+def test_pinned_feet_stay_where_they_stand(reach):
+    names = reach.session.card.skeleton.names
+    feet = names.index("LeftFoot"), names.index("RightFoot")
+    card = replace(reach.session.card, feet=feet)
+    reach = Synthesizer("reach", replace(reach.session, card=card))
+    controls = middle(reach)
+    free = reach.clip(ClipQuestion(controls, fps=60.0, hold=FREE))
+    goal = np.add(joint(reach, free, "RightHand")[-1], [0.02, -0.01, 0.02])
+    targets = (Target("RightHand", tuple(goal), "end"),)
+    held, pinned = (
+        reach.clip(ClipQuestion(controls, fps=60.0, hold=Hold("none", targets, pin)))
+        for pin in (False, True)
+    )
+
+    def moved(answer):
+        gaps = [joint(reach, answer, n) - joint(reach, free, n) for n in ("LeftFoot", "RightFoot")]
+        return float(np.linalg.norm(gaps, axis=-1).mean())
+
+    assert moved(pinned) < 0.5 * moved(held)
+    assert moved(held) > 1e-4
+    assert pinned.trust.targets[0].miss < 1e-4
+    assert pinned.trust.targets[0].miss == pytest.approx(held.trust.targets[0].miss, abs=1e-4)
+
+
+def test_feet_that_nobody_named_cannot_be_pinned(reach):
+    model = Synthesizer("reach", replace(reach.session, card=replace(reach.session.card, feet=())))
+    with pytest.raises(InvalidField, match="names no feet") as fault:
+        model.clip(ClipQuestion(middle(model), hold=Hold(pin_feet=True)))
+    assert fault.value.field == "pin_feet"

@@ -1,0 +1,174 @@
+"""What is left out of a question is the most typical for what is in it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.motion.errors import InvalidField
+from service.synthesis import session, typical
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.typical import Chooser, fit
+from service.synthesis.why import WhyQuestion, why
+
+# A solve of numbers near one.
+ROUNDING = 1e-9
+NOBODY = np.zeros((1, 0))
+
+
+@pytest.fixture
+def drawn(rng):
+    """Draws of a Gaussian of three numbers, and of one that is as good as the second."""
+    free = rng.normal(size=(400, 3)) @ np.array([(2.0, 0.5, 0.0), (0.0, 1.0, 0.3), (0.0, 0.0, 0.1)])
+    return np.hstack([free + np.array([1.0, -2.0, 30.0]), 5.0 * free[:, 1:2]])
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return Synthesizer("labelled", session.load(labelled_path))
+
+
+@pytest.fixture(scope="module")
+def card(model):
+    return model.session.card
+
+
+def test_of_nothing_given_the_mean_is_typical(drawn):
+    assert np.abs(fit(drawn)({}) - drawn.mean(axis=0)).max() < ROUNDING
+
+
+def test_what_is_given_stays_as_it_is_and_the_mean_is_its_own_companion(drawn):
+    found = fit(drawn)
+    assert found({1: 0.1 + 0.2})[1] == 0.1 + 0.2
+    mean = drawn.mean(axis=0)
+    assert np.abs(found({0: mean[0], 2: mean[2]}) - mean).max() < ROUNDING
+    every = dict(enumerate(drawn[7].tolist()))
+    assert found(every).tolist() == drawn[7].tolist()
+
+
+def test_of_one_given_all_others_follow_by_regression(drawn):
+    given = drawn[:, 0].mean() + 1.5
+    slope = np.cov(drawn.T, ddof=0)[:, 0] / drawn[:, 0].var()
+    expected = drawn.mean(axis=0) + (1.0 - typical.SHRUNK) * slope * 1.5
+    assert np.abs(fit(drawn)({0: given}) - expected)[1:].max() < ROUNDING
+    assert np.abs(slope[1] * 1.5) > 0.1, "negative control: it does follow"
+
+
+def test_of_several_given_the_others_are_the_conditional_mean(drawn):
+    # Least squares on a constant and what is given says the same.
+    design = np.column_stack([np.ones(len(drawn)), drawn[:, [0, 2]]])
+    by_least_squares = np.linalg.lstsq(design, drawn[:, [1, 3]], rcond=None)[0]
+    asked = np.array([1.0, 3.0, 30.2])
+    found = fit(drawn, shrunk=0.0)({0: 3.0, 2: 30.2})
+    assert np.abs(found[[1, 3]] - asked @ by_least_squares).max() < 1e-8
+    assert found[0] == 3.0 and found[2] == 30.2
+
+
+def test_columns_that_say_the_same_are_no_trouble(drawn):
+    twice = np.hstack([drawn, drawn[:, :1], np.full((len(drawn), 1), 7.0)])
+    found = fit(twice)({0: 3.0, 4: 3.0, 5: 7.0})
+    assert np.isfinite(found).all()
+    assert found[1] == pytest.approx(fit(drawn)({0: 3.0})[1], abs=0.2)
+
+
+def test_units_do_not_matter(drawn):
+    scale = np.array([1.0, 100.0, 1e-3, 1.0])
+    found = fit(scale * drawn)({0: 3.0, 2: 30.1e-3})
+    assert np.abs(found / scale - fit(drawn)({0: 3.0, 2: 30.1})).max() < ROUNDING * 1e3
+
+
+def test_a_control_of_few_values_takes_one_of_them_and_others_follow_it(card):
+    few = [i for i, control in enumerate(card.controls) if control.values]
+    assert few, "the family has statures"
+    found = Chooser(card).fill({}, NOBODY)
+    for i in few:
+        control = card.controls[i]
+        mean = np.mean([point[i] for point in card.examples])
+        assert found[control.name] in control.values
+        assert found[control.name] == min(control.values, key=lambda value: abs(value - mean))
+    given = {card.controls[i].name: found[card.controls[i].name] for i in few}
+    assert Chooser(card).fill(given, NOBODY) == found
+
+
+def test_what_is_chosen_is_short_and_within_what_was_sampled(card):
+    rare = {"target_height": card.control("target_height").maximum * 50}
+    for given in ({}, {"turn": 21.0}, rare):
+        found = Chooser(card).fill(given, NOBODY)
+        assert list(found) == [control.name for control in card.controls]
+        for control in card.controls:
+            if control.name in given:
+                assert found[control.name] == given[control.name]
+                continue
+            assert control.minimum <= found[control.name] <= control.maximum
+            short = float(f"{found[control.name]:.6g}")
+            ends = (control.minimum, control.maximum, *control.values)
+            assert found[control.name] in (short, *ends)
+
+
+def test_a_performer_who_is_named_is_typical_of_himself(card):
+    chooser, who = Chooser(card), np.eye(len(card.performers))
+    statures = {}
+    for i, name in enumerate(card.performers):
+        statures[name] = chooser.fill({}, who[i : i + 1])["stature"]
+        own = [p[0] for p, mover in zip(card.examples, card.moved_by, strict=True) if mover == i]
+        assert abs(statures[name] - np.mean(own)) < 0.05
+    assert statures["short"] < statures["middle"] < statures["tall"]
+
+
+def left_out(model, asked):
+    """A question's answer, and that of the whole question with what was chosen."""
+    part = model.clip(asked)
+    whole = model.clip(replace(asked, controls=part.trust.controls))
+    return part, whole
+
+
+@pytest.mark.parametrize("given", [{}, {"turn": 20.0}, {"turn": 20.0, "stature": 1.7}])
+@pytest.mark.parametrize("performer", [None, "tall"])
+def test_the_answer_is_that_of_the_whole_question(model, given, performer):
+    asked = ClipQuestion(given, performer=performer)
+    part, whole = left_out(model, asked)
+    names = [control.name for control in model.session.card.controls]
+    assert part.trust.inferred == tuple(name for name in names if name not in given)
+    assert whole.trust.inferred == ()
+    assert replace(part.trust, inferred=()) == whole.trust
+    for field in ("rotations", "translations"):
+        assert getattr(part.clip, field).tobytes() == getattr(whole.clip, field).tobytes()
+    other = model.clip(replace(asked, controls={**part.trust.controls, "turn": -20.0}))
+    assert other.clip.rotations.tobytes() != whole.clip.rotations.tobytes(), "negative control"
+
+
+def test_poses_and_reasons_choose_alike(model):
+    given = {"target_height": 1.2}
+    clip = model.clip(ClipQuestion(given)).trust
+    pose = model.pose(given, [0.1], "warn").trust
+    reasons = why(model, WhyQuestion(given, "warn"))
+    assert clip.controls == pose.controls == reasons.controls
+    assert clip.inferred == pose.inferred == reasons.inferred
+    assert clip.inferred == ("stature", "hip_height", "turn")
+    whole = why(model, WhyQuestion(clip.controls, "warn"))
+    assert replace(reasons, inferred=()) == whole
+
+
+def test_another_process_would_choose_the_same(model, labelled_path):
+    again = Synthesizer("labelled", session.load(labelled_path))
+    given = {"turn": -3.0}
+    assert again.pose(given, [0.0], "warn").trust == model.pose(given, [0.0], "warn").trust
+
+
+def test_only_what_is_given_is_warned_of(model, card):
+    high = card.control("target_height").maximum + 0.2
+    trust = model.pose({"target_height": high}, [0.0], "warn").trust
+    assert len(trust.warnings) == 1 and trust.warnings[0].startswith("target_height")
+    # All that was given is sampled: nothing that was chosen makes it refused.
+    for turn in (card.control("turn").minimum, card.control("turn").maximum):
+        assert model.pose({"turn": turn}, [0.0], "refuse").trust.warnings == ()
+
+
+def test_what_is_unknown_or_no_number_is_refused_all_the_same(model):
+    with pytest.raises(InvalidField, match="no such control; this model has stature"):
+        model.pose({"speed": 1.0}, [0.0], "warn")
+    with pytest.raises(InvalidField, match="nan, expected a finite number"):
+        model.pose({"turn": float("nan")}, [0.0], "warn")
+    with pytest.raises(InvalidField, match="expected one of middle, short, tall"):
+        model.pose({}, [0.0], "warn", "eve")
