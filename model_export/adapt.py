@@ -38,7 +38,8 @@ class Adapted:
 
 def adapt(known: Known, examples: Sequence[Example], performer: str) -> Adapted:
     """Model that also knows a performer of some examples, by a name that it does not know yet."""
-    return solve(known, canonical.move(known, examples), performer)
+    begun = canonical.begin(known, examples)
+    return solve(known, canonical.move(known, begun), performer)
 
 
 def solve(known: Known, moved: Moved, performer: str) -> Adapted:

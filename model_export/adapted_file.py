@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from model_export import adapt, canonical, cost, exams, export, fidelity, thin, threads
+from model_export import adapt, canonical, cost, exams, export, fidelity, new_clips, thin, threads
 from model_export.adapt import Adapted
 from model_export.exams import Exam
 from model_export.export import FEW_VALUES, Exported
@@ -55,7 +55,9 @@ def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
     """
     refuse_name(reopened.card, newcomer.performer)
     with threads.one():
-        moved = canonical.move(reopened.known, newcomer.examples)
+        begun = canonical.begin(reopened.known, newcomer.examples)
+        examples = new_clips.measured_again(reopened, newcomer.examples, begun)
+        moved = canonical.move(reopened.known, examples)
         canonical.refuse_strangers(reopened.known, moved)
         adapted = adapt.solve(reopened.known, moved, newcomer.performer)
         laddered = _ladder(reopened, adapted)

@@ -84,17 +84,23 @@ class Moved:
     distances: Floats
 
 
+def begin(known: Known, examples: Sequence[Example]) -> tuple[Example, ...]:
+    """Examples that begin where a model's cycles do, if those were brought to begin together."""
+    if not known.in_phase:
+        return tuple(examples)
+    with threads.one():
+        references = _references(known, examples)
+        return phase.in_phase_with(examples, references, known.joint_weights, known.in_place)
+
+
 def move(known: Known, examples: Sequence[Example]) -> Moved:
-    """Examples in the canonical time of a model."""
+    """Examples in the canonical time of a model, where they begin as its own do."""
     with threads.one():
         return _move(known, examples)
 
 
 def _move(known: Known, examples: Sequence[Example]) -> Moved:
-    references = np.stack([_expected(known, example) for example in examples])
-    if known.in_phase:
-        weights, in_place = known.joint_weights, known.in_place
-        examples = phase.in_phase_with(examples, references, weights, in_place)
+    references = _references(known, examples)
     aligned = align.align_to(examples, references, known.canon)
     distances = _distances(known, examples, aligned.logs, references)
     gone = {}
@@ -107,6 +113,10 @@ def _move(known: Known, examples: Sequence[Example]) -> Moved:
     findings = jumps + flipped + own_chart.far(rotations)
     numbers = own_chart.numbers(rotations, aligned.root_path)
     return Moved(tuple(examples), aligned, numbers, offsets, gone, findings, distances)
+
+
+def _references(known: Known, examples: Sequence[Example]) -> Floats:
+    return np.stack([_expected(known, example) for example in examples])
 
 
 def _expected(known: Known, example: Example) -> Floats:

@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from service.cli import Controls, Json, ModelPath, as_json, encoder, numbers, wrote
-from service.encode.convention import Up
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField, TrainingError
-from service.synthesis import session
 
 if TYPE_CHECKING:
     from model_export.evaluate.learning import Learning
@@ -33,6 +31,7 @@ Scheduler = Annotated[
     ),
 ]
 
+Up = Literal["y", "z"]
 RootOffset = Literal["replace", "add"]
 
 
@@ -199,7 +198,7 @@ def adapt(
         raise InvalidField("unit", f"{unit}, expected a length in metres")
     progress = _Progress()
     progress(f"reading {model}")
-    known = reopen.reopen(session.read(model), str(model))
+    known = reopen.load(model)
     adapted_file.refuse_name(known.card, performer)
     source = new_clips.Source(unit, up, root_offset)
     progress("reading clips")

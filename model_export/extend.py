@@ -21,16 +21,11 @@ from service.motion.conventions import Floats
 @dataclass(frozen=True)
 class Extended:
     """The old samples, then the new clips: tensor, its decomposition, and the ranks that lose
-    nothing of it.
-
-    beyond (k,): how far each new clip lies from all that the old bases can say, root mean square
-    over joints and frames, m.
-    """
+    nothing of it."""
 
     tensor: MotionTensor
     full: Multilinear
     ranks: tuple[int, int, int]
-    beyond: Floats
 
 
 @dataclass(frozen=True)
@@ -71,15 +66,8 @@ def extend(
     turned = np.pad(turned, ((0, len(new) - len(turned)), (0, 0), (0, 0)))
     whole = _tensor(np.concatenate([turned, new], axis=2), space, directions, decoder, weight)
     full = hosvd.decompose(whole.values)
-    said = coordinates[:, : space.directions.shape[1]] @ times
-    beyond = np.sum(np.square(centred), axis=(1, 2)) - np.sum(np.square(said), axis=(1, 2))
     samples = min(decoder.reduced.core.shape[2] + clips, full.core.shape[2])
-    return Extended(
-        whole,
-        full,
-        (len(new), longer.shape[1], samples),
-        np.sqrt(np.maximum(beyond, 0.0) / (weight * frames)),
-    )
+    return Extended(whole, full, (len(new), longer.shape[1], samples))
 
 
 def _reduced(decoder: Decoder) -> Floats:

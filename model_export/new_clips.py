@@ -11,20 +11,16 @@ from typing import Literal
 
 import numpy as np
 
-from model_export import data, ingest, table
+from model_export import data, ingest, measured, table
 from model_export.ingest import Example
 from model_export.reopen import Reopened
 from model_export.table import Row, Table
-from service.motion import bvh, measure, quat, skeleton
+from service.motion import bvh, measure
 from service.motion.card import Control
 from service.motion.clip import Clip
-from service.motion.conventions import UP, Floats
+from service.motion.conventions import Floats
 from service.motion.errors import RecipeError
-from service.motion.measure import Seen
 from service.motion.skeleton import Skeleton
-
-# Below a micrometre a measured value is rounding.
-DECIMALS = 6
 
 
 @dataclass(frozen=True)
@@ -133,7 +129,8 @@ def _example(
         notes += ingest.offset_notes(file, row)
     clip, jumps, said = ingest.canonical(clip, row, own.cyclic, own.root == "in_place")
     marks = ingest.landmarks(row, last)
-    return Example(row, clip, np.zeros(0), marks, jumps), notes + said
+    nothing = np.full(len(own.controls), np.nan)
+    return Example(row, clip, nothing, marks, jumps), notes + said
 
 
 def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str]]:
@@ -160,18 +157,34 @@ def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str
     return smaller, [said] if others else []
 
 
-def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) -> Floats:
-    """Controls (d,) of an example: those given, and the others measured."""
-    seen = _seen(example.clip)
+def measured_again(
+    reopened: Reopened, before: Sequence[Example], after: Sequence[Example]
+) -> list[Example]:
+    """Examples that begin elsewhere than before, with what was measured of them measured anew: of a
+    cycle on an arc, the way from one phase is not that from another."""
+    found = []
+    for old, new in zip(before, after, strict=True):
+        said = zip(reopened.card.controls, old.controls, _controls(reopened, old, {}), strict=True)
+        given = {control.name: float(own) for control, own, again in said if own != again}
+        found.append(replace(new, controls=_controls(reopened, new, given)))
+    return found
 
-    def value(control: Control) -> float:
-        if control.name in given or control.measure is None:
+
+def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) -> Floats:
+    """Controls (d,) of an example: those given, and the others measured or as they are."""
+    seen = measured.seen(example.clip)
+
+    def value(control: Control, own: float) -> float:
+        if control.name in given:
             return given[control.name]
+        if control.measure is None:
+            return own
         at = _landmark(reopened, control, example) * (len(example.clip) - 1)
         found = measure.value(control.measure, replace(seen, landmark=at))
-        return round(found, DECIMALS) + 0.0
+        return round(found, measured.DECIMALS) + 0.0
 
-    return np.array([value(control) for control in reopened.card.controls])
+    pairs = zip(reopened.card.controls, example.controls.tolist(), strict=True)
+    return np.array([value(control, own) for control, own in pairs])
 
 
 def _landmark(reopened: Reopened, control: Control, example: Example) -> float:
@@ -180,14 +193,3 @@ def _landmark(reopened: Reopened, control: Control, example: Example) -> float:
         return 0.0
     times = np.array(list(reopened.making.landmarks.values()))
     return example.landmarks[int(np.argmin(np.abs(times - control.measure.share)))]
-
-
-def _seen(clip: Clip) -> Seen:
-    offsets, parents = clip.translations.mean(axis=0), clip.skeleton.parents
-    offsets[0] = 0.0
-    local = skeleton.translations(offsets, clip.root_path)
-    positions, _ = skeleton.forward(parents, clip.rotations, local)
-    turned = quat.mul(clip.rotations[-1, 0], quat.conj(clip.rotations[0, 0]))
-    way = clip.root_path[-1] - clip.root_path[0]
-    gone = np.array([way[0], way[2], float(quat.twist(turned, UP))])
-    return Seen(positions, clip.duration, gone, parents, offsets)

@@ -7,6 +7,7 @@ of each field: the card has the pose's, the graph scales and labels of all, and 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,11 @@ class _File:
 
     def __contains__(self, name: str) -> bool:
         return name in self.numbers
+
+
+def load(path: Path) -> Reopened:
+    """The same of a file's content; ModelError where it cannot be read."""
+    return reopen(session.read(path), str(path))
 
 
 def reopen(content: bytes, source: str) -> Reopened:

@@ -225,7 +225,6 @@ def _fit(
     reduced = full.truncated(ranks.choose(recipe.size, full, price, judge))
     explained = {name: found.explained for name, found in fits.beside.items()}
     residuals = {name: found.residuals for name, found in fits.beside.items()}
-    parents, left_out = examples[0].clip.skeleton.parents, residuals | {"pose": fits.pose.residuals}
     return Trained(
         _model(recipe, controls, moved, own_tensor, fits, reduced),
         tuple(examples),
@@ -241,7 +240,7 @@ def _fit(
         moved.findings,
         residuals,
         judge.of(reduced),
-        shares.of_joints(own_tensor, full, parents, moved.offsets, left_out),
+        shares.of_joints(judge, full, fits.pose, residuals.get("travel")),
     )
 
 

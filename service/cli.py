@@ -65,6 +65,9 @@ LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the fine
 JointNames = Annotated[Names, typer.Option(help="what joints are called")]
 RootMotion = Annotated[Root, typer.Option(help="whether the root travels")]
 Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last frame is its first")]
+JointSigma = Annotated[
+    bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
+]
 ExactControls = Annotated[
     str | None,
     typer.Option(
@@ -83,9 +86,6 @@ Targets = Annotated[
     ),
 ]
 PinFeet = Annotated[bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")]
-JointSigma = Annotated[
-    bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
-]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -161,10 +161,10 @@ def pose(
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
     level: LevelOfDetail = 0,
+    joint_sigma: JointSigma = False,
     exact: ExactControls = None,
     target: Targets = None,
     pin_feet: PinFeet = False,
-    joint_sigma: JointSigma = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
@@ -190,10 +190,10 @@ def clip(
     names: JointNames = "own",
     root: RootMotion = "travelling",
     loop: Loop = False,
+    joint_sigma: JointSigma = False,
     exact: ExactControls = None,
     target: Targets = None,
     pin_feet: PinFeet = False,
-    joint_sigma: JointSigma = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -205,16 +205,7 @@ def clip(
     controls = numbers(control or [])
     held = spelling.hold(exact, target or (), pin_feet)
     asked = ClipQuestion(
-        controls,
-        fps,
-        extrapolate,
-        start,
-        end,
-        performer,
-        level,
-        names,
-        root,
-        loop,
+        *(controls, fps, extrapolate, start, end, performer, level, names, root, loop),
         joint_sigma=joint_sigma,
         hold=held,
     )

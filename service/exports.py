@@ -164,9 +164,7 @@ def _said(place: str, outcome: Outcome, look: Look) -> str:
     facts = outcome.facts
     said = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
-        said += (
-            f", {facts['warned']} of them outside what was sampled, in a gap of it or out of reach"
-        )
+        said += f", {facts['warned']} of them like nothing that was captured, or out of reach"
     if facts["skipped"]:
         said += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
     if outcome.before:

@@ -6,10 +6,21 @@ import newcomers
 import numpy as np
 import pytest
 
-from model_export import adapt, canonical, export, ingest, kriging, new_fields, reopen, train
+from model_export import (
+    adapt,
+    canonical,
+    export,
+    ingest,
+    kriging,
+    new_fields,
+    phase,
+    reopen,
+    train,
+)
 from model_export.evaluate import errors, methods, motion
 from model_export.evaluate.methods import Asked
 from model_export.field_bank import Constant
+from model_export.sample import stroll
 from service.motion import quat
 from service.motion.errors import TrainingError
 
@@ -218,3 +229,45 @@ def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, 
     fewer = adapt.adapt(reopened, examples(trained, "cy", SHOWN[:2]), "cy").model
     gaps = np.linalg.norm(fewer.evaluate(*question).positions(parents) - expected, axis=-1)
     assert gaps.max() > 1e-3
+
+
+@pytest.fixture(scope="module")
+def walkers(strides):
+    """A walk of two walkers who are told apart, and strides that a third shows."""
+    plain = stroll.recipe()
+    told = plain.kriging.model_copy(update={"label": "performer"})
+    recipe = plain.model_copy(update={"kriging": told})
+    named = [
+        replace(e, row=replace(e.row, performer="ab"[i % 2])) for i, e in enumerate(strides[3:])
+    ]
+    trained = train.train(recipe, named, lambda _: None)
+    return recipe, trained, strides[:3]
+
+
+def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
+    recipe, trained, shown = walkers
+    model = adapt.adapt(canonical.known(recipe, trained), shown, "new").model
+    who = np.eye(3)[[model.bank.performers.index("new")]]
+    for example in shown:
+        seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]
+        found = model.evaluate(example.controls[None], np.array([[0.0, seconds]]), who)
+        way = example.clip.root_path[-1] - example.clip.root_path[0]
+        gone = found.root_position[0, 1] - found.root_position[0, 0]
+        assert np.linalg.norm(gone - way) < 0.05 < np.linalg.norm(way)
+        # All but where the root is and heads: the last pose is the first.
+        ends = found.rotations[0, :, 1:]
+        assert np.abs(ends[0] - ends[1]).max() < 1e-9
+        middle = model.evaluate(example.controls[None], np.array([[seconds / 2]]), who)
+        assert np.abs(middle.rotations[0, 0, 1:] - ends[0]).max() > 0.1
+
+
+def test_a_cycle_that_was_cut_elsewhere_is_begun_with_the_family(walkers):
+    recipe, trained, shown = walkers
+    known = canonical.known(recipe, trained)
+    late = [phase.begin(example, 0.3) for example in shown]
+    assert canonical.begin(replace(known, in_phase=False), late) == tuple(late)
+    found = canonical.begin(replace(known, in_phase=True), late)
+    cut, begun, right = (canonical.move(known, clips) for clips in (late, found, shown))
+    assert begun.distances.max() < 1.5 * right.distances.max()
+    assert cut.distances.min() > 2.0 * begun.distances.max()
+    assert [round(example.shift, 1) for example in begun.examples] == [-0.3] * 3

@@ -68,6 +68,22 @@ def test_what_can_be_measured_is_measured(reopened, table):
     assert [e.controls[0] for e in said] == [2.0, 7.0]
 
 
+def test_what_was_measured_is_measured_again_where_a_clip_begins_elsewhere(reopened, table):
+    hand = reopened.card.skeleton.names.index("LeftHand")
+    own = with_measure(reopened, Measure("height", (hand,), "start"))
+    (example,), _ = new_clips.of_files(own, [table.parent / "0.bvh"], METRES, "cy")
+    clip = example.clip
+    later = replace(clip, rotations=clip.rotations[9:], translations=clip.translations[9:])
+    (again,) = new_clips.measured_again(own, [example], [replace(example, clip=later)])
+    assert again.controls[0] == pytest.approx(clip.positions()[9, hand, 1], abs=1e-6)
+    assert again.controls[0] != example.controls[0]
+    # What somebody said stays, and so does what cannot be measured.
+    said = replace(example, controls=np.array([2.0]))
+    for model in (own, reopened):
+        (kept,) = new_clips.measured_again(model, [said], [replace(said, clip=later)])
+        assert kept.controls.tolist() == [2.0]
+
+
 def test_a_control_that_nobody_can_measure_is_asked_for(reopened, table):
     with pytest.raises(RecipeError, match="nothing says 'speed', which cannot be measured"):
         new_clips.of_files(reopened, [table.parent / "0.bvh"], METRES, "cy")

@@ -9,44 +9,46 @@ from model_export import fidelity, shares
 
 
 @pytest.fixture
-def offsets(trained):
-    return np.stack([example.offsets for example in trained.examples])
+def judge(small_recipe, trained):
+    return fidelity.judge(small_recipe, trained.examples, trained.tensor)
 
 
-def asked(trained, offsets, residuals):
-    return shares.of_joints(
-        trained.tensor, trained.full, trained.skeleton.parents, offsets, residuals
-    )
-
-
-def test_squares_average_to_one_and_hands_err_more_than_hips(trained, offsets):
-    found = asked(trained, offsets, {"pose": trained.pose.residuals})
+def test_squares_average_to_one_and_hands_err_more_than_hips(judge, trained):
+    found = shares.of_joints(judge, trained.full, trained.pose, None)
     assert np.mean(np.square(found)) == pytest.approx(1.0, abs=1e-3)
-    assert np.array_equal(found, trained.joints)
+    assert found == pytest.approx(trained.joints, rel=1e-9)
     hand, hips = map(trained.skeleton.names.index, ("RightHand", "Hips"))
     assert found[hand] > 1.5 * found[hips]
 
 
-def test_shares_are_of_distances_between_the_clip_and_its_prediction(trained, offsets):
-    whole, parents, clip = trained.tensor, trained.skeleton.parents, 7
-    values, own = whole.values[:, :, [clip]], offsets[[clip]]
-    predicted = values - trained.full.slices(trained.pose.residuals[[clip]])
-    places = [fidelity.positions(whole, each, parents, own) for each in (values, predicted)]
-    squares = np.mean(np.square(np.linalg.norm(places[0] - places[1], axis=-1)[0]), axis=0)
-    alone, rest = replace(whole, values=values), {"pose": trained.pose.residuals[[clip]]}
-    found = shares.of_joints(alone, trained.full, parents, own, rest)
-    assert np.allclose(found, np.sqrt(squares / squares.mean()), atol=1e-9)
-    # Negative control: another clip's prediction lies elsewhere.
-    others = {"pose": trained.pose.residuals[[clip + 1]]}
-    assert not np.allclose(shares.of_joints(alone, trained.full, parents, own, others), found)
+def test_shares_are_of_distances_to_the_prediction_by_what_is_usual_of_each_clip(judge, trained):
+    total = np.zeros(len(trained.skeleton))
+    plain = np.zeros_like(total)
+    for clip in range(len(trained.examples)):
+        one = [clip]
+        values = trained.tensor.values[:, :, one]
+        predicted = values - trained.full.slices(trained.pose.residuals[one])
+        places = [
+            fidelity.positions(trained.tensor, each, judge.parents, judge.offsets[one])[0]
+            for each in (values, predicted)
+        ]
+        squares = np.mean(np.sum(np.square(places[0] - places[1]), axis=-1), axis=0)
+        total += squares / trained.pose.variances[clip]
+        plain += squares
+    expected = np.sqrt(total / total.mean())
+    found = shares.of_joints(judge, trained.full, trained.pose, None)
+    assert found == pytest.approx(expected, rel=1e-6)
+    # Negative control: with all clips counted alike it would be another.
+    assert found != pytest.approx(np.sqrt(plain / plain.mean()), rel=1e-4)
 
 
-def test_travel_moves_all_joints_alike(trained, offsets):
-    plain = asked(trained, offsets, {"pose": trained.pose.residuals})
-    far = {"pose": trained.pose.residuals, "travel": np.full((len(offsets), 3), 100.0)}
-    assert np.ptp(asked(trained, offsets, far)) < 0.01 < np.ptp(plain)
+def test_travel_moves_all_joints_alike(judge, trained):
+    far = np.full((len(trained.examples), 3), 100.0)
+    found = shares.of_joints(judge, trained.full, trained.pose, far)
+    assert np.ptp(found) < 0.01 < np.ptp(trained.joints)
 
 
-def test_what_is_met_exactly_errs_evenly(trained, offsets):
-    nothing = {"pose": np.zeros_like(trained.pose.residuals)}
-    assert np.array_equal(asked(trained, offsets, nothing), np.ones(len(trained.skeleton)))
+def test_what_is_met_exactly_errs_evenly(judge, trained):
+    met = replace(trained.pose, residuals=np.zeros_like(trained.pose.residuals))
+    found = shares.of_joints(judge, trained.full, met, None)
+    assert np.array_equal(found, np.ones(len(trained.skeleton)))
