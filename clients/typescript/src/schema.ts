@@ -1552,7 +1552,7 @@ export interface components {
         /** @description Each point is ranked as if those before it had been captured already. */
         Suggestions: {
             model: components["schemas"]["Identity"];
-            /** @description Who is to be captured; null where clips of all count alike. */
+            /** @description Whose clips alone counted as captured; null for everybody's. */
             performer: string | null;
             /** @description Of how many points these were chosen. */
             candidates: number;
@@ -1561,9 +1561,9 @@ export interface components {
         };
         Suggestion: {
             controls: components["schemas"]["Controls"];
-            /** @description Share by which the mean variance of the poses falls over all that may be asked, once this is captured. */
+            /** @description Share by which the mean of `variance`, as Backing has it, falls over all that may be asked, once this is captured. */
             gain: number;
-            /** @description At the point itself, before, as a share of the sill. */
+            /** @description As Backing has it, at the point itself, before. */
             variance: number;
             /** @description Source of the captured clip nearest to it; null in models trained before this was kept. */
             nearest: string | null;
@@ -3217,7 +3217,7 @@ export interface components {
         /** @description How many points. */
         suggestions: number;
         /**
-         * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+         * @description Whose clips alone count as captured, of the `performers` that the model's card names; everybody's, if left out.
          * @example tall
          */
         whose: string;
@@ -5731,7 +5731,7 @@ export interface operations {
                 /** @description How many points. */
                 count?: components["parameters"]["suggestions"];
                 /**
-                 * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+                 * @description Whose clips alone count as captured, of the `performers` that the model's card names; everybody's, if left out.
                  * @example tall
                  */
                 performer?: components["parameters"]["whose"];
