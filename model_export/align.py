@@ -57,15 +57,48 @@ def align(
     the identity: canonical time is the family's own average, not the reference's.
     """
     traces = [trace(example.clip, np.sqrt(joint_weights)) for example in examples]
-    marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
-    medoid = _medoid(_straight(traces, marks, COARSE))
-    fine = _straight(traces, marks, FINE)
-    logs = _round(fine, fine[medoid], marks, basis)
+    marks = _marks(examples)
+    knees = _knees(marks, marks.mean(axis=0))
+    medoid = _medoid(_straight(traces, knees, COARSE))
+    fine = _straight(traces, knees, FINE)
+    logs = _gauge(_round(fine, fine[medoid], knees, basis), knees, basis)
     for _ in range(rounds):
         pairs = zip(traces, logs, strict=True)
         warped = np.stack([at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs])
         predicted = predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
-        logs = _round(fine, predicted, marks, basis)
+        logs = _gauge(_round(fine, predicted, knees, basis), knees, basis)
+    return _aligned(examples, frames, basis, logs, medoid)
+
+
+@dataclass(frozen=True)
+class Canon:
+    """A canonical time that is there already: its frames, the basis of its warps, and the times
+    (M,) of landmarks in it. joint_weights (J,): importance of each joint's position."""
+
+    frames: int
+    basis: WarpBasis
+    landmarks: Floats
+    joint_weights: Floats
+
+
+def align_to(examples: Sequence[Example], references: Floats, canon: Canon) -> Aligned:
+    """Examples warped to a canonical time, each by its reference.
+
+    references (N, FINE, features): traces in even steps of canonical time.
+    """
+    traces = [trace(example.clip, np.sqrt(canon.joint_weights)) for example in examples]
+    knees = _knees(_marks(examples), canon.landmarks)
+    logs = _round(_straight(traces, knees, FINE), references, knees, canon.basis)
+    return _aligned(examples, canon.frames, canon.basis, logs, medoid=0)
+
+
+def _marks(examples: Sequence[Example]) -> Floats:
+    return np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
+
+
+def _aligned(
+    examples: Sequence[Example], frames: int, basis: WarpBasis, logs: Floats, medoid: int
+) -> Aligned:
     resampled = [
         resample(e.clip, basis.invert(log, _even(frames)))
         for e, log in zip(examples, logs, strict=True)
@@ -98,17 +131,31 @@ def at(values: Floats, u: Floats) -> Floats:
     return (1.0 - share) * values[before] + share * values[before + 1]
 
 
-def _knees(marks: Floats) -> tuple[Floats, Floats]:
+@dataclass(frozen=True)
+class _Knees:
     """Clip times (N, M + 2) and canonical times (M + 2,) between which time runs evenly."""
+
+    own: Floats
+    canonical: Floats
+
+    @property
+    def weights(self) -> Floats:
+        """What each sample of a warp is worth in its fit (N, 501)."""
+        weights = np.ones((len(self.own), len(DENSE)))
+        for row, own in zip(weights, self.own[:, 1:-1], strict=True):
+            row[np.rint(own * (len(DENSE) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
+        return weights
+
+
+def _knees(marks: Floats, canonical: Floats) -> _Knees:
+    """Knees of landmarks (N, M) whose canonical times are (M,)."""
     ends = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
-    knees = np.hstack([ends[0], marks, ends[1]])
-    return knees, knees.mean(axis=0)
+    return _Knees(np.hstack([ends[0], marks, ends[1]]), np.array([0.0, *canonical, 1.0]))
 
 
-def _straight(traces: list[Floats], marks: Floats, frames: int) -> Floats:
+def _straight(traces: list[Floats], knees: _Knees, frames: int) -> Floats:
     """Traces (N, frames, features) with their landmarks brought together by straight lines."""
-    knees, canonical = _knees(marks)
-    times = [np.interp(_even(frames), canonical, own) for own in knees]
+    times = [np.interp(_even(frames), knees.canonical, own) for own in knees.own]
     return np.stack([at(trace, u) for trace, u in zip(traces, times, strict=True)])
 
 
@@ -117,34 +164,24 @@ def _medoid(traces: Floats) -> int:
     return int(np.argmin(np.round(totals, 9)))
 
 
-def _round(traces: Floats, reference: Floats, marks: Floats, basis: WarpBasis) -> Floats:
+def _round(traces: Floats, reference: Floats, knees: _Knees, basis: WarpBasis) -> Floats:
     """Log increments (N, knots) of the warps to a reference (F, features), or one a clip (N, F,
-    features), their mean warp the identity."""
-    knees, canonical = _knees(marks)
-    straight = np.stack([np.interp(DENSE, own, canonical) for own in knees])
+    features)."""
+    straight = np.stack([np.interp(DENSE, own, knees.canonical) for own in knees.own])
     # Time warping may carry a landmark away: it is brought back, and what lies between with it.
     phases = [
-        np.interp(phase, np.interp(canonical, _even(FINE), phase), canonical)
+        np.interp(phase, np.interp(knees.canonical, _even(FINE), phase), knees.canonical)
         for phase in dtw.warp(traces, reference)
     ]
     warps = np.stack([np.interp(s, _even(FINE), p) for s, p in zip(straight, phases, strict=True)])
-    weights = _weights(marks)
-    fitted = [basis.fit(warp, w) for warp, w in zip(warps, weights, strict=True)]
-    return _gauge(np.stack(fitted), weights, basis)
+    return np.stack([basis.fit(warp, w) for warp, w in zip(warps, knees.weights, strict=True)])
 
 
-def _weights(marks: Floats) -> Floats:
-    weights = np.ones((len(marks), len(DENSE)))
-    for row, own in zip(weights, marks, strict=True):
-        row[np.rint(own * (len(DENSE) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
-    return weights
-
-
-def _gauge(logs: Floats, weights: Floats, basis: WarpBasis) -> Floats:
+def _gauge(logs: Floats, knees: _Knees, basis: WarpBasis) -> Floats:
     """The same warps followed by the one that makes their mean inverse the identity."""
     mean_inverse = np.mean([basis.invert(log, DENSE) for log in logs], axis=0)
     even = [np.interp(basis.evaluate(log, DENSE), DENSE, mean_inverse) for log in logs]
-    return np.stack([basis.fit(warp, w) for warp, w in zip(even, weights, strict=True)])
+    return np.stack([basis.fit(warp, w) for warp, w in zip(even, knees.weights, strict=True)])
 
 
 def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:

@@ -32,11 +32,15 @@ class Chart:
         vectors = numbers[..., 3:].reshape(*numbers.shape[:-1], -1, 3)
         return quat.mul(self.means, quat.exp(vectors)), numbers[..., :3]
 
+    def far(self, rotations: Floats) -> list[Finding]:
+        """Joints of rotations (N, T, J, 4) that come close to half a turn from their means."""
+        return _far(quat.log(quat.mul(quat.conj(self.means), rotations)))
+
 
 def fit(rotations: Floats) -> tuple[Chart, list[Finding]]:
     """Chart about the chordal means of rotations (N, T, J, 4), and what is far from them."""
-    means = quat.mean(rotations.reshape(-1, *rotations.shape[2:]))
-    return Chart(means), _far(quat.log(quat.mul(quat.conj(means), rotations)))
+    own_chart = Chart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
+    return own_chart, own_chart.far(rotations)
 
 
 def _jumps(vectors: Floats) -> Floats:

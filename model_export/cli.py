@@ -1,4 +1,4 @@
-"""The training job's commands: `sample`, `train` and `evaluate`."""
+"""The training job's commands: `sample`, `train`, `adapt` and `evaluate`."""
 
 import sys
 import time
@@ -8,16 +8,17 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from service.cli import Controls, Json, as_json, encoder, numbers, wrote
+from service.cli import Controls, Json, ModelPath, as_json, encoder, numbers, wrote
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField, TrainingError
 
 if TYPE_CHECKING:
+    from model_export.evaluate.learning import Learning
     from model_export.export import Exported
     from model_export.recipe import Recipe
     from model_export.train import Trained
@@ -30,11 +31,15 @@ Scheduler = Annotated[
     ),
 ]
 
+Up = Literal["y", "z"]
+RootOffset = Literal["replace", "add"]
+
 
 def commands(app: typer.Typer) -> None:
     """Add the training job's commands to the one command line."""
     app.command("sample")(sample)
     app.command("train")(train_command)
+    app.command("adapt")(adapt)
     app.command("evaluate")(evaluate)
 
 
@@ -99,8 +104,7 @@ def _train(
     # SciPy and onnx take a second to import, which every other command would wait for.
     from model_export import export, ingest, recipe, train
 
-    if output.suffix != ".onnx":
-        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
+    _expect_onnx(output)
     progress = _Progress()
     progress(f"reading {recipe_file}")
     own = recipe.read(recipe_file)
@@ -156,6 +160,64 @@ def _expect_html(report: Path | None) -> None:
         raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
 
 
+def adapt(
+    model: ModelPath,
+    clips: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="BVH files of one new performer, one to five or more", metavar="CLIP..."
+        ),
+    ] = None,
+    *,
+    output: Annotated[Path, typer.Option("--output", "-o", help="the .onnx file to write")],
+    performer: Annotated[str, typer.Option(help="their name, by which they are asked for")],
+    unit: Annotated[float, typer.Option(help="length of one unit of the files", metavar="METRES")],
+    up: Annotated[Up, typer.Option(help="up axis of the files")],
+    licence: Annotated[str, typer.Option(help="of the new clips, with what it asks to be said")],
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            help="instead of clips: CSV with columns file, first_frame, last_frame and controls by "
+            "name; what the model can measure may be left out"
+        ),
+    ] = None,
+    root_offset: Annotated[
+        RootOffset | None,
+        typer.Option(help="whether root position channels replace the root's OFFSET or add to it"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Add a performer to a model by a few clips, without the data that it was trained from."""
+    from model_export import adapted_file, new_clips, reopen
+    from model_export.adapted_file import Newcomer
+
+    _expect_onnx(output)
+    if bool(clips) == bool(table):
+        raise InvalidField("clips", "expected either motion files or --table")
+    if not (0.0 < unit < float("inf")):
+        raise InvalidField("unit", f"{unit}, expected a length in metres")
+    progress = _Progress()
+    progress(f"reading {model}")
+    known = reopen.load(model)
+    adapted_file.refuse_name(known.card, performer)
+    source = new_clips.Source(unit, up, root_offset)
+    progress("reading clips")
+    if table:
+        examples, notes = new_clips.of_table(known, table, source, performer)
+    else:
+        examples, notes = new_clips.of_files(known, clips or [], source, performer)
+    progress("adapting, and comparing the graph with the reference")
+    made = adapted_file.make(known, Newcomer(performer, examples, licence, notes))
+    files.write(made.content, output)
+    progress("done")
+    typer.echo(as_json(_facts(made, output)) if json else _summary(made, output))
+
+
+def _expect_onnx(output: Path) -> None:
+    if output.suffix != ".onnx":
+        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
+
+
 class Protocol(StrEnum):
     """Ways to ask how good a model is."""
 
@@ -179,6 +241,13 @@ def evaluate(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
     ] = None,
+    joined: Annotated[
+        Path | None,
+        typer.Option(help="another recipe: is the gap between both flagged?", metavar="RECIPE"),
+    ] = None,
+    learning: Annotated[
+        bool, typer.Option(help="what suggested clips are worth, on the procedural family")
+    ] = False,
     table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
     scheduler: Scheduler = None,
 ) -> None:
@@ -195,7 +264,7 @@ def evaluate(
         raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
     else:
         asked = [one.value for one in protocol or []]
-        wanted = _Wanted(asked, report, json_file, scheduler)
+        wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
         _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
@@ -210,17 +279,20 @@ def _table1(json_file: Path | None) -> None:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Protocols, all that can for none, what to write, and where to work."""
+    """Protocols, all that can for none, what to write, where to work, the recipe of a family that
+    is joined to this one, and whether suggested clips are tried out."""
 
     protocols: list[str]
     report: Path | None
     json_file: Path | None
     scheduler: str | None
+    joined: Path | None
+    learning: bool
 
 
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export import ingest, recipe
-    from model_export.evaluate import protocol, reach, summary
+    from model_export.evaluate import flags, learning, protocol, reach, summary, worth
 
     own = recipe.read(recipe_file)
     examples, _ = ingest.ingest(own, data)
@@ -233,17 +305,44 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
         for name in wanted.protocols or can:
             with _bar(name) as progress:
                 results.append(protocol.run(own, examples, name, progress))
-            typer.echo(f"{summary.table(results[-1])}\n")
+            trust = "\n".join(summary.trust_said(results[-1]))
+            typer.echo(f"{summary.table(results[-1])}\n\n{trust}\n")
             if results[-1].corrections:
                 typer.echo(f"{reach.table(results[-1])}\n")
-    typer.echo(f"{summary.LEGEND}\n{summary.definitions(results[0])}")
+    for said in worth.said(results):
+        typer.echo(said)
+    typer.echo(f"{summary.LEGEND}\n{summary.definitions(results)}")
+    more: dict[str, Any] = {}
+    if wanted.joined:
+        other = recipe.read(wanted.joined)
+        both = flags.joined(own, examples, other, ingest.ingest(other, data)[0])
+        typer.echo(f"\n{own.name} and {other.name} joined, {summary.flags_said(both)}")
+        more = {"joined": {"family": other.name, "support": summary.flags_facts(both)}}
+    if named := worth.facts(results):
+        more["performers"] = named
+    curve = _learning(own, wanted)
+    if curve:
+        more["learning"] = learning.facts(curve)
+        typer.echo(f"\n{learning.table(curve)}")
     first, *others = map(summary.facts, results)
     if wanted.json_file:
-        files.write(as_json({**first, "others": others}).encode(), wanted.json_file)
+        files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
     if wanted.report:
         from model_export.evaluate import render
 
-        files.write(render.html(own.description, results), wanted.report)
+        files.write(render.html(own.description, results, curve), wanted.report)
+
+
+def _learning(own: "Recipe", wanted: _Wanted) -> "Learning | None":
+    """What suggested clips are worth; none where nobody asks."""
+    from model_export.evaluate import learning
+
+    if not wanted.learning:
+        return None
+    if not own.truth:
+        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
+    with _jobs(wanted.scheduler), _bar("learning") as progress:
+        return learning.measure(progress)
 
 
 def _jobs(scheduler: str | None, shared: Sequence[Any] = ()) -> AbstractContextManager[None]:

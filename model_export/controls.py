@@ -17,7 +17,7 @@ from service.motion import measure
 # Parameters that a clip query has besides the controls.
 RESERVED = frozenset(
     "fps start end time times extrapolate performer level format names root loop unit up "
-    "across along columns rows margin nearest".split()
+    "across along columns rows margin nearest joint_sigma exact target targets pin_feet".split()
 )
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Text = Annotated[str, Field(min_length=1)]

@@ -33,7 +33,12 @@ def numbers(own_tensor: MotionTensor, controls: int) -> Price:
     function. Not counted: what does not grow with the ranks (the means, the samples' controls, the
     fields of duration, warp and bones) and sigma's matrix.
     """
-    freedoms, frames, samples = own_tensor.values.shape
+    return stored(own_tensor.values.shape, controls)
+
+
+def stored(shape: Sequence[int], controls: int) -> Price:
+    """The same of a tensor of degrees of freedom, frames and samples."""
+    freedoms, frames, samples = shape
     return Price((freedoms, frames, samples + controls + 1))
 
 
@@ -90,6 +95,10 @@ class Compression:
 
 def compression(own_tensor: MotionTensor, ranks: Sequence[int], controls: int) -> Compression:
     """Compression at ranks (r1, r2, r3); what counts as stored says `numbers`."""
-    raw = own_tensor.values.size
-    stored = numbers(own_tensor, controls).of(*ranks)
-    return Compression(raw / float(np.prod(ranks)), raw / float(stored))
+    return compressed(own_tensor.values.shape, ranks, controls)
+
+
+def compressed(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
+    """The same of a tensor of a shape (D', T, N)."""
+    raw, held = float(np.prod(shape)), stored(shape, controls).of(*ranks)
+    return Compression(raw / float(np.prod(ranks)), raw / float(held))

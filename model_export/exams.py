@@ -7,6 +7,7 @@ import numpy as np
 
 from model_export import fidelity, kriging, thin
 from model_export.fidelity import Moment
+from model_export.hosvd import Multilinear
 from model_export.model import Model
 from model_export.recipe import Recipe
 from model_export.train import Trained
@@ -72,14 +73,20 @@ class Exam:
 
 def of(recipe: Recipe, trained: Trained, questions: int) -> Exam:
     """Exam of a trained model's levels, of so many questions."""
-    whole, bank = _whole(trained), trained.model.bank
+    moment = fidelity.moment(recipe, trained.examples)
+    whole = uncut(trained.model, trained.full)
+    return against(whole, trained.skeleton.parents, moment, questions)
+
+
+def against(whole: Model, parents: tuple[int, ...], moment: Moment | None, questions: int) -> Exam:
+    """Exam by the answers of a model that nothing is cut from."""
+    bank = whole.bank
     points, d = thin.questions(bank, 1.0, questions), len(bank.low)
     controls = (points[:, :d] * (bank.high - bank.low) + bank.high + bank.low) / 2.0
     labels = points[:, d:]
     rng = np.random.Generator(np.random.PCG64(len(points)))
     durations = whole.evaluate(controls, np.zeros((len(points), 1)), labels).duration
     times = rng.uniform(0.0, 1.0, (len(points), 1)) * durations[:, None]
-    parents, moment = trained.skeleton.parents, fidelity.moment(recipe, trained.examples)
     joints = whole.evaluate(controls, times, labels).positions(parents)[:, 0]
     exam = Exam(controls, labels, times, parents, moment, joints, np.zeros((len(points), 3)))
     return replace(exam, at_event=_event(whole, exam, 0, moment)) if moment else exam
@@ -92,12 +99,10 @@ def _event(model: Model, exam: Exam, level: int, moment: Moment) -> Floats:
     return answer.positions(exam.parents)[:, 0, moment.joint]
 
 
-def _whole(trained: Trained) -> Model:
-    """The model that nothing is cut from."""
-    bank, decoder = trained.model.bank, trained.model.decoder
-    pose = kriging.solve(bank.pose.hyper, bank.pose.samples, trained.full.bases[2])
+def uncut(model: Model, full: Multilinear) -> Model:
+    """A model before its tensor was cut."""
+    bank = model.bank
+    pose = kriging.solve(bank.pose.hyper, bank.pose.samples, full.bases[2])
     return replace(
-        trained.model,
-        bank=replace(bank, pose=pose),
-        decoder=replace(decoder, reduced=trained.full),
+        model, bank=replace(bank, pose=pose), decoder=replace(model.decoder, reduced=full)
     )

@@ -4,7 +4,7 @@ The gate asks the very session that the service will use, and compares joints in
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from model_export import cost, fidelity, levels, measured, phase, samples, strangers, threads
+from model_export.flips import Finding
 from model_export.ingest import Example
+from model_export.kriging import Kriging
 from model_export.model import Model, Outputs
 from model_export.recipe import Recipe
 from model_export.train import Trained
 from service import __version__
 from service.motion import card
-from service.motion.card import Control, ModelCard
+from service.motion.card import Control, Making, ModelCard
 from service.motion.conventions import Floats
 from service.motion.detail import Level
 from service.motion.errors import ExportRefused
@@ -51,15 +53,25 @@ def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
     Raises TrainingError for levels of detail that there cannot be, ExportRefused where onnxruntime
     answers anything else than the float64 reference does.
     """
-    about = _about()
     notes = [*notes, *samples.notes(recipe, trained.examples)]
     laddered = levels.build(recipe, trained)
+    return finished(
+        laddered.model, lambda parity: _card(recipe, trained, laddered.levels, notes, parity)
+    )
+
+
+def finished(model: Model, own_card: Callable[[float], ModelCard]) -> Exported:
+    """File of a model of all its levels, whose card says the largest joint error, m, that the gate
+    saw.
+
+    Raises ExportRefused as `gate` does.
+    """
+    about = _about()
     # The gate's finding is part of the card, so the weights are judged before it is written.
-    draft = _card(recipe, trained, laddered.levels, notes, parity=0.0)
-    parity = gate(laddered.model, laddered.model.onnx(card.dump(draft), about), draft)
-    own_card = _card(recipe, trained, laddered.levels, notes, parity)
-    content = laddered.model.onnx(card.dump(own_card), about)
-    return Exported(laddered.model, content, own_card, parity)
+    draft = own_card(0.0)
+    parity = gate(model, model.onnx(card.dump(draft), about), draft)
+    written = own_card(parity)
+    return Exported(model, model.onnx(card.dump(written), about), written, parity)
 
 
 @threads.one()
@@ -167,11 +179,13 @@ def _card(
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
         sources=tuple(example.row.source for example in examples),
-        kriging=_plainly(trained.pose.hyper),
+        kriging=plainly(trained.pose.hyper),
         roles={str(role): joint for role, joint in recipe.roles.items()},
         left_out=tuple(map(_round, np.sqrt(trained.missed))),
         event=fidelity.event(recipe, examples),
         beside=_beside(trained),
+        joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
+        making=_making(recipe, trained),
     )
 
 
@@ -186,6 +200,24 @@ def _beside(trained: Trained) -> tuple[tuple[float, ...], ...]:
     # A walk of one duration, or a straight one, has no variance there.
     root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(covariance)))
     return tuple(tuple(map(_round, row)) for row in root)
+
+
+def _making(recipe: Recipe, trained: Trained) -> Making:
+    marks = [example.landmarks for example in trained.examples]
+    times = np.array(marks).reshape(len(marks), -1).mean(axis=0)
+    fields = trained.model.bank.others.items()
+    return Making(
+        {name: solved_with(field.hyper) for name, field in fields if isinstance(field, Kriging)},
+        dict(zip(recipe.clips.landmarks, map(float, times), strict=True)),
+        {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
+        recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
+    )
+
+
+def solved_with(hyper: Hyper) -> tuple[float, ...]:
+    """Nugget and drifts; six digits of the one, for all that is made of it takes it as it stands
+    there."""
+    return (float(f"{hyper.nugget:.6g}"), *hyper.drifts)
 
 
 def _controls(recipe: Recipe, trained: Trained) -> tuple[Control, ...]:
@@ -230,12 +262,12 @@ def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str,
             *notes,
             *strangers.notes(trained),
             *phase.notes(trained.examples),
-            *_found(trained),
+            *found(trained.findings, trained.examples, trained.skeleton.names),
         ],
     }
 
 
-def _plainly(hyper: Hyper) -> Hyper:
+def plainly(hyper: Hyper) -> Hyper:
     """The same in numbers of Python, which a card can hold."""
     return replace(hyper, nugget=float(hyper.nugget), label=float(hyper.label))
 
@@ -244,15 +276,16 @@ def _round(value: Any) -> float:
     return float(f"{float(value):.4g}")
 
 
-def _found(trained: Trained) -> list[str]:
+def found(
+    findings: Sequence[Finding], examples: Sequence[Example], names: Sequence[str]
+) -> list[str]:
     """One sentence for every clip that a joint was cleaned in or watched in."""
     said: dict[tuple[int, str], list[str]] = {}
-    for finding in trained.findings:
-        joint = trained.skeleton.names[finding.joint]
-        entry = f"{joint} by {np.degrees(finding.angle):.0f} degrees"
+    for finding in findings:
+        entry = f"{names[finding.joint]} by {np.degrees(finding.angle):.0f} degrees"
         said.setdefault((finding.clip, finding.kind), []).append(entry)
     return [
-        f"{trained.examples[clip].row.named}: {_MEANING[kind]}: {', '.join(entries)}"
+        f"{examples[clip].row.named}: {_MEANING[kind]}: {', '.join(entries)}"
         for (clip, kind), entries in sorted(said.items())
     ]
 
@@ -269,13 +302,13 @@ def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
     return {
         "licence": recipe.licence,
         "recipe_sha256": hashlib.sha256(recipe.model_dump_json().encode()).hexdigest(),
-        "data_sha256": _digest({str(e.row.place.name): e for e in examples}),
+        "data_sha256": digest({str(e.row.place.name): e for e in examples}),
         "clips": len(examples),
         "versions": {name: version(name) for name in ("posefield", "numpy", "scipy", "onnx")},
     }
 
 
-def _digest(files: Mapping[str, Example]) -> str:
+def digest(files: Mapping[str, Example]) -> str:
     """One hash over the content of every motion file, in the order of their names."""
     total = hashlib.sha256()
     for name in sorted(files):

@@ -82,6 +82,13 @@ class FieldBank:
         """How many samples a level asks."""
         return min(self.columns(level), len(self.pose.samples))
 
+    def at_samples(self, name: str) -> Floats:
+        """What one of the others was laid through (n, m), or its mean everywhere."""
+        field = self.others[name]
+        if isinstance(field, Constant):
+            return field.predict(self.pose.samples)
+        return field.values
+
     def sizes(self, pose: int) -> list[int]:
         """How many values each field has, the variance's logarithm first, where the pose has so
         many."""

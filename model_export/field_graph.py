@@ -49,7 +49,9 @@ def onnx(bank: FieldBank, net: Net, controls: str, ends: dict[str, str]) -> dict
     variance = _variance(bank, net, basis, fields.pop("straight"), ends)
     variance = net("Mul", variance, net("Exp", fields.pop(VARIANCE)))
     one = net.indices(1)
-    sigma = net("Squeeze", net("Sqrt", net("Mul", variance, net.number(bank.sill))), one)
+    sigma = net(
+        "Squeeze", net("Sqrt", net("Mul", variance, net.weights("sill", np.array(bank.sill)))), one
+    )
     return {**fields, "sigma": sigma}
 
 

@@ -62,6 +62,13 @@ def without_flips(rotations: Floats, small: Floats) -> tuple[Floats, list[Findin
     """Aligned rotations (N, T, J, 4) with clips turned back as one whose small joint is half a
     turn off throughout."""
     means = quat.mean(rotations.reshape(-1, *rotations.shape[2:]))
+    return without_flips_from(means, rotations, small)
+
+
+def without_flips_from(
+    means: Floats, rotations: Floats, small: Floats
+) -> tuple[Floats, list[Finding]]:
+    """The same, half a turn off a family's means (J, 4)."""
     away = quat.mul(quat.conj(means), rotations)
     least = np.linalg.norm(quat.log(away), axis=-1).min(axis=1)
     clean, findings = rotations.copy(), []

@@ -1,5 +1,6 @@
 """Rows of the table to clips in one frame: cut, metres, Y up, heading and origin taken out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -56,14 +57,15 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
         key = str(row.place)
         if key not in files:
             files[key] = bvh.read(row.place)
-            notes += _offset_notes(recipe, files[key], row)
+            notes += offset_notes(files[key], row) if recipe.source.root_offset is None else []
         examples.append(_example(recipe, files[key], row, notes))
     _refuse_other_trees(examples)
     return examples, notes
 
 
-def _offset_notes(recipe: Recipe, file: bvh.BvhFile, row: Row) -> list[str]:
-    if recipe.source.root_offset is not None or not np.any(file.joints[0].offset):
+def offset_notes(file: bvh.BvhFile, row: Row) -> list[str]:
+    """What was taken a root's OFFSET for, where it is not zero."""
+    if not np.any(file.joints[0].offset):
         return []
     return [
         f"{row.place}: the root's OFFSET is {file.joints[0].offset} and has position channels, "
@@ -79,26 +81,45 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
         up=source.up,
         root_offset=source.root_offset or "replace",
     )
+    own, last = cut(whole, row)
+    clip = _without(own, recipe, row)
+    in_place = recipe.motion.root == "in_place"
+    clip, jumps, said = canonical(clip, row, recipe.motion.cyclic, in_place)
+    notes += said
+    marks = landmarks(row, last)
+    return Example(row, clip, measured.controls(recipe, row, clip, marks), marks, jumps)
+
+
+def cut(whole: Clip, row: Row) -> tuple[Clip, int]:
+    """Frames of a file that a row names, and the last of them.
+
+    Raises RecipeError for a frame that the file does not have, and a single one.
+    """
     last = len(whole) - 1 if row.last_frame is None else row.last_frame
     if last >= len(whole):
         raise row.fault(f"frame {last}, but {row.place} has frames 0 to {len(whole) - 1}")
-    clip = _without(_cut(whole, row.first_frame, last), recipe, row)
+    if last <= row.first_frame:
+        raise row.fault(f"{row.place} has frames 0 to {last}, expected two or more")
+    kept = slice(row.first_frame, last + 1)
+    rotations, translations = whole.rotations[kept], whole.translations[kept]
+    return replace(whole, rotations=rotations, translations=translations), last
+
+
+def canonical(
+    clip: Clip, row: Row, cyclic: bool, in_place: bool
+) -> tuple[Clip, tuple[Finding, ...], list[str]]:
+    """Clip with its heading and origin taken out, what was undone of it, and what is to be noted.
+
+    A cycle is closed.
+    """
+    notes = []
     stretch = np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0)
     if stretch > RIGID:
         notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
     # Before a cycle is closed, which would spread a jump over all of it.
     clip, jumps = flips.without_jumps(clip, 0)
-    clip = _loop(set_out(clip)) if recipe.motion.cyclic else _origin_out(clip)
-    if recipe.motion.root == "in_place":
-        clip = stay(clip)
-    landmarks = _landmarks(row, last)
-    controls = measured.controls(recipe, row, clip, landmarks)
-    return Example(row, clip, controls, landmarks, tuple(jumps))
-
-
-def _cut(clip: Clip, first: int, last: int) -> Clip:
-    kept = slice(first, last + 1)
-    return replace(clip, rotations=clip.rotations[kept], translations=clip.translations[kept])
+    clip = _loop(set_out(clip)) if cyclic else _origin_out(clip)
+    return stay(clip) if in_place else clip, tuple(jumps), notes
 
 
 def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
@@ -118,7 +139,18 @@ def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
     gone = needed - {joints.names[joint] for joint in kept}
     if gone:
         raise row.fault(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
-    tips = [i for i, joint in enumerate(joints.tip_joints) if joint not in dropped]
+    return keep(clip, kept)
+
+
+def closed(joints: Skeleton, kept: Sequence[int]) -> bool:
+    """Whether every kept joint's parent is kept too."""
+    return all(joints.parents[joint] in kept or joints.parents[joint] < 0 for joint in kept)
+
+
+def keep(clip: Clip, kept: Sequence[int]) -> Clip:
+    """Clip of some of its joints, in order; none hangs on one that is left out."""
+    joints = clip.skeleton
+    tips = [i for i, joint in enumerate(joints.tip_joints) if joint in kept]
     smaller = Skeleton(
         tuple(joints.names[joint] for joint in kept),
         tuple(kept.index(joints.parents[j]) if j else -1 for j in kept),
@@ -138,7 +170,8 @@ def _needed(recipe: Recipe) -> set[str]:
     return {*motion.joint_weights, *motion.feet, *recipe.roles.values()} | event
 
 
-def _landmarks(row: Row, last: int) -> tuple[float, ...]:
+def landmarks(row: Row, last: int) -> tuple[float, ...]:
+    """Landmarks of a row as fractions of its clip, whose last frame of the file is given."""
     frames = (row.first_frame, *row.landmarks, last)
     if any(later <= earlier for earlier, later in pairwise(frames)):
         raise row.fault(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")

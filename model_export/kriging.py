@@ -50,6 +50,11 @@ class Kriging:
         basis = self._basis(points)
         return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
+    @property
+    def values(self) -> Floats:
+        """What it was laid through (n, m)."""
+        return values(self.hyper, self.samples, self.dual)
+
     def _basis(self, points: Floats) -> Floats:
         return field.basis(self.hyper, points, self.samples)
 
@@ -64,6 +69,14 @@ def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
     toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
     form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
     return Kriging(hyper, samples, weighing @ values, weighing, form)
+
+
+def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
+    """Values (n, m) at samples (n, d + p) of which dual weights (n + k, m) were made: the system
+    times them."""
+    n, degree = len(samples), max(hyper.drifts)
+    functions = drift(samples, len(hyper.scales), degree)
+    return noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
 
 
 def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:

@@ -12,6 +12,7 @@ from model_export import cost, exams, fidelity, ranks, thin
 from model_export.decoder import Rung
 from model_export.exams import Exam
 from model_export.fidelity import Judge
+from model_export.hosvd import Multilinear
 from model_export.model import Model
 from model_export.ranks import Triple
 from model_export.recipe import Detail, Recipe
@@ -38,14 +39,14 @@ class Laddered:
 
 @dataclass(frozen=True)
 class Workshop:
-    """What levels are made with: what training left, judges of truncations and of answers, and
-    what a level's weights are fitted to. finals: the exam of what was made.
+    """What levels are made with: the whole tensor's decomposition, judges of truncations and of
+    answers, and what a level's weights are fitted to. finals: the exam of what was made.
 
     model: of the finest level alone, its samples in the order in which they say most of the pose.
     budgets: of the finest level, m, by name.
     """
 
-    trained: Trained
+    full: Multilinear
     model: Model
     budgets: dict[str, float]
     judge: Judge
@@ -96,16 +97,16 @@ class Workshop:
 
     def _ranks(self, within: Triple, allowed: dict[str, float]) -> Triple:
         """Fewest multiply-adds within a finer level's ranks whose true errors are allowed."""
-        trained = self.trained
 
         def strain(triple: Triple) -> float:
-            found = self.judge.of(trained.full.truncated(triple))
+            found = self.judge.of(self.full.truncated(triple))
             return max(getattr(found, name) / most for name, most in allowed.items())
 
-        price = cost.operations(trained.tensor, trained.laid.controls)
-        places = trained.tensor.weight * np.prod(self.judge.whole.shape[:2])
+        own_tensor = self.judge.own_tensor
+        price = cost.operations(own_tensor, len(self.model.bank.low))
+        places = own_tensor.weight * np.prod(self.judge.whole.shape[:2])
         aim = min(allowed.values()) ** 2 * float(places)
-        return ranks.cheapest(ranks.front(trained.full.core, price, within), strain, aim)
+        return ranks.cheapest(ranks.front(self.full.core, price, within), strain, aim)
 
     def _thinned(self, model: Model, rung: Rung, allowed: dict[str, float]) -> tuple[Model, bool]:
         """Model with one more level, of the fewest covariances whose answers are near enough, and
@@ -139,7 +140,7 @@ def workshop(recipe: Recipe, trained: Trained) -> Workshop:
     """Workshop for the levels of a trained model."""
     bank = thin.ordered(trained.model.bank)
     return Workshop(
-        trained,
+        trained.full,
         replace(trained.model, bank=bank),
         recipe.size.budgets or {"rms": trained.fidelity.rms},
         fidelity.judge(recipe, trained.examples, trained.tensor),

@@ -30,13 +30,13 @@ def controls(recipe: Recipe, row: Row, clip: Clip, landmarks: Sequence[float]) -
     """
     if not recipe.measured:
         return row.controls
-    typed, seen = iter(row.controls.tolist()), _seen(clip)
+    typed, whole = iter(row.controls.tolist()), seen(clip)
 
     def value(control: Control) -> float:
         if not isinstance(control, ControlMeasured):
             return float(next(typed))
         at = _landmark(recipe, control, landmarks)
-        place = replace(seen, landmark=(at or 0.0) * (len(clip) - 1))
+        place = replace(whole, landmark=(at or 0.0) * (len(clip) - 1))
         found = measure.value(of(recipe, control, clip.skeleton), place)
         # Of minus zero, zero.
         return round(found, DECIMALS) + 0.0
@@ -87,7 +87,8 @@ def bones(clip: Clip) -> Floats:
     return offsets
 
 
-def _seen(clip: Clip) -> Seen:
+def seen(clip: Clip) -> Seen:
+    """A clip as it is measured."""
     offsets, parents = bones(clip), clip.skeleton.parents
     local = skeleton.translations(offsets, clip.root_path)
     positions, _ = skeleton.forward(parents, clip.rotations, local)

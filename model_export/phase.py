@@ -57,6 +57,16 @@ def _measured(recipe: Recipe, begun: Example) -> Example:
     return replace(begun, controls=controls)
 
 
+def in_phase_with(
+    examples: Sequence[Example], references: Floats, joint_weights: Floats, in_place: bool
+) -> tuple[Example, ...]:
+    """Cyclic examples that begin at the phase of their references (N, F, features), traces of
+    closed cycles in even steps."""
+    traces = np.stack([_even(align.trace(e.clip, np.sqrt(joint_weights))) for e in examples])
+    found = _to(traces, np.stack([_even(reference) for reference in references]))
+    return tuple(begin(e, share, in_place) for e, share in zip(examples, found, strict=True))
+
+
 def shifts(traces: Floats, rounds: int) -> Floats:
     """Shares of their cycles (N,) at which traces (N, STEPS, features) are at one phase."""
     found = _gauge(_to(traces, traces[_medoid(traces)]))

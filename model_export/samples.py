@@ -77,7 +77,7 @@ def notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     if recipe.kriging.label and not performers:
         name = examples[0].row.performer
         said.append(f"all clips are of one performer, {name!r}: kriging.label tells nobody apart")
-    if len(np.unique(laid.groups)) > len(np.unique(_takes(examples))):
+    if len(np.unique(laid.groups)) > len(np.unique(takes(examples))):
         said.append(
             "clips of one file are not left out together: those of the other files alone could "
             "not carry the drift"
@@ -90,7 +90,7 @@ def _points(examples: Sequence[Example]) -> Floats:
     return half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
 
 
-def _takes(examples: Sequence[Example]) -> Indices:
+def takes(examples: Sequence[Example]) -> Indices:
     """Number (N,) of the file that each example was cut from."""
     return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
 
@@ -101,9 +101,9 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
     Raises TrainingError where there is none without a single example.
     """
     degree = recipe.kriging.degree
-    takes, alone = _takes(examples), np.arange(len(examples))
-    if _needed(takes, points, degree) is None:
-        return takes
+    by_file, alone = takes(examples), np.arange(len(examples))
+    if _needed(by_file, points, degree) is None:
+        return by_file
     needed = _needed(alone, points, degree)
     if needed is not None:
         raise TrainingError(

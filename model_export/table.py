@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,14 +20,14 @@ from service.motion.errors import RecipeError
 class Row:
     """One clip: where it is, which frames of it, and what it was an example of.
 
-    line: in the table, for messages. last_frame, counted in, and first_frame index the file's
-    frames from 0; None is the file's own end. controls: those that are typed; landmarks: frames of
-    the file.
+    line: in the table, for messages; None where it stands in none. last_frame, counted in, and
+    first_frame index the file's frames from 0; None is the file's own end. controls: those that
+    are typed; landmarks: frames of the file.
     """
 
     place: Place
     table: str
-    line: int
+    line: int | None
     performer: str
     first_frame: int
     last_frame: int | None
@@ -37,7 +37,7 @@ class Row:
     @property
     def named(self) -> str:
         """How messages name it: its line and its file."""
-        return f"line {self.line}, {self.place.name}"
+        return self.place.name if self.line is None else f"line {self.line}, {self.place.name}"
 
     @property
     def source(self) -> str:
@@ -59,7 +59,7 @@ def read(recipe: Recipe, folder: Path) -> list[Row]:
     missing column, a table without a row that belongs, and two rows that are one clip.
     """
     place = data.find(folder, recipe.clips.table)
-    cells = _Table(str(place), _records(place))
+    cells = opened(place)
     cells.require(_columns(recipe))
     rows = [
         _row(recipe, folder, cells, line, record)
@@ -68,7 +68,7 @@ def read(recipe: Recipe, folder: Path) -> list[Row]:
     ]
     if not rows:
         raise RecipeError(cells.name, f"none of {len(cells.records)} rows meets the conditions")
-    _refuse_repeats(rows)
+    refuse_repeats(rows)
     return rows
 
 
@@ -96,12 +96,30 @@ def _refuse_twin_columns(place: Place, names: Sequence[str]) -> None:
         raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
 
 
+def opened(place: Place) -> "Table":
+    """Table of a CSV file; RecipeError where it is none."""
+    try:
+        return Table(str(place), _records(place))
+    except OSError as fault:
+        raise RecipeError(str(place), f"cannot be read: {fault.strerror}") from fault
+
+
 @dataclass(frozen=True)
-class _Table:
+class Table:
+    """Cells by line and column of a file of a name; every fault in them names both."""
+
     name: str
     records: list[tuple[int, dict[str, str]]]
 
+    def expect_only(self, columns: Collection[str]) -> None:
+        """Refuse columns besides those that mean something."""
+        unknown = sorted(set(self.records[0][1]) - set(columns))
+        if unknown:
+            known = ", ".join(sorted(columns))
+            raise RecipeError(self.name, f"columns {unknown}, expected some of {known}", 1)
+
     def require(self, columns: Mapping[str, str]) -> None:
+        """Refuse a table without rows, or without one of some columns; why says what each is."""
         if not self.records:
             raise RecipeError(self.name, "no rows below the heading")
         there = self.records[0][1]
@@ -112,6 +130,7 @@ class _Table:
                 )
 
     def number(self, line: int, record: dict[str, str], column: str) -> float:
+        """A cell's number."""
         try:
             # Python reads 1_000 as a number; a table that holds it means something else.
             value = float(record[column].replace("_", "?"))
@@ -123,6 +142,7 @@ class _Table:
         return value
 
     def frame(self, line: int, record: dict[str, str], column: str) -> int:
+        """A cell's frame of a file."""
         value = self.number(line, record, column)
         if value != int(value) or value < 0:
             raise RecipeError(
@@ -131,6 +151,7 @@ class _Table:
         return int(value)
 
     def meets(self, line: int, record: dict[str, str], column: str, condition: Condition) -> bool:
+        """Whether a cell meets a condition."""
         cell = record[column]
         if condition.among is not None and cell not in condition.among:
             return False
@@ -158,7 +179,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
     return named
 
 
-def _row(recipe: Recipe, folder: Path, cells: _Table, line: int, record: dict[str, str]) -> Row:
+def _row(recipe: Recipe, folder: Path, cells: Table, line: int, record: dict[str, str]) -> Row:
     clips = recipe.clips
     first = cells.frame(line, record, clips.first_frame) if clips.first_frame else 0
     last = cells.frame(line, record, clips.last_frame) if clips.last_frame else None
@@ -177,7 +198,7 @@ def _row(recipe: Recipe, folder: Path, cells: _Table, line: int, record: dict[st
 
 
 def _motion_file(
-    folder: Path, clips: Clips, cells: _Table, line: int, record: dict[str, str]
+    folder: Path, clips: Clips, cells: Table, line: int, record: dict[str, str]
 ) -> Place:
     beside = clips.table.rpartition("/")[0]
     name = f"{beside}/{record[clips.file]}" if beside else record[clips.file]
@@ -187,10 +208,11 @@ def _motion_file(
         raise RecipeError(cells.name, f"column {clips.file!r}: {fault.message}", line) from fault
 
 
-def _refuse_repeats(rows: list[Row]) -> None:
+def refuse_repeats(rows: Sequence[Row]) -> None:
+    """Raise RecipeError for two rows that are one clip."""
     seen: dict[tuple[str, int, int | None], Row] = {}
     for row in rows:
         key = (str(row.place), row.first_frame, row.last_frame)
         if key in seen:
-            raise row.fault(f"the same frames of the same file as line {seen[key].line}")
+            raise row.fault(f"the same frames of the same file as {seen[key].named}")
         seen[key] = row

@@ -66,8 +66,8 @@ def build(
     """
     mean = numbers.mean(axis=(0, 1))
     varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT
-    gram = _gram(numbers, own_chart, parents, offsets, joint_weights)
-    root, inverse = metric.whitening(gram[np.ix_(varies, varies)])
+    own_gram = gram(numbers, own_chart, parents, offsets, joint_weights)
+    root, inverse = metric.whitening(own_gram[np.ix_(varies, varies)])
     whiten, unwhiten = np.zeros((2, len(root), len(mean)))
     whiten[:, varies], unwhiten[:, varies] = root, inverse
     values = _whitened(numbers, mean, whiten)
@@ -82,14 +82,14 @@ def _whitened(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
     return np.ascontiguousarray(flat.reshape(-1, samples, frames).swapaxes(1, 2))
 
 
-def _gram(
+def gram(
     numbers: Floats,
     own_chart: Chart,
     parents: tuple[int, ...],
     offsets: Floats,
     joint_weights: Floats,
 ) -> Floats:
-    """Gram matrix (D, D) over poses spread evenly through the tensor."""
+    """Gram matrix (D, D) over poses spread evenly through pose vectors (N, T, D)."""
     samples, frames, _ = numbers.shape
     chosen = np.unique(np.linspace(0, samples * frames - 1, metric.POSES).astype(np.int64))
     some = numbers.reshape(samples * frames, -1)[chosen]

@@ -15,6 +15,7 @@ from model_export import (
     phase,
     ranks,
     samples,
+    shares,
     strangers,
     tensor,
     threads,
@@ -55,8 +56,9 @@ class Trained:
     distance, m², of each clip from what all others predict for it. explained: for each field the
     share of the variation between clips that leave-one-out predicts from the controls; one that is
     not surely above zero is answered with its mean. residuals: of each field but the pose, left
-    out (N, m). fidelity: what the truncation costs. strangers: what speaks against clips that do
-    not seem to belong.
+    out (N, m). fidelity: what the truncation costs. joints (J,): how far each joint of a clip left
+    out lies from what all others predict, as a share of the root mean square of all. strangers:
+    what speaks against clips that do not seem to belong.
     """
 
     model: Model
@@ -73,6 +75,7 @@ class Trained:
     findings: list[Finding]
     residuals: dict[str, Floats]
     fidelity: Fidelity
+    joints: Floats
     strangers: tuple[Stranger, ...] = ()
 
 
@@ -221,6 +224,7 @@ def _fit(
     price = cost.PRICES[recipe.size.cost](own_tensor, controls.shape[1])
     reduced = full.truncated(ranks.choose(recipe.size, full, price, judge))
     explained = {name: found.explained for name, found in fits.beside.items()}
+    residuals = {name: found.residuals for name, found in fits.beside.items()}
     return Trained(
         _model(recipe, controls, moved, own_tensor, fits, reduced),
         tuple(examples),
@@ -234,8 +238,9 @@ def _fit(
         fits.missed,
         {"pose": 1.0 - fits.pose.unexplained, **explained},
         moved.findings,
-        {name: found.residuals for name, found in fits.beside.items()},
+        residuals,
         judge.of(reduced),
+        shares.of_joints(judge, full, fits.pose, residuals.get("travel")),
     )
 
 

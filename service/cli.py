@@ -7,6 +7,7 @@ that died; 128 and a signal's number where that ended an export.
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,8 +18,9 @@ import orjson
 import typer
 
 from service import __version__, exports, page
-from service.encode import ENCODERS, Encoder, poses, reasons
+from service.encode import ENCODERS, Encoder, poses, reasons, suggestions
 from service.encode.convention import Unit, Up
+from service.export import queries
 from service.motion import card as cards
 from service.motion import files, measure
 from service.motion.answer import ClipAnswer, Reasons, Trust
@@ -32,8 +34,10 @@ from service.motion.errors import (
     WorkerDied,
 )
 from service.motion.roles import Names
-from service.synthesis import library, pace, session
+from service.synthesis import library, pace, session, spelling
 from service.synthesis.question import ClipQuestion, Policy, Root
+from service.synthesis.suggest import COUNT, SuggestQuestion
+from service.synthesis.suggest import suggest as find_suggestions
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 from service.synthesis.why import NEAREST, WhyQuestion
@@ -52,7 +56,7 @@ Controls = Annotated[
     ),
 ]
 Extrapolate = Annotated[
-    Policy, typer.Option(help="what to do with controls outside what was sampled")
+    Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
 ]
 Performer = Annotated[
     str | None, typer.Option(help="who moves, by name; somebody never seen if not said")
@@ -61,6 +65,27 @@ LevelOfDetail = Annotated[int, typer.Option(help="level of detail: 0 is the fine
 JointNames = Annotated[Names, typer.Option(help="what joints are called")]
 RootMotion = Annotated[Root, typer.Option(help="whether the root travels")]
 Loop = Annotated[bool, typer.Option("--loop", help="one whole cycle whose last frame is its first")]
+JointSigma = Annotated[
+    bool, typer.Option("--joint-sigma", help="say how far each joint may err, too")
+]
+ExactControls = Annotated[
+    str | None,
+    typer.Option(
+        "--exact",
+        help="measured controls to be met exactly: auto (those given), none, or names",
+        metavar="auto|none|NAME,NAME",
+    ),
+]
+Targets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--target",
+        help="where a joint is to be, m; MOMENT is seconds, start, end, event, highest, lowest "
+        "or farthest; may be repeated",
+        metavar="JOINT@MOMENT=X,Y,Z",
+    ),
+]
+PinFeet = Annotated[bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")]
 LengthUnit = Annotated[
     Unit | None, typer.Option(help="of length in the file; the format's own if not said")
 ]
@@ -136,13 +161,19 @@ def pose(
     extrapolate: Extrapolate = "warn",
     performer: Performer = None,
     level: LevelOfDetail = 0,
+    joint_sigma: JointSigma = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
     asked, times = numbers(control or []), time or [0.0]
-    answer = synthesizer.pose(asked, times, extrapolate, performer, level)
+    held = spelling.hold(exact, target or (), pin_feet)
+    answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
     _tell(answer.trust)
-    typer.echo(poses.json(answer).decode())
+    trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
+    typer.echo(poses.json(replace(answer, trust=trust)).decode())
 
 
 @app.command()
@@ -159,6 +190,10 @@ def clip(
     names: JointNames = "own",
     root: RootMotion = "travelling",
     loop: Loop = False,
+    joint_sigma: JointSigma = False,
+    exact: ExactControls = None,
+    target: Targets = None,
+    pin_feet: PinFeet = False,
     unit: LengthUnit = None,
     up: UpAxis = None,
     json: Json = False,
@@ -168,8 +203,11 @@ def clip(
     convention = found.convention(unit, up)
     synthesizer = open_model(model)
     controls = numbers(control or [])
+    held = spelling.hold(exact, target or (), pin_feet)
     asked = ClipQuestion(
-        controls, fps, extrapolate, start, end, performer, level, names, root, loop
+        *(controls, fps, extrapolate, start, end, performer, level, names, root, loop),
+        joint_sigma=joint_sigma,
+        hold=held,
     )
     answer = synthesizer.clip(asked)
     files.write(found.encode(answer, convention), output)
@@ -260,6 +298,29 @@ def why(
     found = find_reasons(synthesizer, asked)
     _tell(found)
     typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
+
+
+@app.command()
+def suggest(
+    model: ModelPath,
+    count: Annotated[int, typer.Option(help="points to list")] = COUNT,
+    performer: Annotated[
+        str | None,
+        typer.Option(help="who is to be captured; if not said, clips of all count alike"),
+    ] = None,
+    candidates: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV, Parquet or JSON Lines of points that can be captured", metavar="FILE"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say which clips to capture next: where one more would be worth most, the first first."""
+    synthesizer = open_model(model)
+    given = queries.points(candidates, synthesizer) if candidates else ()
+    found = find_suggestions(synthesizer, SuggestQuestion(count, performer, given))
+    typer.echo(as_json(suggestions.plain(found)) if json else suggestions.text(found))
 
 
 app.command()(exports.export)

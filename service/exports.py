@@ -18,7 +18,7 @@ from service.export.reading import Defaults
 from service.export.run import Outcome, Shard
 from service.motion.errors import InvalidField
 from service.motion.roles import Names
-from service.synthesis import intake, session
+from service.synthesis import intake, session, spelling
 from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
 
 
@@ -42,12 +42,22 @@ def export(
     level: Annotated[int, typer.Option(help="of detail, where a row says none")] = 0,
     performer: Annotated[str | None, typer.Option(help="who moves, where a row says none")] = None,
     extrapolate: Annotated[
-        Policy, typer.Option(help="what to do with controls outside what was sampled")
+        Policy, typer.Option(help="controls like which nothing was captured: answer, warn, refuse")
     ] = POLICY,
     names: Annotated[Names, typer.Option(help="what joints are called")] = NAMES,
     root: Annotated[Root, typer.Option(help="travelling, or in place")] = ROOT,
     loop: Annotated[
         bool, typer.Option("--loop", help="cycles that end with the frame they begin with")
+    ] = False,
+    exact: Annotated[
+        str | None,
+        typer.Option(
+            help="measured controls to be met exactly, where a row says none",
+            metavar="auto|none|NAME,NAME",
+        ),
+    ] = None,
+    pin_feet: Annotated[
+        bool, typer.Option("--pin-feet", help="keep feet that stand where they stand")
     ] = False,
     unit: Annotated[
         Unit | None, typer.Option(help="of length; what is usual in the format if not said")
@@ -88,6 +98,7 @@ def export(
         names=names,
         root=root,
         loop=loop,
+        hold=spelling.hold(exact, (), pin_feet),
     )
     opened = intake.opened(model.stem, model, content)
     source = queries.source(asked, Defaults(form, question), opened)
@@ -153,7 +164,7 @@ def _said(place: str, outcome: Outcome, look: Look) -> str:
     facts = outcome.facts
     said = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
-        said += f", {facts['warned']} of them outside what was sampled"
+        said += f", {facts['warned']} of them like nothing that was captured, or out of reach"
     if facts["skipped"]:
         said += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
     if outcome.before:

@@ -33,12 +33,14 @@ QUESTIONS = (
     "SigmaQuestion",
     "WhyQuestion",
     "Camera",
+    "Target",
 )
 ANSWERS = (
     "ModelList",
     "ModelCard",
     "Trust",
     "Reasons",
+    "Suggestions",
     "ManifestEntry",
     "Liveness",
     "Readiness",

@@ -19,6 +19,7 @@ const LOOKED_AT = [
   "Readiness",
   "Reasons",
   "SigmaGrid",
+  "Suggestions",
   "Trust",
 ];
 

@@ -34,7 +34,7 @@ class Errors:
     there is none. acceleration: mean size of
     the synthesised motion's over the captured one's, at equal durations. skate and skate_captured:
     mean speed, m/s, of feet on the ground. duration: logarithm of synthesised over captured.
-    squared: mean squared absolute distance, m².
+    squared: mean squared absolute distance, m². joints (J,): of each joint, m².
     """
 
     relative: Distances
@@ -47,6 +47,7 @@ class Errors:
     skate: float
     skate_captured: float
     duration: float
+    joints: Floats
 
     @property
     def squared(self) -> float:
@@ -70,6 +71,7 @@ def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
         skate(made, feet),
         skate(captured, feet),
         float(np.log(made.duration / captured.duration)),
+        np.mean(np.square(_apart(warped, true)), axis=0),
     )
 
 
@@ -134,6 +136,7 @@ def mean(errors: Sequence[Errors]) -> Errors:
         skate=average("skate"),
         skate_captured=average("skate_captured"),
         duration=float(np.sqrt(np.mean(np.square([error.duration for error in errors])))),
+        joints=np.mean([error.joints for error in errors], axis=0),
     )
 
 

@@ -1,6 +1,6 @@
 """Every method's answers to the same queries, from the same training."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,13 @@ DEFINITIONS = {
     OURS: "the model as it is exported: truncated, with its own bones and timing",
     EXACT: "the same, corrected by what the service runs until the event's joint is at its event "
     "where the captured clip has it",
+    "posefield_no_performer": "the same model, asked for nobody in particular",
+    **{
+        f"posefield_adapt_{count}": f"the same model adapted to the performer by {shown}, each of "
+        "a take of its own and none of the asked clip's take, as far apart in the controls as "
+        "they come; only clips that at least three other takes of their performer stand beside"
+        for count, shown in ((1, "one clip"), (3, "three clips"), (5, "at most five clips"))
+    },
     NAIVE: "kriging of every frame by itself, isotropic, variogram fitted by weighted least "
     "squares (Mukai & Kuriyama 2005); our code, checked against GSTools",
     **{name: words for name, (_, words) in PEERS.items()},
@@ -40,10 +47,12 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answers:
-    """Motions of each method, and our own standard deviation (Q,) of each query, m."""
+    """Motions of each method, none where it was not asked, and our own standard deviation of each
+    query (Q,), and of each joint of it (Q, J), m."""
 
-    motions: dict[str, list[Motion]]
+    motions: Mapping[str, Sequence[Motion | None]]
     sigma: Floats
+    joint_sigma: Floats
 
 
 @dataclass(frozen=True)
@@ -59,10 +68,11 @@ def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
     event = fidelity.moment(recipe, trained.examples)
     bank = trained.model.bank
     points = bank.points(asked.controls, _labels(trained, asked))
-    motions = {OURS: _ours(trained, asked, points, event)}
+    motions: dict[str, list[Motion]] = {OURS: ours(recipe, trained, asked)}
     for name, predict in _methods(trained).items():
         motions[name] = _restore(trained, predict(points), event)
-    return Answers(motions, bank.sigma(bank.numpy(points)[VARIANCE]))
+    sigma = bank.sigma(bank.numpy(points)[VARIANCE])
+    return Answers(motions, sigma, sigma[:, None] * trained.joints)
 
 
 def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:
@@ -79,11 +89,11 @@ def _labels(trained: Trained, asked: Asked) -> Floats:
     return samples.labels(asked.performers, trained.model.bank.performers)
 
 
-def _ours(
-    trained: Trained, asked: Asked, points: Floats, event: fidelity.Moment | None
-) -> list[Motion]:
+def ours(recipe: Recipe, trained: Trained, asked: Asked) -> list[Motion]:
+    """Answers of the model as it is exported."""
+    event = fidelity.moment(recipe, trained.examples)
     labels, model = _labels(trained, asked), trained.model
-    fields = model.bank.numpy(points)
+    fields = model.bank.numpy(model.bank.points(asked.controls, labels))
     times = np.exp(fields["duration"]) * EVEN
     found = model.evaluate(asked.controls, times, labels)
     places = found.rotations, found.root_position, found.bone_offsets

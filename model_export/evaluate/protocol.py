@@ -1,16 +1,17 @@
 """The three ways to ask how good a model is, and what came out."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
 from model_export import export, threads
-from model_export.evaluate import errors, exact, folds, methods, motion, truth
+from model_export.evaluate import errors, exact, flags, folds, methods, motion, newcomers, truth
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.exact import Correction
+from model_export.evaluate.flags import Flags
 from model_export.evaluate.folds import Fold
 from model_export.evaluate.methods import EXACT, OURS, Asked
 from model_export.evaluate.motion import Event, Motion
@@ -34,17 +35,30 @@ Report = Callable[[int, int], None]
 class Result:
     """What one protocol found.
 
-    clips: what was asked for, by name. errors: of each method, clip by clip. sigma (C,): predicted
-    standard deviation of ours, m. corrections (C,): what it took to hold ours to the captured
-    event; none where the recipe names no event.
+    clips: what was asked for, by name. errors: of each method, clip by clip; None where a method
+    was not asked. sigma (C,): predicted standard deviation of ours, m; joint_sigma (C, J): of each
+    joint, by name in `joints`. corrections (C,): what it took to hold ours to the captured event;
+    none where the recipe names no event. flags: how the support flag does on the same clips; none
+    against the truth, which is everywhere.
     """
 
     family: str
     protocol: str
     clips: tuple[str, ...]
-    errors: dict[str, tuple[Errors, ...]]
+    errors: dict[str, tuple[Errors | None, ...]]
     sigma: Floats
+    joint_sigma: Floats
+    joints: tuple[str, ...]
     corrections: tuple[Correction, ...]
+    flags: Flags | None = None
+
+    def asked(self, name: str) -> list[int]:
+        """Places of the clips that a method was asked for."""
+        return [place for place, error in enumerate(self.errors[name]) if error is not None]
+
+    def of(self, name: str, places: Sequence[int]) -> list[Errors]:
+        """Errors of a method at some of the places that it was asked for."""
+        return [error for place in places if (error := self.errors[name][place]) is not None]
 
 
 @dataclass(frozen=True)
@@ -52,9 +66,14 @@ class _Part:
     """Answers to some of the clips: their places in the whole, their errors, sigma, corrections."""
 
     places: tuple[int, ...]
-    errors: dict[str, list[Errors]]
+    errors: dict[str, list[Errors | None]]
     sigma: Floats
+    joint_sigma: Floats
     corrections: list[Correction]
+
+    def of(self, name: str) -> Sequence[Errors | None]:
+        """Errors of a method, none of one that was not asked."""
+        return self.errors.get(name, [None] * len(self.places))
 
 
 @dataclass(frozen=True)
@@ -81,9 +100,12 @@ def run(recipe: Recipe, examples: Sequence[Example], protocol: str, report: Repo
     if protocol == "truth":
         return against_truth(recipe, examples, truth.points(), report)
     own = folds.clips(examples) if protocol == "clip" else folds.performers(examples)
-    jobs = [delayed(_held_out)(recipe, examples, fold) for fold in own]
+    jobs = [delayed(_held_out)(recipe, examples, fold, protocol) for fold in own]
     names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
-    return _result(recipe, f"leave_one_{protocol}_out", names, _done(jobs, report))
+    controls = np.stack([example.controls for example in examples])
+    found = flags.measure(controls, [control.name for control in recipe.controls], own)
+    asked = _Asked(f"leave_one_{protocol}_out", names, examples[0].clip.skeleton.names)
+    return replace(_result(recipe, asked, _done(jobs, report)), flags=found)
 
 
 def against_truth(
@@ -94,7 +116,7 @@ def against_truth(
     starts = range(0, len(points), BATCH)
     jobs = [delayed(_true)(made, points[at : at + BATCH], at) for at in starts]
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
-    return _result(recipe, "truth", names, _done(jobs, report))
+    return _result(recipe, _Asked("truth", names, made.trained.skeleton.names), _done(jobs, report))
 
 
 def _done(jobs: Sequence[object], report: Report) -> Iterator[_Part]:
@@ -112,7 +134,7 @@ def _alone() -> Iterator[None]:
 
 
 @_alone()
-def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
+def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str) -> _Part:
     rest, held = fold.split(examples)
     try:
         made = _made(recipe, rest)
@@ -123,7 +145,24 @@ def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> _Part:
     events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
     pairs = zip(held, events, strict=True)
     captured = [motion.of_clip(example.clip, event) for example, event in pairs]
-    return _compared(made, fold.held, asked, captured, events)
+    if protocol == "clip":
+        more: More = newcomers.unnamed(recipe, made.trained, asked)
+    else:
+        more = newcomers.adapted(recipe, made.trained, held)
+    return _compared(made, fold.held, asked, _Truth(captured, events, more))
+
+
+More = Mapping[str, Sequence[Motion | None]]
+"""Answers of methods that only one protocol asks, None where they were not asked."""
+
+
+@dataclass(frozen=True)
+class _Truth:
+    """Captured motions, their events, and answers to them that are at hand already."""
+
+    captured: Sequence[Motion]
+    events: Sequence[Event | None]
+    more: More
 
 
 @_alone()
@@ -132,7 +171,7 @@ def _true(made: _Made, points: Floats, start: int) -> _Part:
     captured = [motion.of_clip(truths.clip(list(p), RATE), event) for p in points]
     places = tuple(range(start, start + len(points)))
     asked = Asked(points, [""] * len(points))
-    return _compared(made, places, asked, captured, [event] * len(points))
+    return _compared(made, places, asked, _Truth(captured, [event] * len(points), {}))
 
 
 def _made(recipe: Recipe, examples: Sequence[Example]) -> _Made:
@@ -144,38 +183,53 @@ def _compared(
     made: _Made,
     places: tuple[int, ...],
     asked: Asked,
-    captured: Sequence[Motion],
-    events: Sequence[Event | None],
+    held: _Truth,
 ) -> _Part:
     recipe, trained = made.recipe, made.trained
     feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
     found = methods.answers(recipe, trained, asked)
-    motions, corrections = found.motions, list[Correction]()
-    wanted = [exact.goal(own, event) for own, event in zip(captured, events, strict=True) if event]
+    rest = {name: own for name, own in found.motions.items() if name != OURS}
+    ours, corrections = {OURS: found.motions[OURS]}, list[Correction]()
+    pairs = zip(held.captured, held.events, strict=True)
+    wanted = [exact.goal(own, event) for own, event in pairs if event]
     if wanted:
-        held = exact.answers(recipe, trained, made.file, asked, wanted)
-        rest = {name: own for name, own in motions.items() if name != OURS}
-        motions, corrections = {OURS: motions[OURS], EXACT: held.motions, **rest}, held.corrections
+        corrected = exact.answers(recipe, trained, made.file, asked, wanted)
+        ours[EXACT], corrections = corrected.motions, corrected.corrections
+    motions = {**ours, **held.more, **rest}
     compared = {
-        name: [errors.compare(own, true, feet) for own, true in zip(named, captured, strict=True)]
+        name: [
+            None if own is None else errors.compare(own, true, feet)
+            for own, true in zip(named, held.captured, strict=True)
+        ]
         for name, named in motions.items()
     }
-    return _Part(places, compared, found.sigma, corrections)
+    return _Part(places, compared, found.sigma, found.joint_sigma, corrections)
 
 
-def _result(recipe: Recipe, protocol: str, names: Sequence[str], parts: Iterator[_Part]) -> Result:
+@dataclass(frozen=True)
+class _Asked:
+    """Which protocol, of which clips, and the names of the joints."""
+
+    protocol: str
+    clips: Sequence[str]
+    joints: tuple[str, ...]
+
+
+def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
     """Parts in the order of the clips, whichever came first."""
     listed = list(parts)
     order = np.argsort([place for part in listed for place in part.places])
     corrections = [correction for part in listed for correction in part.corrections]
-    gathered = {
-        name: [error for part in listed for error in part.errors[name]] for name in listed[0].errors
-    }
+    # Where a fold holds the last but one performer out, nobody is told apart in it.
+    methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
+    gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
     return Result(
         recipe.name,
-        protocol,
-        tuple(names),
+        asked.protocol,
+        tuple(asked.clips),
         {name: tuple(own[i] for i in order) for name, own in gathered.items()},
         np.concatenate([part.sigma for part in listed])[order],
+        np.concatenate([part.joint_sigma for part in listed])[order],
+        asked.joints,
         tuple(corrections[i] for i in order if corrections),
     )

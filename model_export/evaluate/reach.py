@@ -72,14 +72,14 @@ def _time(key: str, words: str, seconds: Floats) -> Figure:
 
 
 def _effector(result: Result) -> Floats:
-    return np.array([error.effector for error in result.errors[EXACT]])
+    return np.array([error.effector for error in result.of(EXACT, result.asked(EXACT))])
 
 
 def _changes(result: Result) -> Iterator[Figure]:
     """Of the mean distances, as shares of those of the answers before."""
 
     def means(name: str, distance: str) -> Floats:
-        return np.array([_mean(error, distance) for error in result.errors[name]])
+        return np.array([_mean(error, distance) for error in result.of(name, result.asked(name))])
 
     for distance, word in (("relative", "relative"), ("absolute", "global")):
         before, after = means(OURS, distance), means(EXACT, distance)

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from model_export.evaluate import reach, summary
-from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
+from model_export.evaluate.learning import Learning
+from model_export.evaluate.methods import DEFINITIONS, OURS
 from model_export.evaluate.protocol import Result
 from model_export.evaluate.summary import Summary
 from model_export.report import page, picture
@@ -22,8 +23,8 @@ TITLES = {
 }
 
 
-def html(description: str, results: Sequence[Result]) -> bytes:
-    """Page of a recipe's results; the same results give the same bytes."""
+def html(description: str, results: Sequence[Result], curve: Learning | None = None) -> bytes:
+    """Page of a recipe's results, and of a learning curve; the same results give the same bytes."""
     sections = [part for result in results for part in (_section(result), _spread(result))]
     first = summary.of(results[0])[0]
     figures = [
@@ -32,7 +33,8 @@ def html(description: str, results: Sequence[Result]) -> bytes:
         ("duration error", f"{100 * first.mean.duration:.1f} %"),
         ("sigma ratio (1 is right)", f"{summary.sigma_ratio(results[0]):.2f}"),
     ]
-    body = [*sections, _methods(results[0])]
+    learnt = [] if curve is None else [_learning(curve)]
+    body = [*sections, *learnt, _methods(results)]
     return page.html("evaluation", results[0].family, description, figures, body).encode()
 
 
@@ -41,7 +43,7 @@ def _section(result: Result) -> Section:
     return Section(
         result.protocol,
         TITLES[result.protocol],
-        (summary.LEGEND, _verdict(found)),
+        (summary.LEGEND, _verdict(found), *summary.trust_said(result)),
         (Table(summary.HEAD, tuple(one.cells() for one in found)), *_held(result)),
         (_bars(result, found), _clips(result, found), _calibration(result)),
     )
@@ -54,7 +56,7 @@ def _held(result: Result) -> list[Table]:
 
 def _verdict(found: Sequence[Summary]) -> str:
     """Who is ahead, and by how much beyond chance, in words."""
-    others = _others(found)
+    others = _rivals(found)
     ahead = [one.name for one in others if one.worse < -one.worse_error]
     tied = [one.name for one in others if abs(one.worse) <= one.worse_error]
     if ahead:
@@ -93,13 +95,13 @@ def _paint_bars(found: Sequence[Summary], figure: Figure) -> None:
     axes[0].invert_yaxis()
 
 
+def _rivals(found: Sequence[Summary]) -> list[Summary]:
+    """Other methods than ours, however it is asked."""
+    return [one for one in found if not one.name.startswith(OURS)]
+
+
 def _rival(found: Sequence[Summary]) -> str:
-    return min(_others(found), key=lambda one: one.worse).name
-
-
-def _others(found: Sequence[Summary]) -> list[Summary]:
-    """Other methods; what is held to the captured event was told more than they were."""
-    return [one for one in found if one.name not in (OURS, EXACT)]
+    return min(_rivals(found), key=lambda one: one.worse).name
 
 
 def _clips(result: Result, found: Sequence[Summary]) -> Picture:
@@ -116,8 +118,8 @@ def _clips(result: Result, found: Sequence[Summary]) -> Picture:
 
 def _paint_clips(result: Result, rival: str, figure: Figure) -> None:
     left, right = figure.subplots(1, 2)
-    ours = 100 * summary.relative(result.errors[OURS])
-    theirs = 100 * summary.relative(result.errors[rival])
+    ours = 100 * summary.relative(result.of(OURS, result.asked(OURS)))
+    theirs = 100 * summary.relative(result.of(rival, result.asked(rival)))
     left.plot(theirs, ours, ".", color=picture.BLUE, rasterized=len(ours) > WORST**3)
     far = 1.05 * max(ours.max(), theirs.max())
     left.plot([0, far], [0, far], color=picture.GREY, linewidth=0.8)
@@ -142,7 +144,7 @@ def _calibration(result: Result) -> Picture:
 
 def _paint_calibration(result: Result, figure: Figure) -> None:
     ax = figure.subplots()
-    actual = 100 * np.sqrt([error.squared for error in result.errors[OURS]])
+    actual = 100 * np.sqrt([error.squared for error in result.of(OURS, result.asked(OURS))])
     sigma = 100 * result.sigma
     ax.plot(sigma, actual, ".", color=picture.BLUE, rasterized=len(actual) > WORST**3)
     far = 1.1 * float(sigma.max())
@@ -168,7 +170,35 @@ def _spread(result: Result) -> Section:
     return Section(f"{result.protocol}-distances", title, words, (Table(heading, tuple(rows)),))
 
 
-def _methods(result: Result) -> Section:
-    rows = tuple((name, DEFINITIONS[name]) for name in result.errors)
+def _learning(curve: Learning) -> Section:
+    drawn = picture.draw(
+        "learning",
+        3.2,
+        partial(_paint_learning, curve),
+        "Distance to the truth against the number of samples, suggested and at random.",
+        "Each point is a model trained anew; both ways begin with the same samples.",
+    )
+    words = (
+        f"From {curve.sizes[0]} samples to {curve.sizes[-1]}, added as `posefield suggest` ranks "
+        f"them and as chance has it: suggested ones are at {curve.reached:.0f} where random ones "
+        f"are at {curve.sizes[-1]}, {curve.faster:.1f} times as fast.",
+    )
+    return Section("learning", "What suggested clips are worth", words, (), (drawn,))
+
+
+def _paint_learning(curve: Learning, figure: Figure) -> None:
+    axes = figure.subplots(1, 2)
+    for ax, title, row in zip(axes, ("global", "root-relative"), (0, 1), strict=True):
+        for (way, own), colour in zip(
+            curve.errors.items(), (picture.ORANGE, picture.BLUE), strict=True
+        ):
+            ax.plot(curve.sizes, 100 * own[row], "o-", color=colour, label=way)
+        ax.set(xlabel="samples", ylabel="cm", title=title, ylim=(0, None))
+    axes[0].legend()
+
+
+def _methods(results: Sequence[Result]) -> Section:
+    names = dict.fromkeys(name for result in results for name in result.errors)
+    rows = tuple((name, DEFINITIONS[name]) for name in names)
     words = ("All methods get the same aligned clips; each predicts motion, bones, timing.",)
     return Section("methods", "What each method is", words, (Table(("method", "what"), rows),))

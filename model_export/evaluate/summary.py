@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from model_export.evaluate import columns, errors, reach
+from model_export.evaluate import columns, errors, flags, reach
 from model_export.evaluate.errors import Errors
+from model_export.evaluate.flags import Flags
 from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
 from model_export.evaluate.protocol import Result
 from model_export.report import plain
@@ -32,13 +33,16 @@ HEAD = (
 
 @dataclass(frozen=True)
 class Summary:
-    """One method over all clips.
+    """One method over all clips that it was asked for.
 
-    mean: its errors. standard_error, m: of the mean relative distance. worse, worse_error, m: by
-    how much its relative distance exceeds ours on the same clip, and the standard error of that.
+    clips, left_out: how many those are, and how many others there are. mean: its errors.
+    standard_error, m: of the mean relative distance. worse, worse_error, m: by how much its
+    relative distance exceeds ours on the same clip, and the standard error of that.
     """
 
     name: str
+    clips: int
+    left_out: int
     mean: Errors
     standard_error: float
     worse: float
@@ -54,20 +58,24 @@ class Summary:
         """Figures by name, distances in centimetres."""
         mean = self.mean
         return {
-            "relative_cm": _cm(mean.relative.mean),
-            "global_cm": _cm(mean.absolute.mean),
-            "effector_cm": _cm(mean.effector),
-            "plain_relative_cm": _cm(mean.plain_relative.mean),
-            "plain_global_cm": _cm(mean.plain_absolute.mean),
-            "standard_error_cm": _cm(self.standard_error),
-            "difference_cm": _cm(self.worse),
-            "difference_standard_error_cm": _cm(self.worse_error),
+            "clips": self.clips,
+            "clips_left_out": self.left_out,
+            "relative_cm": centimetres(mean.relative.mean),
+            "global_cm": centimetres(mean.absolute.mean),
+            "effector_cm": centimetres(mean.effector),
+            "plain_relative_cm": centimetres(mean.plain_relative.mean),
+            "plain_global_cm": centimetres(mean.plain_absolute.mean),
+            "standard_error_cm": centimetres(self.standard_error),
+            "difference_cm": centimetres(self.worse),
+            "difference_standard_error_cm": centimetres(self.worse_error),
             "duration_error": plain.number(mean.duration),
             "acceleration_ratio": plain.number(mean.acceleration),
             "skate_ratio": plain.number(self.skate) if mean.skate_captured else None,
-            "skate_cm_per_s": _cm(mean.skate),
+            "skate_cm_per_s": centimetres(mean.skate),
             "distances_cm": {
-                name: {key: _cm(value) for key, value in asdict(getattr(mean, name)).items()}
+                name: {
+                    key: centimetres(value) for key, value in asdict(getattr(mean, name)).items()
+                }
                 for name in DISTANCES
             },
             "definition": DEFINITIONS[self.name],
@@ -78,7 +86,7 @@ class Summary:
         mean = self.mean
         ours = self.name == OURS
         return (
-            self.name,
+            f"{self.name} ({self.clips} clips)" if self.left_out else self.name,
             _two(mean.relative.mean),
             _two(self.standard_error),
             "" if ours else f"{100 * self.worse:+.2f}",
@@ -97,7 +105,7 @@ def _two(metres: float) -> str:
     return f"{100 * metres:.2f}"
 
 
-def _cm(metres: float) -> float | None:
+def centimetres(metres: float) -> float | None:
     return None if np.isnan(metres) else plain.number(100.0 * metres)
 
 
@@ -108,14 +116,17 @@ def relative(found: Sequence[Errors]) -> Floats:
 
 def of(result: Result) -> list[Summary]:
     """Every method of a result, ours first."""
-    ours = relative(result.errors[OURS])
-    return [_summary(name, found, ours) for name, found in result.errors.items()]
+    return [_summary(result, name) for name in result.errors if result.asked(name)]
 
 
-def _summary(name: str, found: Sequence[Errors], ours: Floats) -> Summary:
-    own = relative(found)
+def _summary(result: Result, name: str) -> Summary:
+    places = result.asked(name)
+    found = result.of(name, places)
+    own, ours = relative(found), relative(result.of(OURS, places))
     return Summary(
         name,
+        len(found),
+        len(result.clips) - len(found),
         errors.mean(found),
         _standard_error(own),
         float((own - ours).mean()),
@@ -129,12 +140,56 @@ def _standard_error(values: Floats) -> float:
 
 def sigma_ratio(result: Result) -> float:
     """Mean of squared distance over squared prediction: one where sigma is right."""
-    squared = np.array([error.squared for error in result.errors[OURS]])
+    squared = np.array([error.squared for error in result.of(OURS, result.asked(OURS))])
     return float(np.mean(squared / np.square(result.sigma)))
+
+
+def joint_sigma_ratios(result: Result) -> dict[str, float]:
+    """The same for each joint alone, by name."""
+    squared = np.stack([error.joints for error in result.of(OURS, result.asked(OURS))])
+    ratios = np.mean(squared / np.square(result.joint_sigma), axis=0)
+    return dict(zip(result.joints, ratios.tolist(), strict=True))
+
+
+def flags_facts(found: Flags) -> dict[str, Any]:
+    """How the support flag does, as JSON holds it."""
+    facts = {
+        "false_alarms": plain.number(found.alarms),
+        "beyond": {name: plain.number(share) for name, share in found.beyond.items()},
+    }
+    if found.gap is None:
+        return facts
+    control, share = found.gap
+    return {**facts, "gap": {"control": control, "flagged": plain.number(share)}}
+
+
+def flags_said(found: Flags) -> str:
+    """The same in a sentence."""
+    beyond = ", ".join(f"{name} {100 * share:.0f}" for name, share in found.beyond.items())
+    said = (
+        f"support: {100 * found.alarms:.1f} % of held-out clips flagged; of those moved "
+        f"{100 * flags.BEYOND:.0f} % of its range beyond a control, %: {beyond}"
+    )
+    if found.gap is None:
+        return said
+    control, share = found.gap
+    return f"{said}; in the gap of {control}, %: {100 * share:.0f}"
+
+
+def _joints_said(result: Result) -> str:
+    """Sigma by joint in a sentence."""
+    ratios = joint_sigma_ratios(result)
+    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    return (
+        f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
+        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
+    )
 
 
 def facts(result: Result) -> dict[str, Any]:
     """Figures of a result as JSON holds them."""
+    held = {} if result.flags is None else {"support": flags_facts(result.flags)}
+    by_joint = joint_sigma_ratios(result)
     methods = {summary.name: summary.facts() for summary in of(result)}
     if EXACT in methods:
         methods[EXACT]["exact"] = reach.facts(result)
@@ -143,6 +198,8 @@ def facts(result: Result) -> dict[str, Any]:
         "protocol": result.protocol,
         "clips": len(result.clips),
         "sigma_ratio": plain.number(sigma_ratio(result)),
+        "joint_sigma_ratio": {name: plain.number(ratio) for name, ratio in by_joint.items()},
+        **held,
         "methods": methods,
     }
 
@@ -157,6 +214,11 @@ def table(result: Result) -> str:
     return f"{title}\n\n{rows}"
 
 
+def trust_said(result: Result) -> list[str]:
+    """How sigma by joint and the support flag do, a sentence each."""
+    return [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
+
+
 LEGEND = (
     "Centimetres, mean over joints, frames and clips. relative: root position taken out; global: "
     "left in; both after slope-limited time warping; plain: at equal shares of the duration. "
@@ -167,6 +229,7 @@ LEGEND = (
 )
 
 
-def definitions(result: Result) -> str:
-    """What each method of a result is, a line each."""
-    return "\n".join(f"  {name}: {DEFINITIONS[name]}" for name in result.errors)
+def definitions(results: Sequence[Result]) -> str:
+    """What each method of some results is, a line each."""
+    names = dict.fromkeys(name for result in results for name in result.errors)
+    return "\n".join(f"  {name}: {DEFINITIONS[name]}" for name in names)

@@ -96,7 +96,7 @@ def _shaken(clip: Clip, rng: Generator) -> Clip:
     return replace(clip, rotations=quat.mul(clip.rotations, quat.exp(noise)))
 
 
-def _trial(where: Controls, rng: Generator) -> Clip:
+def trial(where: Controls, rng: Generator) -> Clip:
     """One try: as the truth, but a little sooner or later, and not quite steady."""
     seconds = truth.duration(astuple(where))
     pace = truth.warp(where)
@@ -110,4 +110,4 @@ def samples() -> Iterator[Sample]:
     """All samples in order; the same at every call."""
     rng = Generator(PCG64(SEED))
     for performer, where in design():
-        yield Sample(performer, where, _trial(where, rng))
+        yield Sample(performer, where, trial(where, rng))

@@ -3,7 +3,7 @@
 import csv
 import io
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import astuple
 from pathlib import Path
 
@@ -83,11 +83,11 @@ description = "{description}"
 _BALL = "Zrotation Yrotation Xrotation"
 
 
-def _files() -> dict[str, bytes]:
-    """Every file of the family by its path under the family's directory."""
+def _files(chosen: Iterable[Sample]) -> dict[str, bytes]:
+    """Every file of some samples by its path under their directory."""
     files: dict[str, bytes] = {}
     rows: list[list[str]] = []
-    for number, sample in enumerate(samples(), start=1):
+    for number, sample in enumerate(chosen, start=1):
         path = f"bvh/reach_{number:03}.bvh"
         files[path] = bvh(sample.clip).encode()
         rows.append(_row(path, sample))
@@ -100,13 +100,19 @@ def family(output: Path) -> Path:
     A directory that already holds just this family is left as it is; raises FileError for a file
     in the way or a directory with anything else in it.
     """
-    files = _files()
+    files = _files(samples())
     if output.exists() and not output.is_dir():
         raise FileError(output, "found a file, expected a new or empty directory")
     if output.is_dir() and any(output.iterdir()):
         _expect_same(output, files)
     else:
         _place(output, files)
+    return output / "recipe.toml"
+
+
+def some(output: Path, chosen: Iterable[Sample]) -> Path:
+    """Write samples of one's own to a new directory, as a family, and return its recipe's path."""
+    _place(output, _files(chosen))
     return output / "recipe.toml"
 
 

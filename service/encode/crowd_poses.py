@@ -19,6 +19,7 @@ def table(poses: CrowdPoses) -> Table:
 
 def _columns(poses: CrowdPoses) -> dict[str, Column]:
     found = {name: single(getattr(poses, name)) for name in _SINGLES}
+    found["supported"] = poses.supported
     # A question names levels up to 127.
     found["levels"] = poses.levels.astype(np.int8)
     if poses.error_px is not None:

@@ -21,14 +21,7 @@ class Facts(NamedTuple):
 
     def whole(self) -> Any:
         """The facts again."""
-        return _joined(self.shape, iter(self.numbers), iter(self.texts))
-
-
-@dataclass(frozen=True)
-class Texts:
-    """Place of so many texts in a list."""
-
-    count: int
+        return _joined(self.shape, iter(self.numbers), iter(self.texts), self.texts)
 
 
 class Group(NamedTuple):
@@ -38,9 +31,22 @@ class Group(NamedTuple):
     shapes: tuple[Hashable, ...]
 
 
+class Several(NamedTuple):
+    """Texts or groups in a row, and the shape of each."""
+
+    shapes: tuple[Hashable, ...]
+
+
+class Again(NamedTuple):
+    """Place of a text that came before, the nth of all: USD writes it once."""
+
+    nth: int
+
+
 @dataclass(frozen=True)
 class Same:
-    """A fact that belongs to the shape: what is neither a finite number nor text."""
+    """A fact that belongs to the shape: what is neither a finite number nor text, and text that is
+    the name of a fact too."""
 
     spelt: str
     fact: Any = field(compare=False)
@@ -54,10 +60,9 @@ NONE = Facts(Group((), ()), (), ())
 
 def parted(facts: Mapping[str, Any]) -> Facts:
     """The same facts in parts."""
-    numbers: list[float] = []
-    texts: list[str] = []
-    shape = _shape(facts, numbers, texts)
-    return Facts(shape, tuple(numbers), tuple(texts))
+    parting = _Parting(frozenset(_names(facts)))
+    shape = parting.shape(facts)
+    return Facts(shape, tuple(parting.numbers), tuple(parting.texts))
 
 
 def dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -65,35 +70,64 @@ def dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
     return {name: _value(fact) for name, fact in facts.items() if fact is not None}
 
 
-def _shape(fact: Any, numbers: list[float], texts: list[str]) -> Hashable:
-    kind = type(fact)
-    if kind is float and math.isfinite(fact):
-        numbers.append(fact)
-        return NUMBER
-    if kind is str:
-        texts.append(fact)
+@dataclass
+class _Parting:
+    """Numbers and texts of facts as they are met; texts by their places. names: of all facts."""
+
+    names: frozenset[str]
+    numbers: list[float] = field(default_factory=list)
+    texts: dict[str, int] = field(default_factory=dict)
+
+    def shape(self, fact: Any) -> Hashable:
+        """Shape of a fact, whose numbers and texts are taken."""
+        kind = type(fact)
+        if kind is float and math.isfinite(fact):
+            self.numbers.append(fact)
+            return NUMBER
+        if kind is str:
+            return self._text(fact)
+        if kind is dict:
+            return Group(tuple(fact), tuple([self.shape(each) for each in fact.values()]))
+        if kind is list and {*map(type, fact)} <= {str}:
+            return Several(tuple([self._text(each) for each in fact]))
+        if kind is list and {*map(type, fact)} == {dict}:
+            return Several(tuple([self.shape(each) for each in fact]))
+        return Same(repr(fact), fact)
+
+    def _text(self, text: str) -> Hashable:
+        if text in self.names:
+            return Same(repr(text), text)
+        if text in self.texts:
+            return Again(self.texts[text])
+        self.texts[text] = len(self.texts)
         return TEXT
-    if kind is dict:
-        return Group(tuple(fact), tuple([_shape(each, numbers, texts) for each in fact.values()]))
-    if kind is list and all(type(each) is str for each in fact):
-        texts.extend(fact)
-        return Texts(len(fact))
-    return Same(repr(fact), fact)
 
 
-def _joined(shape: Hashable, numbers: Iterator[float], texts: Iterator[str]) -> Any:
+def _names(fact: Any) -> Iterator[str]:
+    """Names of facts, and of those in them."""
+    if type(fact) is dict:
+        yield from fact
+        for each in fact.values():
+            yield from _names(each)
+    if type(fact) is list:
+        for each in fact:
+            yield from _names(each)
+
+
+def _joined(
+    shape: Hashable, numbers: Iterator[float], texts: Iterator[str], every: Sequence[str]
+) -> Any:
     match shape:
         case Group(names, shapes):
-            values = (_joined(each, numbers, texts) for each in shapes)
+            values = [_joined(each, numbers, texts, every) for each in shapes]
             return dict(zip(names, values, strict=True))
-        case "number":
-            return next(numbers)
-        case "text":
-            return next(texts)
-        case Texts(count):
-            return [next(texts) for _ in range(count)]
+        case Several(shapes):
+            return [_joined(each, numbers, texts, every) for each in shapes]
+        case Again(nth):
+            return every[nth]
         case Same(_, fact):
             return fact
+    return next(numbers) if shape == NUMBER else next(texts)
 
 
 def _value(fact: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from service.motion.answer import Captured, Reasons
+from service.motion.answer import Backing, Captured, Reasons
 
 DECIMALS = 9
 """Further ones hang on the machine that inverted the system."""
@@ -15,6 +15,7 @@ def plain(found: Reasons) -> dict[str, Any]:
         "controls": found.controls,
         "performer": found.performer,
         "warnings": list(found.warnings),
+        "support": _backing(found.backing),
         "nearest": [_clip(clip) for clip in found.nearest],
         "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
         **({"inferred": list(found.inferred)} if found.inferred else {}),
@@ -26,8 +27,18 @@ def _clip(clip: Captured) -> dict[str, Any]:
     return {**vars(clip), **rounded}
 
 
+def _backing(found: Backing) -> dict[str, Any]:
+    return {
+        "supported": found.supported,
+        "beyond": {name: round(share, DECIMALS) for name, share in found.beyond.items()},
+        "most_beyond": found.most,
+        "variance": round(found.variance, DECIMALS),
+        "most_variance": round(found.limit, DECIMALS),
+    }
+
+
 def text(found: Reasons) -> str:
-    """A line for each clip, the nearest first, and one for all others."""
+    """A line for each clip, the nearest first, one for all others, and what supports the answer."""
     wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
     lines = [f"{'clip':{wide}}  distance   weight  "]
     lines += [
@@ -36,7 +47,21 @@ def text(found: Reasons) -> str:
     ]
     others = f"{found.others} others"
     lines.append(f"{others:{wide}}  {'':8}  {100 * found.others_weight:6.1f} %")
+    lines.append(_supported(found.backing))
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _supported(found: Backing) -> str:
+    said = "was captured" if found.supported else "was not captured"
+    beyond = ", ".join(
+        f"{name} {100 * share:.0f} % of its range beyond it"
+        for name, share in found.beyond.items()
+        if share
+    )
+    return (
+        f"something like it {said}: variance {found.variance:.2g} of at most {found.limit:.2g}, "
+        f"{beyond or 'no control beyond its range'} (at most {100 * found.most:.0f} %)"
+    )
 
 
 def _said(clip: Captured) -> str:

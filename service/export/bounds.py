@@ -12,31 +12,34 @@ import numpy as np
 from service.export.columns import CONTROL
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
+from service.motion.support import Support
 from service.synthesis import course, limits
 from service.synthesis.question import ClipQuestion
 
 Values = Mapping[str, Sequence[Any]]
 
 
-def pass_all(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+def pass_all(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
     """Whether rows of values by field, usual where nothing is said, are all sound."""
     return (
-        _controls_pass(card, values, usual)
+        _controls_pass(card, support, values, usual)
         and _within(_column(values, "level", usual.level), 0, len(card.levels) - 1)
         and _within(_column(values, "fps", usual.fps), *course.RATES)
         and _window_passes(card, values, usual)
         and _loops_pass(card, values, usual)
+        and _hold_passes(values)
         and (bool(card.roles) or {*values.get("names", ()), usual.names} <= {"own", None})
     )
 
 
-def _controls_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+def _controls_pass(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
     strict = "refuse" in values.get("extrapolate", ()) or usual.extrapolate == "refuse"
     allowed = limits.sampled if strict else limits.reach
-    return all(
-        _within(np.asarray(values[CONTROL + control.name]), *allowed(control))
-        for control in card.controls
-    )
+    columns = [np.asarray(values[CONTROL + control.name]) for control in card.controls]
+    pairs = zip(columns, card.controls, strict=True)
+    if not all(_within(column, *allowed(control)) for column, control in pairs):
+        return False
+    return not strict or bool(support.holds(np.stack(columns, axis=1)).all())
 
 
 def _window_passes(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
@@ -57,6 +60,12 @@ def _loops_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
     whole = _column(values, "start", usual.start) <= 0.0
     last = _column(values, "end", math.inf if usual.end is None else usual.end) == math.inf
     return card.cyclic and bool(np.all(~loops | (whole & last)))
+
+
+def _hold_passes(values: Values) -> bool:
+    """Whether no row says what has to be looked at by itself; the usual has been looked at."""
+    plain = {"auto", "none", None}.issuperset(values.get("exact", ()))
+    return plain and not any(values.get("targets", ())) and not any(values.get("pin_feet", ()))
 
 
 def _column(values: Values, field: str, usual: float) -> Floats:

@@ -9,6 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from service.synthesis import question, spelling
+from service.synthesis.question import Target
+
 LEGAL_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}", re.ASCII)
 
 
@@ -106,6 +109,52 @@ class Flag:
         if not set(map(type, cells)) <= {bool, type(None)}:
             raise ValueError
         return list(cells)
+
+
+@dataclass(frozen=True)
+class Exact:
+    """Which measured controls a clip is held to: auto, none, or names with commas between; of JSON
+    and Parquet also a list of names."""
+
+    expected: str = "auto, none or names of controls, commas between"
+
+    def text(self, cells: Sequence[str]) -> list[question.Exact | None]:
+        return [spelling.exact(cell) if cell else None for cell in cells]
+
+    def values(self, cells: Sequence[Any]) -> list[question.Exact | None]:
+        return [_exact(cell) for cell in cells]
+
+
+def _exact(cell: object) -> question.Exact | None:
+    if isinstance(cell, list) and cell and {*map(type, cell)} == {str}:
+        return tuple(cell)
+    if cell is None or isinstance(cell, str):
+        return spelling.exact(cell) if cell else None
+    raise ValueError
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Targets of a clip: as text JOINT@MOMENT:X,Y,Z with semicolons between, else a list of
+    objects with joint, position and time or at."""
+
+    expected: str = "targets: JOINT@MOMENT:X,Y,Z; ... in text, else a list of objects"
+
+    def text(self, cells: Sequence[str]) -> list[tuple[Target, ...] | None]:
+        return [_targets(cell) for cell in cells]
+
+    def values(self, cells: Sequence[Any]) -> list[tuple[Target, ...] | None]:
+        return [_targets(cell) for cell in cells]
+
+
+def _targets(cell: object) -> tuple[Target, ...] | None:
+    if cell is None or cell == "":
+        return None
+    if isinstance(cell, str):
+        return tuple(spelling.target(words.strip()) for words in cell.split(";"))
+    if not isinstance(cell, list):
+        raise ValueError
+    return tuple(map(spelling.plain_target, cell))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from typing import Any, get_args
 
 from service.encode import ENCODERS
-from service.export.cells import Flag, Kind, Name, Number, Whole, Word
+from service.export.cells import Exact, Flag, Kind, Name, Number, Targets, Whole, Word
 from service.motion.card import ModelCard
 from service.motion.roles import Names
 from service.synthesis.question import Policy, Root
@@ -34,9 +34,15 @@ OPTIONS: Mapping[str, Callable[[ModelCard], Kind]] = {
     "names": lambda _: Word(get_args(Names)),
     "root": lambda _: Word(get_args(Root)),
     "loop": lambda _: Flag(),
+    "exact": lambda _: Exact(),
+    "targets": lambda _: Targets(),
+    "pin_feet": lambda _: Flag(),
 }
 """Every column but the controls; those that are neither name nor format are fields of a
-ClipQuestion."""
+ClipQuestion, or of what that is held to."""
+
+HELD = ("exact", "targets", "pin_feet")
+"""Fields of a Hold."""
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,8 @@ def _axis(text: str, columns: Columns) -> Axis:
         column = columns.find(name.strip())
         if column.field == "name":
             raise ValueError(f"column {name!r}, expected one that clips may share")
+        if column.field == "targets":
+            raise ValueError(f"column {name!r}, expected one whose values have no commas")
         return Axis(column, tuple(_values(column, values)))
     except ValueError as fault:
         raise InvalidField("grid", f"{text!r}: {fault}") from fault

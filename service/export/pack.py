@@ -27,10 +27,16 @@ class Order:
 
     @property
     def warnings(self) -> list[str]:
-        """One sentence if some clips are extrapolated; the manifest says which."""
-        outside = sum(bool(prospect.warnings) for prospect in self.prospects)
-        clips = f"{outside} of {len(self.prospects)} clips"
-        return [f"{clips} have some control outside what was sampled"] if outside else []
+        """A sentence if some clips are like nothing that was captured, and one if some miss a
+        target; the manifest says which."""
+        counts = {
+            "lie outside what was sampled, or in a gap of it": sum(
+                bool(prospect.warnings) for prospect in self.prospects
+            ),
+            "miss some target": sum(prospect.missed for prospect in self.prospects),
+        }
+        clips = len(self.prospects)
+        return [f"{count} of {clips} clips {said}" for said, count in counts.items() if count]
 
 
 def members(order: Order) -> Iterator[tuple[str, bytes]]:

@@ -22,7 +22,7 @@ from service.export import columns, grid, jsonl, originals, parquet, sampling, t
 from service.export.blocks import Block, Broken
 from service.export.columns import Columns
 from service.export.originals import Original
-from service.export.query import Source
+from service.export.query import Fault, Source
 from service.export.reading import Defaults, Reading
 from service.motion.errors import InvalidField, UnknownFormat
 from service.synthesis.synthesizer import Synthesizer
@@ -72,6 +72,17 @@ def source(asked: Asked, usual: Defaults, model: Synthesizer) -> Source:
     found, spec = _blocks(asked, model)
     digest = _digest({**spec, "usual": asdict(usual)})
     return Reading(found.blocks, found.place, model, usual, found.count, digest)
+
+
+def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
+    """Controls of each row of a file; raises as `source` does, InvalidField for a row at fault."""
+    rows = source(Asked(path), Defaults("usdc"), model).rows()
+    found = []
+    for row in rows:
+        if isinstance(row, Fault):
+            raise InvalidField("candidates", f"{row.place}: {row.message}")
+        found.append(dict(row.question.controls))
+    return found
 
 
 def _check_one(asked: Asked) -> None:

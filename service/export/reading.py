@@ -7,11 +7,11 @@ from typing import Any
 
 from service.export import bounds
 from service.export.blocks import Block, Broken
-from service.export.columns import CONTROL
+from service.export.columns import CONTROL, HELD
 from service.export.names import Seen, generated
 from service.export.query import KEPT, Fault, Query, Survey
 from service.motion.errors import QueryError
-from service.synthesis.question import ClipQuestion
+from service.synthesis.question import ClipQuestion, Hold
 from service.synthesis.synthesizer import Synthesizer
 
 OWN_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
@@ -108,7 +108,8 @@ class Reading:
             table = Table(block, block.values())
         except ValueError:
             return None
-        sound = bounds.pass_all(self.model.session.card, table.values, self.usual.question)
+        card, support = self.model.session.card, self.model.door.support
+        sound = bounds.pass_all(card, support, table.values, self.usual.question)
         return table if sound else None
 
     def _alone(self, block: Block) -> Table | Fault:
@@ -137,8 +138,16 @@ class Reading:
         ):
             form = said.pop("format", self.usual.format)
             said.pop("name", None)
-            question = replace(self.usual.question, controls=self._controls(said), **said)
+            hold = self._hold(said)
+            controls = self._controls(said)
+            question = replace(self.usual.question, controls=controls, hold=hold, **said)
             yield Query(name, form, question, self.place(number))
+
+    def _hold(self, said: dict[str, Any]) -> Hold:
+        """What a row is held to, taken out of what it says."""
+        held = {field: said.pop(field) for field in HELD if field in said}
+        usual = self.usual.question.hold
+        return replace(usual, **held) if held else usual
 
     def _controls(self, said: dict[str, Any]) -> dict[str, float]:
         """Controls of a row, taken out of what it says, in the card's order."""

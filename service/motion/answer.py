@@ -35,11 +35,14 @@ class Trust:
     model: name@contenthash. controls: the values that were asked for, in the model's units.
     duration: natural length of the whole clip at these controls, s. sigma: how far a captured
     clip at these controls would lie from this one, as a root-mean-square over joints and frames,
-    m. warnings: one sentence for each control outside what was sampled. performer: who was asked
-    for; none for somebody who was never seen. level: of detail. supported: whether anything
-    like these controls was captured. inferred: names of the controls that were not given, and
-    chosen as the most typical for those that were. measured: the controls that the recipe says how
-    to measure, as the answer has them. targets: what the answer was held to.
+    m. warnings: one sentence for each control outside what was sampled, or one where the controls
+    lie in a gap of it, and one for each target that is not reached. performer: who was asked for;
+    none for somebody who was never seen. level: of detail. supported: whether anything like these
+    controls was captured. performer_seen: whether somebody captured was asked for; none where the
+    model tells nobody apart. inferred: names of the controls that were not given, and chosen as the
+    most typical for those that were. measured: the controls that the recipe says how to measure, as
+    the answer has them. targets: what the answer was held to. joint_sigma (J,), m: sigma of each
+    joint, where it was asked for.
     """
 
     model: str
@@ -50,9 +53,11 @@ class Trust:
     performer: str | None = None
     level: int = 0
     supported: bool = True
+    performer_seen: bool | None = None
     inferred: tuple[str, ...] = ()
     measured: Mapping[str, float] = field(default_factory=dict)
     targets: tuple[Met, ...] = ()
+    joint_sigma: tuple[float, ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """The same as plain values, for formats that carry free metadata; what there is nothing to
@@ -64,17 +69,20 @@ class Trust:
             "level": self.level,
             "duration": self.duration,
             "sigma": self.sigma,
+            "supported": self.supported,
             "warnings": list(self.warnings),
             **self._more(),
         }
 
     def _more(self) -> dict[str, Any]:
+        seen = {} if self.performer_seen is None else {"performer_seen": self.performer_seen}
         more = {
             "inferred": list(self.inferred),
             "measured": dict(self.measured),
             "targets": [asdict(met) for met in self.targets],
+            "joint_sigma": list(self.joint_sigma),
         }
-        return {name: fact for name, fact in more.items() if fact}
+        return seen | {name: fact for name, fact in more.items() if fact}
 
 
 @dataclass(frozen=True)
@@ -138,19 +146,68 @@ class Captured:
 
 
 @dataclass(frozen=True)
+class Backing:
+    """Whether anything like some controls was captured, and by what that was told.
+
+    beyond: how far each control lies beyond its sampled range, as a share of it, of which `most` is
+    allowed. variance: of a plain field over the controls of the captured clips, from 0 where many
+    are near to 1 where none is. limit: the most at which something like it was captured.
+    """
+
+    supported: bool
+    beyond: dict[str, float]
+    most: float
+    variance: float
+    limit: float
+
+
+@dataclass(frozen=True)
 class Reasons:
     """Why an answer is as it is: the captured clips nearest to it, the nearest first, and how many
     others there are, with what all of them count for. All weights add up to one.
 
-    model: name@contenthash. warnings: one sentence for each control outside what was sampled.
-    inferred: names of the controls that were not given, as of an answer.
+    model: name@contenthash. warnings: as in Trust. inferred: names of the controls that were not
+    given, as of an answer.
     """
 
     model: str
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
+    backing: Backing
     nearest: tuple[Captured, ...]
     others: int
     others_weight: float
     inferred: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A point to capture.
+
+    gain: share by which the mean variance over all that may be asked falls if it is. variance: at
+    the point itself, as a share of the sill. nearest: source of the captured clip nearest to it;
+    none for models that do not keep them. lacking: the control in which that differs most, by
+    `gap`, a share of its range.
+    """
+
+    controls: dict[str, float]
+    gain: float
+    variance: float
+    nearest: str | None
+    lacking: str
+    gap: float
+
+
+@dataclass(frozen=True)
+class Suggestions:
+    """Points to capture next, the one that is worth most first; each as if those before it were.
+
+    model: name@contenthash. performer: who is to be captured; for none clips of all counted alike.
+    candidates: of how many points they were chosen.
+    """
+
+    model: str
+    performer: str | None
+    candidates: int
+    suggestions: tuple[Suggestion, ...]

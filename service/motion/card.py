@@ -52,6 +52,21 @@ class Event:
 
 
 @dataclass(frozen=True)
+class Making:
+    """What a model's fields were solved with and its graph does not say: adapting it takes that.
+
+    fields: of each field of the controls but the pose, its nugget and the degrees of its drifts.
+    landmarks: columns of the table that name them, and their canonical times. joint_weights: of
+    joints whose weight in the metric is not one. in_phase: cycles were brought to begin together.
+    """
+
+    fields: Mapping[str, tuple[float, ...]]
+    landmarks: Mapping[str, float] = field(default_factory=dict)
+    joint_weights: Mapping[str, float] = field(default_factory=dict)
+    in_phase: bool = False
+
+
+@dataclass(frozen=True)
 class ModelCard:
     """Everything a client needs to know of a model but its weights.
 
@@ -70,6 +85,8 @@ class ModelCard:
     this. event: None where the recipe names none, and in files older than this. beside: of a cycle
     a root of the covariance by which captured clips stray in the logarithm of their duration and in
     their travel, for a sigma of one metre; empty for what is no cycle, and in older files.
+    joint_sigma (J,): how far each joint errs, as a share of sigma; empty in files older than this.
+    making: nothing that a client needs; None in files older than this.
     """
 
     name: str
@@ -95,6 +112,8 @@ class ModelCard:
     left_out: tuple[float, ...] = ()
     event: Event | None = None
     beside: tuple[tuple[float, ...], ...] = ()
+    joint_sigma: tuple[float, ...] = ()
+    making: Making | None = None
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""
@@ -104,11 +123,13 @@ class ModelCard:
 def dump(card: ModelCard) -> dict[str, str]:
     """Metadata entries of a card: keys in a fixed order, values JSON text."""
     plain = {**plain_values(card), "format": FORMAT}
+    if card.making:
+        plain["making"] = _plain_making(card.making)
     return {PREFIX + key: json.dumps(plain[key], sort_keys=True) for key in sorted(plain)}
 
 
 def plain_values(card: ModelCard) -> dict[str, Any]:
-    """The card as numbers, strings, lists and objects."""
+    """The card as numbers, strings, lists and objects, but for what no client needs."""
     joints = card.skeleton
     return {
         **{key: getattr(card, key) for key in _AS_THEY_ARE},
@@ -127,6 +148,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         "left_out": list(card.left_out),
         "event": asdict(card.event) if card.event else None,
         "beside": [list(row) for row in card.beside],
+        "joint_sigma": list(card.joint_sigma),
         "units": {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"},
         "skeleton": {
             "names": list(joints.names),
@@ -152,6 +174,18 @@ def _control(plain: Mapping[str, Any]) -> Control:
 
 def _plain_level(level: Level) -> dict[str, Any]:
     return {**asdict(level), "ranks": list(level.ranks), "joints": list(level.joints)}
+
+
+def _plain_making(making: Making) -> dict[str, Any]:
+    """What of it there is: every byte of it travels in every file."""
+    return {key: value for key, value in asdict(making).items() if value}
+
+
+def _making(plain: Mapping[str, Any] | None) -> Making | None:
+    if plain is None:
+        return None
+    fields = {name: tuple(numbers) for name, numbers in plain.get("fields", {}).items()}
+    return Making(**{**plain, "fields": fields})
 
 
 def _plain_hyper(hyper: Hyper | None) -> dict[str, Any] | None:
@@ -213,6 +247,8 @@ def _from_plain(plain: Mapping[str, Any]) -> ModelCard:
         left_out=tuple(plain.get("left_out", ())),
         event=_event(plain.get("event")),
         beside=tuple(map(tuple, plain.get("beside", ()))),
+        joint_sigma=tuple(plain.get("joint_sigma", ())),
+        making=_making(plain.get("making")),
     )
 
 

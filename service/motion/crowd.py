@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from service.motion import quat
-from service.motion.conventions import UP, Floats, Indices, Singles
+from service.motion.conventions import UP, Floats, Indices, Singles, Truths
 from service.motion.skeleton import Skeleton
 
 
@@ -55,7 +55,8 @@ class CrowdPoses:
     model: name@contenthash. rotations (N, J, 4), the root's in the world; root_position (N, 3), m,
     in the world; bone_offsets (N, J, 3), m. levels (N,): level of detail of each. error_px (N,):
     pixels that the level's error covers; none where no camera was given. duration (N,), s: of each
-    character's clip. sigma (N,), m: as in Trust. warnings: sentences on the crowd as a whole.
+    character's clip. sigma (N,), m, and supported (N,): as in Trust. warnings: sentences
+    on the crowd as a whole.
     """
 
     model: str
@@ -67,6 +68,7 @@ class CrowdPoses:
     error_px: Singles | None
     duration: Singles
     sigma: Singles
+    supported: Truths
     warnings: tuple[str, ...]
 
     def __len__(self) -> int:

@@ -10,7 +10,8 @@ MotionError
 │   ├── UnknownModel
 │   ├── UnknownFormat
 │   ├── InvalidField     missing, unknown, of a wrong type, or outside the allowed range
-│   └── OutsideSamples   controls outside what was sampled, when the client asked to refuse them
+│   ├── OutsideSamples   controls outside what was sampled, when the client asked to refuse them
+│   └── OutOfReach       a target that no captured motion comes near, when the same was asked
 ├── ClusterError         a Dask cluster that cannot be reached or worked on
 ├── WorkerDied           a process that did a part of the work has gone
 └── TrainingError        samples from which no model can be made
@@ -87,6 +88,10 @@ class InvalidField(QueryError):
 
 class OutsideSamples(QueryError):
     """Controls outside what was sampled, when the client asked for them to be refused."""
+
+
+class OutOfReach(QueryError):
+    """A target that the motion cannot meet, when the client asked for that to be refused."""
 
 
 class ClusterError(MotionError):

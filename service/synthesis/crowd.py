@@ -69,7 +69,7 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     one.
     """
     card = model.session.card
-    controls, said = crowd_door.controls(card, question)
+    controls, supported, said = crowd_door.controls(card, model.door.support, question)
     labels = crowd_question.labels(question, card.performers)
     crowd_question.check_levels(question, len(card.levels))
     early = question.times < 0.0
@@ -96,6 +96,7 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         error_px,
         block.duration,
         block.sigma,
+        supported,
         (*said, *sentences),
     )
 

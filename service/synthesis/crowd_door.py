@@ -3,19 +3,30 @@
 import numpy as np
 
 from service.motion.card import Control, ModelCard
-from service.motion.conventions import Floats, Singles, Truths
+from service.motion.conventions import Floats, Indices, Singles, Truths
 from service.motion.errors import InvalidField, OutsideSamples
-from service.synthesis import limits
+from service.motion.support import Support
+from service.synthesis import door, limits
 from service.synthesis.crowd_question import CrowdQuestion
 
 
-def controls(card: ModelCard, question: CrowdQuestion) -> tuple[Floats, tuple[str, ...]]:
-    """Controls (N, d) in the card's order, and a sentence for each that some go beyond."""
+def controls(
+    card: ModelCard, support: Support, question: CrowdQuestion
+) -> tuple[Floats, Truths, tuple[str, ...]]:
+    """Controls (N, d) in the card's order, whether anything like each was captured (N,), and a
+    sentence for each control that some go beyond, and for those in a gap.
+
+    OutsideSamples where that is refused.
+    """
     limits.check_names(card, question.controls)
     columns = [_column(control, question) for control in card.controls]
+    points = np.stack(columns, axis=1)
+    supported = support.holds(points)
     pairs = zip(card.controls, columns, strict=True)
-    said = tuple(filter(None, (_outside(question, *pair) for pair in pairs)))
-    return np.stack(columns, axis=1), said
+    found = [_outside(question, *pair) for pair in pairs]
+    found.append(_gap(card, support, question, points[~supported], np.flatnonzero(~supported)))
+    said = tuple(filter(None, found)) if question.extrapolate == "warn" else ()
+    return points, supported, said
 
 
 def _column(control: Control, question: CrowdQuestion) -> Floats:
@@ -48,6 +59,24 @@ def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str |
     )
     if question.extrapolate == "refuse":
         raise OutsideSamples(f"controls/{control.name}", said, first)
+    return said
+
+
+def _gap(
+    card: ModelCard, support: Support, question: CrowdQuestion, points: Floats, who: Indices
+) -> str | None:
+    """What to say of those at points (U, d) between the captured clips; OutsideSamples where that
+    is refused."""
+    low, high = np.transpose([limits.sampled(control) for control in card.controls])
+    inside = np.all((points >= low) & (points <= high), axis=1)
+    if not inside.any():
+        return None
+    first = int(who[inside][0])
+    variance = float(support.variance(points[inside][:1])[0])
+    count = f"{np.count_nonzero(inside)} characters; the first, character {first}, lies"
+    said = door.gap(count, variance, support.limit)
+    if question.extrapolate == "refuse":
+        raise OutsideSamples("controls", said, first)
     return said
 
 

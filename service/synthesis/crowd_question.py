@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from service.motion.conventions import Floats, Indices, Singles, Truths
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
 from service.synthesis import limits
-from service.synthesis.question import Root
+from service.synthesis.question import Policy, Root
 from service.synthesis.view import FARTHEST, View
 
 
@@ -29,7 +28,7 @@ class CrowdQuestion:
     controls: (N,) by name, in their units. times (N,): s from the start of each character's clip.
     performers: who is asked for, each once, None for somebody who was never seen; performer (N,):
     which of them each character is. detail: levels of detail (N,), or the view to choose them by.
-    extrapolate: what to do with controls outside what was sampled. blending: of levels that
+    extrapolate: what to do with controls like which nothing was captured. blending: of levels that
     characters are on their way from, where they are.
 
     Raises InvalidField, with the index of the first character at fault, for rows that are missing
@@ -43,7 +42,7 @@ class CrowdQuestion:
     performer: Indices
     detail: Indices | View
     root: Root
-    extrapolate: Literal["warn", "refuse"]
+    extrapolate: Policy
     blending: "Blending | None" = None
 
     def __post_init__(self) -> None:

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from service.motion import support
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
@@ -17,9 +18,9 @@ from service.synthesis.typical import Chooser
 @dataclass(frozen=True)
 class Question:
     """What has passed the door: all controls, in the card's order, and performer as they were
-    given, and as the graph takes them, point (1, d) and labels (1, p); a warning for each control
-    outside its sampled range. inferred: names of the controls that were not given, and are the most
-    typical for those that were."""
+    given, and as the graph takes them, point (1, d) and labels (1, p); what is warned of; whether
+    anything like these controls was captured. inferred: names of the controls that were not given,
+    and are the most typical for those that were."""
 
     controls: dict[str, float]
     performer: str | None
@@ -27,6 +28,7 @@ class Question:
     point: Floats
     labels: Floats
     warnings: tuple[str, ...]
+    supported: bool
     inferred: tuple[str, ...] = ()
 
 
@@ -38,6 +40,7 @@ class Door:
         self._ranges = [(control.name, *limits.sampled(control)) for control in card.controls]
         self._names = {control.name for control in card.controls}
         self._nobody = labels(card.performers, None)
+        self.support = support.of(np.array(card.examples))
 
     def question(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
@@ -46,7 +49,7 @@ class Door:
         those that are, and for the performer.
 
         Raises InvalidField for a control, performer or level that cannot be used, OutsideSamples
-        where `extrapolate` is "refuse" and a control lies outside its sampled range.
+        where `extrapolate` is "refuse" and nothing like the controls was captured.
         """
         if not controls.keys() <= self._names:
             limits.check_names(self._card, controls)
@@ -55,13 +58,16 @@ class Door:
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         plain = self._plain(controls)
-        found = controls if plain else self._found(controls, own)
-        warnings = () if plain else self._outside(found, extrapolate)
+        every = controls if plain else self._every(controls, own)
         # However they are put: the same question has the same bytes.
-        every = {name: float(found[name]) for name, _, _ in self._ranges}
-        point = np.array([list(every.values())])
-        inferred = tuple(name for name in every if name not in controls)
-        return Question(every, performer, level, point, own, warnings, inferred)
+        given = {name: float(every[name]) for name, _, _ in self._ranges}
+        point = list(given.values())
+        found = () if plain else outside(self._card.controls, point)
+        supported = self.support.held(point)
+        warnings = () if supported and not found else self._said(extrapolate, found, point)
+        inferred = tuple(name for name in given if name not in controls)
+        array = np.array([point])
+        return Question(given, performer, level, array, own, warnings, supported, inferred)
 
     def _plain(self, controls: Mapping[str, float]) -> bool:
         """Whether there is nothing to say of the controls, as of nearly all that are asked for."""
@@ -70,7 +76,7 @@ class Door:
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
-    def _found(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
+    def _every(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
         """All controls, as they were given or as is typical."""
         given = {
             control.name: checked(control, controls[control.name])
@@ -84,10 +90,19 @@ class Door:
         """What chooses controls that are not given."""
         return Chooser(self._card)
 
-    def _outside(self, controls: Mapping[str, float], extrapolate: Policy) -> tuple[str, ...]:
-        """What to warn of."""
-        values = np.array([controls[control.name] for control in self._card.controls])
-        return outside(self._card.controls, values, extrapolate)
+    def _said(
+        self, extrapolate: Policy, found: tuple[str, ...], point: Sequence[float]
+    ) -> tuple[str, ...]:
+        """What to warn of where something lies outside, or in a gap; OutsideSamples where that is
+        refused."""
+        said = found or (self._gap(point),)
+        if extrapolate == "refuse":
+            raise OutsideSamples("controls", "; ".join(said))
+        return said if extrapolate == "warn" else ()
+
+    def _gap(self, point: Sequence[float]) -> str:
+        variance = float(self.support.variance(np.array([point]))[0])
+        return gap("these controls lie", variance, self.support.limit)
 
 
 def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
@@ -105,14 +120,18 @@ def checked(control: Control, given: float) -> float:
     return value
 
 
-def outside(controls: Sequence[Control], point: Floats, extrapolate: Policy) -> tuple[str, ...]:
-    """A sentence for each control whose value (d,) lies outside its sampled range; OutsideSamples
-    where that is refused."""
+def outside(controls: Sequence[Control], point: Sequence[float]) -> tuple[str, ...]:
+    """A sentence for each control whose value (d,) lies outside its sampled range."""
     found = (_outside(control, value) for control, value in zip(controls, point, strict=True))
-    said = tuple(filter(None, found))
-    if said and extrapolate == "refuse":
-        raise OutsideSamples("controls", "; ".join(said))
-    return said
+    return tuple(filter(None, found))
+
+
+def gap(who: str, variance: float, limit: float) -> str:
+    """What to say of controls between the captured clips, by the variance of a plain field."""
+    return (
+        f"{who} in a gap of what was sampled: nothing like it was captured "
+        f"(variance {variance:.2g}, expected at most {limit:.2g})"
+    )
 
 
 def _outside(control: Control, value: float) -> str | None:

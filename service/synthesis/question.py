@@ -6,8 +6,9 @@ from typing import Literal
 
 from service.motion.roles import Names
 
-Policy = Literal["warn", "refuse"]
-"""What to do with controls outside what was sampled."""
+Policy = Literal["ok", "warn", "refuse"]
+"""What to do with controls like which nothing was captured, outside what was sampled or in a gap of
+it, and with targets out of reach. Answer and say no more than that, warn as well, or refuse."""
 
 Root = Literal["travelling", "in_place"]
 """Whether a clip goes where it leads, or stays where it begins."""
@@ -15,7 +16,10 @@ Root = Literal["travelling", "in_place"]
 Exact = Literal["auto", "none"] | tuple[str, ...]
 """Which measured controls an answer is held to: those that were given, none, or those named."""
 
-When = float | Literal["start", "end", "event", "highest", "lowest", "farthest"]
+Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
+"""A moment of the motion; farthest is from the root."""
+
+When = float | Moment
 """When a target counts: seconds from the start of the clip, or a moment of the motion."""
 
 
@@ -50,16 +54,16 @@ class ClipQuestion:
     """Which clip: control values, frames a second, the part between start and end, s, who moves,
     nobody that was seen for none, and the level of detail.
 
-    extrapolate: what to do with controls outside what was sampled. end: none for the clip's own.
-    names: what joints are called, which is all that changes by it: bones keep their axes.
-    root: in place, the frame that goes along a cycle's arc is taken out, heading and all, or the
-    straight way from the first pose to the last of what is no cycle, evenly, the heading left as it
-    is; heights stay, and so does all of a model that is in place already. loop: a whole cycle as
-    N = max(1, round(duration * fps)) steps, without start and end. Its frame N is its first again:
-    equal in every number where it stays in place, else carried by the cycle's way and turn. It
-    equal in every number where it stays in place, else carried by the cycle's way and turn. It
-    plays N / fps seconds, which is the duration but for the rounding. hold: what the clip has to
-    meet exactly.
+    extrapolate: what to do with controls like which nothing was captured, and with targets out of
+    reach. end: none for the clip's own. names: what joints are called, which is all that changes by
+    it: bones keep their axes. root: in place, the frame that goes along a cycle's arc is taken out,
+    heading and all, or the straight way from the first pose to the last of what is no cycle,
+    evenly, the heading left as it is; heights stay, and so does all of a model that is in place
+    already. loop: a whole cycle as N = max(1, round(duration * fps)) steps, without start and end.
+    Its frame N is its first again: equal in every number where it stays in place, else carried by
+    the cycle's way and turn. It plays N / fps seconds, which is the duration but for the rounding.
+    hold: what the clip has to meet exactly. joint_sigma: whether the answer says how far each joint
+    may err.
     """
 
     controls: Mapping[str, float]
@@ -72,13 +76,15 @@ class ClipQuestion:
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+    joint_sigma: bool = False
     hold: Hold = HOLD
 
 
 @dataclass(frozen=True)
 class Prospect:
-    """What is known of a clip before it is synthesised: its frames, and a warning for each control
-    outside what was sampled."""
+    """What is known of a clip before it is synthesised: its frames, what is warned of, and whether
+    it misses some target."""
 
     frames: int
     warnings: tuple[str, ...]
+    missed: bool = False

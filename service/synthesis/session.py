@@ -199,9 +199,14 @@ def read(path: Path) -> bytes:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
 
 
+def sha256(content: bytes) -> str:
+    """SHA-256 of a model file, in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
 def digest(content: bytes) -> str:
     """What a model file is told by."""
-    return hashlib.sha256(content).hexdigest()[:16]
+    return sha256(content)[:16]
 
 
 def open_bytes(content: bytes, source: str) -> Session:

@@ -17,7 +17,7 @@ from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
 from service.synthesis.door import Door, Question
-from service.synthesis.exact import strides
+from service.synthesis.exact import missed, strides
 from service.synthesis.exact.goals import NOTHING, Goals
 from service.synthesis.exact.holding import Held
 from service.synthesis.exact.keeper import Keeper
@@ -47,6 +47,9 @@ class Moments:
         return self.question.level
 
 
+OLD = "does not say how far its joints err; train it again"
+MICROMETRES = 6
+"""Decimals of a metre."""
 SAMPLE = 17
 """Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
 
@@ -101,9 +104,11 @@ class Synthesizer:
         return {"own": self.session.card.skeleton}
 
     def _joints(self, asked: ClipQuestion) -> Skeleton:
-        """The skeleton with the names asked for; InvalidField for names that no role leads to, and
-        for a loop of what is no cycle."""
+        """The skeleton with the names asked for; InvalidField for names that no role leads to, for
+        a loop of what is no cycle, and for sigma by joint of a model that cannot say."""
         card = self.session.card
+        if asked.joint_sigma:
+            self._shares()
         if asked.loop and not card.cyclic:
             raise InvalidField(
                 "loop", "true, expected false: this model's last pose does not lead into its first"
@@ -125,21 +130,24 @@ class Synthesizer:
         somebody who was never seen, at a level of detail, of a motion that is held to something.
 
         Raises InvalidField for a control, time, performer or level that cannot be used, or for what
-        the motion cannot be held to, OutsideSamples where `extrapolate` is "refuse" and a control
-        lies outside its sampled range.
+        the motion cannot be held to; where `extrapolate` is "refuse", OutsideSamples where nothing
+        like the controls was captured and OutOfReach for a goal that is missed.
         """
         asked = self.moments(controls, times, extrapolate, performer, level, hold)
         goals = self.keeper.goals(asked.question, hold)
         if goals:
-            return self.held_poses(asked, goals)
+            return self.held_poses(asked, goals, extrapolate)
         return self.posed(asked, self.poses([asked])[0])
 
-    def held_poses(self, asked: Moments, goals: Goals) -> PoseAnswer[np.float64]:
+    def held_poses(
+        self, asked: Moments, goals: Goals, extrapolate: Policy
+    ) -> PoseAnswer[np.float64]:
         """Poses of a motion that is held to something; raises as `pose`."""
         question = asked.question
-        held = self.keeper.held(question, goals)
+        held = self._meeting(question, goals, extrapolate)
         self._check_times(asked, self._sensible(held.duration))
-        return self.keeper.poses(question, held, asked.when, self._held_trust(question, held))
+        trust = self._held_trust(question, held, extrapolate)
+        return self.keeper.poses(question, held, asked.when, trust)
 
     def moments(
         self,
@@ -214,7 +222,7 @@ class Synthesizer:
         """A question at a share of each control's range, and of the shortest clip."""
         card = self.session.card
         controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
-        return self.moments(controls, [share * card.durations[0]], "warn", None, level)
+        return self.moments(controls, [share * card.durations[0]], "ok", None, level)
 
     def posed(self, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
         """The answer that a row of `poses` is; raises as `pose` for a time outside the clip."""
@@ -243,7 +251,20 @@ class Synthesizer:
         else:
             answer = self._plain(question, asked, most)
         turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
+        trust = self.by_joint(answer.trust) if asked.joint_sigma else answer.trust
+        return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), trust)
+
+    def by_joint(self, trust: Trust) -> Trust:
+        """The same with sigma of each joint; InvalidField for a model that cannot say."""
+        joints = (round(share * trust.sigma, MICROMETRES) for share in self._shares())
+        return replace(trust, joint_sigma=tuple(joints))
+
+    def _shares(self) -> tuple[float, ...]:
+        """Sigma of each joint as a share of sigma."""
+        found = self.session.card.joint_sigma
+        if not found:
+            raise InvalidField("joint_sigma", f"true, but {self.identity} {OLD}")
+        return found
 
     def _plain(self, question: Question, asked: ClipQuestion, most: int) -> PoseAnswer[np.float64]:
         """Frames of a clip that is held to nothing."""
@@ -264,9 +285,9 @@ class Synthesizer:
         self, question: Question, goals: Goals, asked: ClipQuestion, most: int
     ) -> PoseAnswer[np.float64]:
         """Frames of a clip that is held to something."""
-        held = self.keeper.held(question, goals)
+        held = self._meeting(question, goals, asked.extrapolate)
         when = course.times(asked, self._sensible(held.duration), most)
-        trust = self._held_trust(question, held)
+        trust = self._held_trust(question, held, asked.extrapolate)
         answer = self.keeper.poses(question, held, when, trust)
         routed = asked.loop or asked.root == "in_place"
         return self._routed(answer, strides.of(held), asked) if routed else answer
@@ -287,9 +308,10 @@ class Synthesizer:
         """
         question = self._asked(asked)
         self._joints(asked)
-        times = course.times(asked, self._length(question, asked))
+        duration, misses = self._outlook(question, asked)
+        times = course.times(asked, duration)
         # A loop ends with its first frame again.
-        return Prospect(len(times) + asked.loop, question.warnings)
+        return Prospect(len(times) + asked.loop, question.warnings, misses)
 
     def _asked(self, asked: ClipQuestion) -> Question:
         who, level, policy = asked.performer, asked.level, asked.extrapolate
@@ -312,12 +334,23 @@ class Synthesizer:
         every = self.door.question(found, extrapolate, performer, level)
         return replace(every, inferred=asked.inferred)
 
-    def _length(self, question: Question, asked: ClipQuestion) -> float:
-        """Seconds that a clip takes, which a speed that it is held to changes."""
+    def _outlook(self, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
+        """Seconds that a clip takes, which a speed that it is held to changes, and whether it
+        misses some target."""
         goals = self.keeper.goals(question, asked.hold)
-        if goals and (goals.targets or self.session.card.cyclic):
-            return self._sensible(self.keeper.held(question, goals).duration)
-        return self._duration(question)
+        strict = asked.extrapolate == "refuse" or self.session.card.cyclic
+        if not (goals.targets or (goals and strict)):
+            return self._duration(question), False
+        held = self._meeting(question, goals, asked.extrapolate)
+        misses = not all(met.reached for met in held.met[len(goals.controls) :])
+        return self._sensible(held.duration), misses
+
+    def _meeting(self, question: Question, goals: Goals, extrapolate: Policy) -> Held:
+        """The motion that meets its goals; OutOfReach where it does not and that is refused."""
+        held = self.keeper.held(question, goals)
+        if extrapolate == "refuse":
+            missed.refuse(goals, held.met)
+        return held
 
     def _duration(self, question: Question) -> float:
         """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
@@ -345,15 +378,27 @@ class Synthesizer:
         return PoseAnswer(when, rotations, root, offsets, trust)
 
     def _trust(self, question: Question, duration: float, sigma: float) -> Trust:
-        controls, warnings = question.controls, question.warnings
-        who, level, inferred = question.performer, question.level, question.inferred
-        identity = self.identity
-        return Trust(identity, controls, duration, sigma, warnings, who, level, inferred=inferred)
+        who = question.performer
+        seen = who is not None if self.session.card.performers else None
+        return Trust(
+            self.identity,
+            question.controls,
+            duration,
+            sigma,
+            question.warnings,
+            who,
+            question.level,
+            question.supported,
+            seen,
+            inferred=question.inferred,
+        )
 
-    def _held_trust(self, question: Question, held: Held) -> Trust:
+    def _held_trust(self, question: Question, held: Held, extrapolate: Policy) -> Trust:
         own = self._trust(question, held.duration, held.state.sigma)
         measured = self.keeper.measured(question, held)
-        return replace(own, measured=measured, targets=held.met)
+        said = () if extrapolate == "ok" else missed.sentences(held.met)
+        warnings = (*own.warnings, *said)
+        return replace(own, warnings=warnings, measured=measured, targets=held.met)
 
     def _run(self, question: Question, when: Floats, *outputs: str) -> list[Any]:
         labels, level = question.labels, question.level

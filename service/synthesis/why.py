@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.motion import field
-from service.motion.answer import Captured, Reasons
+from service.motion import field, support
+from service.motion.answer import Backing, Captured, Reasons
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
 from service.synthesis import limits
-from service.synthesis.door import Question
+from service.synthesis.door import Door, Question
 from service.synthesis.question import Policy
 from service.synthesis.synthesizer import Synthesizer
 
@@ -55,8 +55,16 @@ def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
     found = tuple(_captured(card, i, distances[i], weights[i]) for i in near.tolist())
     rest = float(weights[others].sum())
     controls, who, said = question.controls, question.performer, question.warnings
-    inferred = question.inferred
-    return Reasons(model.identity, controls, who, said, found, len(others), rest, inferred)
+    inferred, backing = question.inferred, _backing(model.door, question)
+    rests = len(others), rest
+    return Reasons(model.identity, controls, who, said, backing, found, *rests, inferred)
+
+
+def _backing(door: Door, question: Question) -> Backing:
+    own = door.support
+    beyond = dict(zip(question.controls, own.beyond(question.point)[0].tolist(), strict=True))
+    variance = float(own.variance(question.point)[0])
+    return Backing(question.supported, beyond, support.BEYOND, variance, own.limit)
 
 
 def _point(card: ModelCard, question: Question) -> Floats:

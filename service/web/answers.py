@@ -64,11 +64,16 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
         "Posefield-Model": trust.model,
         "Posefield-Sigma": repr(trust.sigma),
         "Posefield-Duration": repr(trust.duration),
+        "Posefield-Supported": "true" if trust.supported else "false",
     }
     if trust.inferred:
         chosen = {name: trust.controls[name] for name in trust.inferred}
         headers["Posefield-Inferred"] = json.dumps(chosen)
     made = Response(content, headers=headers, media_type=encoder.media_type)
+    for met in trust.targets:
+        if not met.reached:
+            said = {"what": met.what, "miss": met.miss, "unit": met.unit}
+            made.headers.append("Posefield-Missed", json.dumps(said))
     return _warning(made, trust.warnings)
 
 

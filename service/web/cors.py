@@ -21,8 +21,8 @@ _READABLE = b", ".join(
         *(b"Allow", b"Content-Disposition", b"ETag", b"Retry-After", b"WWW-Authenticate"),
         # Without it a page would take the length of compressed content for that of what it reads.
         b"Content-Encoding",
-        *(b"Posefield-Duration", b"Posefield-Inferred", b"Posefield-Model"),
-        *(b"Posefield-Sigma", b"Posefield-Warning"),
+        *(b"Posefield-Duration", b"Posefield-Inferred", b"Posefield-Missed", b"Posefield-Model"),
+        *(b"Posefield-Sigma", b"Posefield-Supported", b"Posefield-Warning"),
         *(b"X-Request-Id", b"Inference-Header-Content-Length"),
     )
 )

@@ -15,7 +15,7 @@ from service.motion.conventions import Floats, Indices
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
 from service.synthesis.crowd_question import Blending, CrowdQuestion
-from service.synthesis.question import Policy, Root
+from service.synthesis.question import POLICY, Policy, Root
 from service.synthesis.view import Camera, View
 from service.web import decoding
 from service.web.problems import pointer
@@ -51,7 +51,7 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pixels: Annotated[float, msgspec.Meta(ge=0)] | None = None
     budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
     root: Root = "travelling"
-    extrapolate: Policy = "warn"
+    extrapolate: Policy = POLICY
 
 
 _CROWD = msgspec.json.Decoder(CrowdBody)

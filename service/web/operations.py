@@ -22,6 +22,7 @@ from service.export import pack as packing
 from service.motion.crowd import CrowdClip
 from service.synthesis import crowd
 from service.synthesis.course import MOST_POSES
+from service.synthesis.question import HOLD
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import gait, order
 from service.web import (
@@ -36,6 +37,7 @@ from service.web import (
     query,
     sending,
     sigma_operations,
+    suggestion_operations,
     walk_query,
     why_operations,
 )
@@ -150,6 +152,7 @@ _FIXED: dict[str, Handler] = {
     **pose_operations.OPERATIONS,
     **sigma_operations.OPERATIONS,
     **why_operations.OPERATIONS,
+    **suggestion_operations.OPERATIONS,
     **inference.OPERATIONS,
     **{f"getClip{name.capitalize()}": partial(get_clip, e) for name, e in ENCODERS.items()},
     **{f"queryClip{name.capitalize()}": partial(query_clip, e) for name, e in ENCODERS.items()},
@@ -192,7 +195,11 @@ async def _clip(
     convention = encoder.convention(question.unit, question.up)
     joints = len(model.session.card.skeleton)
     most = poses_within(service.settings.output_limit, joints, encoder.per_joint)
-    answer = model.clip(question.clip, min(most, MOST_POSES))
+    if model.keeper.measures or question.clip.hold != HOLD:
+        # A correction takes some milliseconds, in which others would wait.
+        answer = await to_thread.run_sync(model.clip, question.clip, min(most, MOST_POSES))
+    else:
+        answer = model.clip(question.clip, min(most, MOST_POSES))
     if len(answer.clip) <= encoder.at_once:
         content = encoder.encode(answer, convention)
     else:

@@ -12,6 +12,7 @@ from starlette.responses import Response
 
 from service.motion.errors import (
     InvalidField,
+    OutOfReach,
     OutsideSamples,
     QueryError,
     UnknownFormat,
@@ -83,11 +84,14 @@ TABLE: dict[type[QueryError], Kind] = {
     UnknownFormat: Kind(404, "unknown-format", "No format of that name"),
     InvalidField: Kind(422, "invalid-field", "A field is missing, unknown or out of range"),
     OutsideSamples: Kind(422, "outside-samples", "The controls lie outside what was sampled"),
+    OutOfReach: Kind(422, "out-of-reach", "A target cannot be reached"),
 }
 
 KINDS = (*OF_REQUEST, *OF_WIRE, *OF_LOAD, *TABLE.values(), INTERNAL)
 
 _IN_THE_PATH = ("model", "format")
+_REPEATED = {"times": "time", "targets": "target"}
+"""Fields that a query says by a parameter for each."""
 
 
 class RequestFault(Exception):
@@ -141,12 +145,14 @@ def _place(error: QueryError, in_body: bool) -> dict[str, str]:
     if error.field in _IN_THE_PATH:
         return {"parameter": error.field}
     if in_body:
+        # A control's name is one key, whatever stands in it.
+        keys = [rest] if head == "controls" else rest.split("/")
         index = "" if error.index is None else str(error.index)
-        return {"pointer": pointer(*filter(None, (head, rest, index)))}
+        return {"pointer": pointer(*filter(None, (head, *keys, index)))}
     if head == "camera":
         return {"parameter": "camera" if rest == "position" else rest or head}
-    if head == "times":
-        return {"parameter": "time"}
+    if head in _REPEATED:
+        return {"parameter": _REPEATED[head]}
     return {"parameter": rest or head}
 
 

@@ -6,22 +6,34 @@ the model, which knows the ranges, and refused with 422.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar, cast, get_args
+from typing import Annotated, Any, Literal, TypeVar, cast, get_args
 from urllib.parse import parse_qsl
 
 import msgspec
 
 from service.encode.convention import Unit, Up
 from service.motion.roles import Names
-from service.synthesis.question import FPS, NAMES, POLICY, ROOT, ClipQuestion, Policy, Root
+from service.synthesis import spelling
+from service.synthesis.question import (
+    FPS,
+    HOLD,
+    NAMES,
+    POLICY,
+    ROOT,
+    ClipQuestion,
+    Hold,
+    Moment,
+    Policy,
+    Root,
+    Target,
+    When,
+)
+from service.synthesis.spelling import NUMBER
 from service.web import decoding
 from service.web.problems import BAD_PARAMETER, RequestFault, pointer
-
-# What JSON calls a number, so that a query reads like a body: no nan, inf, 1_000 or blanks.
-NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
 
 _ESCAPES = re.compile("[%+]")
 
@@ -36,14 +48,16 @@ FLAGS = {"true": True, "false": False}
 
 @dataclass(frozen=True)
 class PoseQuestion:
-    """Which poses: control values and times, s, who moves, nobody that was seen for none, and the
-    level of detail."""
+    """Which poses: control values and times, s, who moves, nobody that was seen for none, the
+    level of detail, whether sigma is asked for by joint, and what the motion is held to."""
 
     controls: dict[str, float]
     times: list[float]
     extrapolate: Policy
     performer: str | None = None
     level: int = 0
+    joint_sigma: bool = False
+    hold: Hold = HOLD
 
 
 @dataclass(frozen=True)
@@ -55,6 +69,19 @@ class FileQuestion:
     up: Up | None = None
 
 
+class TargetBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Schema Target of the contract."""
+
+    joint: str
+    position: tuple[float, float, float]
+    time: float | msgspec.UnsetType = msgspec.UNSET
+    at: Moment | msgspec.UnsetType = msgspec.UNSET
+
+
+ExactBody = Literal["auto", "none"] | Annotated[list[str], msgspec.Meta(min_length=1)]
+"""Schema Exact of the contract."""
+
+
 class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Schema PoseQuestion of the contract."""
 
@@ -63,6 +90,10 @@ class PoseBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     extrapolate: Policy = POLICY
     performer: str | None = None
     level: float = 0.0
+    joint_sigma: bool = False
+    exact: ExactBody = "auto"
+    targets: list[TargetBody] = []
+    pin_feet: bool = False
 
 
 class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -78,6 +109,10 @@ class ClipBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     names: Names = NAMES
     root: Root = ROOT
     loop: bool = False
+    joint_sigma: bool = False
+    exact: ExactBody = "auto"
+    targets: list[TargetBody] = []
+    pin_feet: bool = False
 
 
 class FileBody(ClipBody, frozen=True):
@@ -103,32 +138,53 @@ def pairs(query_string: bytes) -> list[tuple[str, str]]:
 
 
 def pose_of_pairs(pairs: Pairs) -> PoseQuestion:
-    """Question of query parameters: `time` once or more, extrapolate, performer, level, and one
-    per control."""
+    """Question of query parameters: `time` once or more, `target` any number of times, the others
+    of the contract's pose paths, and one per control."""
     times = [number(name, text) for name, text in pairs if name == "time"]
     if not times:
         raise bad_parameter("time", "missing; give seconds from the start of the clip")
-    single = unique([pair for pair in pairs if pair[0] != "time"])
+    single = unique([pair for pair in pairs if pair[0] not in ("time", "target")])
     policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
-    return PoseQuestion(numbers_of(single), times, policy, performer, level)
+    by_joint, hold = _flag(single, "joint_sigma"), _hold_of_pairs(pairs, single)
+    return PoseQuestion(numbers_of(single), times, policy, performer, level, by_joint, hold)
 
 
 def file_of_pairs(pairs: Pairs) -> FileQuestion:
     """Question of query parameters: those of the contract's clip paths, and one per control."""
-    single = unique(pairs)
+    single = unique([pair for pair in pairs if pair[0] != "target"])
     unit: Unit | None = _word(single, "unit", _choices(Unit), None)
     up: Up | None = _word(single, "up", _choices(Up), None)
-    return FileQuestion(_clip_of_single(single), unit, up)
+    hold = _hold_of_pairs(pairs, single)
+    return FileQuestion(_clip_of_single(single, hold), unit, up)
 
 
-def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
+def _hold_of_pairs(pairs: Pairs, single: dict[str, str]) -> Hold:
+    """What an answer is held to: each `target`, and what is said once, which is taken out."""
+    targets = tuple(_spelt("target", spelling.target, text) for n, text in pairs if n == "target")
+    exact = single.pop("exact", None)
+    pinned = FLAGS[_word(single, "pin_feet", tuple(FLAGS), "false")]
+    if exact is None and not targets and not pinned:
+        return HOLD
+    said = "auto" if exact is None else _spelt("exact", spelling.exact, exact)
+    return Hold(said, targets, pinned)
+
+
+def _spelt(name: str, read: Callable[[str], Word], text: str) -> Word:
+    """What is read of a parameter's text; RequestFault where it cannot be."""
+    try:
+        return read(text)
+    except ValueError as fault:
+        raise bad_parameter(name, str(fault)) from None
+
+
+def _clip_of_single(single: dict[str, str], hold: Hold) -> ClipQuestion:
     """Question of texts by name, of which none is left over: what is no option is a control."""
     policy, performer = policy_of(single), single.pop("performer", None)
     level = whole("level", single.pop("level", "0"))
     names = _word(single, "names", _choices(Names), NAMES)
     root = _word(single, "root", _choices(Root), ROOT)
-    loop = FLAGS[_word(single, "loop", tuple(FLAGS), "false")]
+    loop, by_joint = _flag(single, "loop"), _flag(single, "joint_sigma")
     numbers = numbers_of(single)
     return ClipQuestion(
         fps=numbers.pop("fps", FPS),
@@ -141,6 +197,8 @@ def _clip_of_single(single: dict[str, str]) -> ClipQuestion:
         names=names,
         root=root,
         loop=loop,
+        joint_sigma=by_joint,
+        hold=hold,
     )
 
 
@@ -148,8 +206,9 @@ def pose_of_body(content: bytes) -> PoseQuestion:
     """Question of a JSON body."""
     body = decoding.decoded(_POSE, content)
     controls = controls_of(body.controls)
-    level = _level(body.level)
-    return PoseQuestion(controls, body.times, body.extrapolate, body.performer, level)
+    level, hold = _level(body.level), _hold(body)
+    policy, who, by_joint = body.extrapolate, body.performer, body.joint_sigma
+    return PoseQuestion(controls, body.times, policy, who, level, by_joint, hold)
 
 
 def file_of_body(content: bytes) -> FileQuestion:
@@ -171,7 +230,27 @@ def clip_of(body: ClipBody, *within: str) -> ClipQuestion:
         body.names,
         body.root,
         body.loop,
+        body.joint_sigma,
+        _hold(body, *within),
     )
+
+
+def _hold(body: PoseBody | ClipBody, *within: str) -> Hold:
+    """What an answer is held to."""
+    if body.exact == "auto" and not body.targets and not body.pin_feet:
+        return HOLD
+    targets = [_target(t, *within, "targets", str(i)) for i, t in enumerate(body.targets)]
+    exact = tuple(body.exact) if isinstance(body.exact, list) else body.exact
+    return Hold(exact, tuple(targets), body.pin_feet)
+
+
+def _target(body: TargetBody, *within: str) -> Target:
+    """Target of a body; RequestFault where it says not just one moment."""
+    if (body.time is msgspec.UNSET) == (body.at is msgspec.UNSET):
+        said = "neither time nor at" if body.at is msgspec.UNSET else "time and at"
+        raise decoding.bad_body(f"{said}, expected one of them", pointer(*within))
+    when = body.time if body.at is msgspec.UNSET else body.at
+    return Target(body.joint, body.position, cast(When, when))
 
 
 def unique(pairs: Pairs) -> dict[str, str]:
@@ -196,6 +275,11 @@ def _word(single: dict[str, str], name: str, choices: tuple[Any, ...], usual: Wo
     if text is not usual and text not in choices:
         raise bad_parameter(name, f"{text!r}, expected one of {', '.join(choices)}")
     return cast(Word, text)
+
+
+def _flag(single: dict[str, str], name: str) -> bool:
+    """What is said under that name, which is taken out; false where nothing is."""
+    return FLAGS[_word(single, name, tuple(FLAGS), "false")]
 
 
 def numbers_of(texts: dict[str, str]) -> dict[str, float]:

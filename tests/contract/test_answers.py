@@ -38,6 +38,7 @@ def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded)
     assert answer.headers["posefield-model"] == model.identity
     assert float(answer.headers["posefield-sigma"]) == trust.sigma
     assert float(answer.headers["posefield-duration"]) == trust.duration
+    assert answer.headers["posefield-supported"] == str(trust.supported).lower() == "true"
     assert "posefield-warning" not in answer.headers
     assert answer.headers["content-disposition"] == f'attachment; filename="reach.{extension}"'
 

@@ -110,7 +110,7 @@ def expected_statuses(path, method):
     if path.startswith("/v1") and path.count("/") > 3:
         statuses.add("422")
         # A path that names no format asks which is accepted.
-        statuses |= set() if "." in path or path.endswith("/why") else {"406"}
+        statuses |= set() if "." in path or path.endswith(("/why", "/suggestions")) else {"406"}
     return statuses | ({"413", "415"} if method == "post" else set())
 
 

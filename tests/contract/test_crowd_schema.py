@@ -56,6 +56,7 @@ def test_what_json_holds_matches_the_schema(spec):
         ones,
         ones,
         ones,
+        np.array([True, False]),
         ("it is slow",),
     )
     content = orjson.loads(CROWD_ENCODERS["json"].encode(poses))

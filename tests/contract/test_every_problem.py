@@ -132,6 +132,9 @@ PROVOKED = {
     ),
     "invalid-field": by_request("GET", f"{CLIP}?{CONTROLS}&turn=20&fps=10000"),
     "outside-samples": by_request("GET", f"{CLIP}?{CONTROLS}&turn=1000&extrapolate=refuse"),
+    "out-of-reach": by_request(
+        "GET", f"{CLIP}?{CONTROLS}&turn=20&extrapolate=refuse&target=RightHand@end:0,1,5"
+    ),
     "internal-error": fault,
     "overloaded": overloaded,
     "late": late,

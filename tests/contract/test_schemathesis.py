@@ -150,6 +150,7 @@ def narrowed(spec, card, digest):
     crowd = parts["schemas"]["CrowdQuestion"]
     level = {"type": "integer", "minimum": 0, "maximum": len(card.levels) - 1}
     crowd["properties"] = {"controls": exact, "time": times, "level": level}
+    narrow_holds(parts, card, times)
     # Nor that tensors fit each other.
     narrow["paths"] = {
         path: item
@@ -173,3 +174,16 @@ def narrowed(spec, card, digest):
     for parameter in parts["parameters"].values():
         parameter.pop("example", None)
     return narrow
+
+
+def narrow_holds(parts, card, times):
+    """What this model can be held to: no control of it is measured, and which places are out of
+    reach, or that two targets differ, cannot be said in a schema."""
+    parts["schemas"]["Exact"] = parts["parameters"]["exact"]["schema"] = {"enum": ["auto", "none"]}
+    parts["schemas"]["Extrapolate"] = {"enum": ["warn"]}
+    target = parts["schemas"]["Target"]["properties"]
+    target |= {"joint": {"enum": list(card.skeleton.names)}, "time": times}
+    parts["schemas"]["Targets"]["maxItems"] = 1
+    words = [f"{card.skeleton.names[-1]}@{when}:0.3,1.2,-0.4" for when in ("event", "0.5", "end")]
+    listed = {"type": "array", "maxItems": 1, "items": {"enum": words}}
+    parts["parameters"]["target"]["schema"] = listed

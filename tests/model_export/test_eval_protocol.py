@@ -9,7 +9,18 @@ import pytest
 from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from model_export import ingest
-from model_export.evaluate import errors, folds, methods, motion, protocol, reach, render, summary
+from model_export.evaluate import (
+    errors,
+    folds,
+    methods,
+    motion,
+    newcomers,
+    protocol,
+    reach,
+    render,
+    summary,
+    worth,
+)
 from model_export.evaluate.methods import Asked
 from model_export.recipe import Recipe
 from model_export.train import train
@@ -145,7 +156,9 @@ def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
 
 def test_all_methods_are_asked_the_same_clips(results):
     (clips, performers), _ = results
-    assert set(clips.errors) == {"posefield", "posefield_exact", "naive", *methods.PEERS}
+    peers = {"posefield", "posefield_exact", "naive", *methods.PEERS}
+    assert set(clips.errors) == {*peers, newcomers.NOBODY}
+    assert set(performers.errors) == {*peers, *newcomers.SHOWN}
     assert all(len(found) == CLIPS for r in (clips, performers) for found in r.errors.values())
     assert clips.protocol == "leave_one_clip_out"
     assert performers.protocol == "leave_one_performer_out"
@@ -197,6 +210,67 @@ def test_an_unknown_performer_is_trusted_less(results):
     assert performers.sigma.mean() > clips.sigma.mean()
 
 
+def test_a_name_is_worth_something_and_so_are_clips(results):
+    """Three clips say more than one, and a name than none; the figures are those of the rows."""
+    (clips, performers), _ = results
+    facts = worth.facts([clips, performers])
+    one, three = (facts[f"posefield_adapt_{count}"] for count in (1, 3))
+    assert facts["named_nearer"] > 0.0
+    assert three["relative_cm"] < one["relative_cm"] < three["shown_none_cm"]
+    assert three["clips"] == CLIPS
+    ours = np.mean([error.relative.mean for error in clips.errors["posefield"]])
+    assert three["shown_all_cm"] == pytest.approx(100 * ours, rel=1e-5)
+    assert three["farther_than_all"] == pytest.approx(
+        three["relative_cm"] / three["shown_all_cm"] - 1.0, abs=1e-4
+    )
+    assert worth.facts([clips]) == {} and worth.said([performers]) == []
+    assert len(worth.said([clips, performers])) == 4
+
+
+def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take(family):
+    held = [
+        replace(e, row=replace(e.row, place=family[i // 2].row.place)) for i, e in enumerate(family)
+    ]
+    for asked in range(CLIPS):
+        shown = newcomers.choose(held, asked, 5)
+        takes = [i // 2 for i in shown]
+        assert len(shown) == 5 == len(set(takes)) and asked // 2 not in takes
+        three = newcomers.choose(held, asked, 3)
+        assert set(three) <= set(shown)
+        controls = np.array([held[i].controls[0] for i in three])
+        assert np.ptp(controls) >= 7
+    # No more than there are other takes.
+    assert len(newcomers.choose(held, 0, 20)) == CLIPS // 2 - 1
+
+
+def test_who_has_too_few_takes_is_shown_nobodys_clips(recipe, family):
+    trained = train(recipe, family[:9], lambda _: None)
+    few = [replace(e, row=replace(e.row, performer="z")) for e in family[9:]]
+    assert newcomers.adapted(recipe, trained, few) == {n: [None] * 3 for n in newcomers.SHOWN}
+    # Negative control: of one take more, each clip is asked for.
+    more = [replace(e, row=replace(e.row, performer="z")) for e in family[8:]]
+    found = newcomers.adapted(recipe, trained, more)
+    assert all(len(m) == 4 and None not in m for m in found.values())
+
+
+def test_clips_that_a_method_was_not_asked_for_are_counted_and_left_out_of_its_row(results):
+    whole = results[0][1]
+    some = [e if i > 2 else None for i, e in enumerate(whole.errors["posefield_adapt_3"])]
+    result = replace(whole, errors={**whole.errors, "posefield_adapt_3": tuple(some)})
+    row = next(one for one in summary.of(result) if one.name == "posefield_adapt_3")
+    assert (row.clips, row.left_out) == (CLIPS - 3, 3)
+    assert row.facts()["clips_left_out"] == 3
+    assert f"| posefield_adapt_3 ({CLIPS - 3} clips) " in summary.table(result)
+    ours, own = (
+        summary.relative(result.of(name, range(3, CLIPS)))
+        for name in ("posefield", "posefield_adapt_3")
+    )
+    assert row.worse == pytest.approx(float(np.mean(own - ours)))
+    # Negative control: beside all of ours it would be another figure.
+    everyone = summary.relative(result.of("posefield", range(CLIPS)))
+    assert row.worse != pytest.approx(float(own.mean() - everyone.mean()))
+
+
 def test_progress_is_told(results):
     _, said = results
     assert said == [*((i + 1, CLIPS) for i in range(CLIPS)), (1, 3), (2, 3), (3, 3)]
@@ -244,6 +318,27 @@ def test_facts_are_what_was_measured(results):
         abs=1e-4,
     )
     json.dumps(facts, allow_nan=False)
+
+
+def test_sigma_of_each_joint_is_compared_with_that_joint(results):
+    result = results[0][0]
+    found = summary.facts(result)["joint_sigma_ratio"]
+    assert tuple(found) == result.joints
+    joint = len(result.joints) - 1
+    errors = [error.joints[joint] for error in result.errors["posefield"]]
+    expected = np.mean(errors / result.joint_sigma[:, joint] ** 2)
+    assert found[result.joints[joint]] == pytest.approx(expected, rel=1e-5)
+    # Together they are what the answer as a whole is off by.
+    squares = [np.mean(error.joints) for error in result.errors["posefield"]]
+    assert squares == pytest.approx([error.squared for error in result.errors["posefield"]])
+
+
+def test_the_flag_is_held_to_its_promise_on_the_same_folds(results):
+    result = results[0][0]
+    found = summary.facts(result)["support"]
+    assert result.flags is not None and found["false_alarms"] == result.flags.alarms
+    said = summary.trust_said(result)
+    assert len(said) == 2 and said[1].startswith("support: ")
 
 
 def test_the_table_has_a_row_for_every_method(results):

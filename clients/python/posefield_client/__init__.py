@@ -20,9 +20,12 @@ from posefield_client.generated import (
     Camera,
     Control,
     ManifestEntry,
+    Met,
     ModelCard,
     NamedClipQuestion,
     Reasons,
+    Suggestions,
+    Target,
     Trust,
 )
 from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
@@ -49,6 +52,7 @@ __all__ = [
     "Disk",
     "ManifestEntry",
     "Memory",
+    "Met",
     "Model",
     "ModelCard",
     "NamedClipQuestion",
@@ -60,6 +64,8 @@ __all__ = [
     "Saved",
     "Saving",
     "SigmaGrid",
+    "Suggestions",
+    "Target",
     "Trust",
     "errors",
 ]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from msgspec import UNSET, Struct
 
 from posefield_client.errors import WrongQuestion
-from posefield_client.generated import OPERATIONS
+from posefield_client.generated import OPERATIONS, Target
 from posefield_client.wire import Request
 
 MODEL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}(@[0-9a-f]{16})?", re.ASCII)
@@ -47,9 +47,19 @@ def _words(question: Struct) -> dict[str, Any]:
         value = getattr(question, key)
         if key == "controls":
             words.update(value)
+        elif key == "exact" and isinstance(value, tuple):
+            words[key] = ",".join(value)
+        elif key == "targets" and value is not UNSET:
+            words["target"] = tuple(map(_spelt, value))
         elif value is not UNSET:
             words[_SAID_OTHERWISE.get(key, key)] = value
     return words
+
+
+def _spelt(target: Target) -> str:
+    """A target in words."""
+    moment = target.at if target.time is UNSET else digits(target.time)
+    return f"{target.joint}@{moment}:{','.join(map(digits, target.position))}"
 
 
 def _target(operation: str, model: str, words: Mapping[str, Any]) -> str:

@@ -189,6 +189,7 @@ class Model:
 
     pose = _ask_model(questions.pose)
     why = _ask_model(questions.why)
+    suggest = _ask_model(questions.suggest)
     sigma = _ask_model(questions.sigma)
     read_card = _ask_model(questions.card)
     clip = _lazy(Clip, files.clip)

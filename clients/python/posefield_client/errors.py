@@ -10,7 +10,8 @@ PosefieldError
 │   ├── NotAllowed             the key
 │   │   └── Unauthenticated, Forbidden
 │   ├── Unanswerable           there is no answer to this question
-│   │   └── UnknownModel, UnknownFormat, InvalidField, OutsideSamples
+│   │   └── UnknownModel, UnknownFormat, InvalidField, OutsideSamples,
+│   │       OutOfReach
 │   ├── Busy                   asked again by itself, until patience ends
 │   │   └── Overloaded, Late, NotReady, NoConnectionLeft
 │   └── InternalError          the service failed
@@ -156,7 +157,11 @@ class InvalidField(Unanswerable, kind="invalid-field"):
 
 
 class OutsideSamples(Unanswerable, kind="outside-samples"):
-    """The controls lie outside what was sampled, and `extrapolate` is "refuse"."""
+    """Nothing like the controls was captured, and `extrapolate` is "refuse"."""
+
+
+class OutOfReach(Unanswerable, kind="out-of-reach"):
+    """The motion cannot meet a target, and was not to come as near as it can."""
 
 
 class Busy(Problem):

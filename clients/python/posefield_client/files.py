@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from posefield_client import asking
+from posefield_client import asking, holding
 from posefield_client.errors import WrongQuestion
 from posefield_client.generated import (
     OPERATIONS,
@@ -18,6 +18,7 @@ from posefield_client.generated import (
     CrowdQuestion,
     NamedClipQuestion,
 )
+from posefield_client.holding import Exact, Targets
 from posefield_client.questions import Controls, Extrapolate
 from posefield_client.wire import Request
 
@@ -72,9 +73,13 @@ def clip(
     level: int | None = None,
     performer: str | None = None,
     names: Names | None = None,
+    joint_sigma: bool | None = None,
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
     extrapolate: Extrapolate | None = None,
+    exact: Exact | None = None,
+    targets: Targets | None = None,
+    pin_feet: bool | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Files:
@@ -83,6 +88,8 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
+        **asking.said(joint_sigma=joint_sigma),
+        **holding.said(exact, targets, pin_feet),
     )
     return Files(CLIP, lambda ending: asking.either(f"Clip{ending}", model, question))
 
@@ -109,7 +116,8 @@ def _named(place: int, given: NamedClipQuestion | Mapping[str, Any]) -> NamedCli
     if isinstance(given, NamedClipQuestion):
         return given
     controls = asking.controls(given.get("controls"), {})
-    plain = {**asking.sayable(f"clip {place}", given), "controls": controls}
+    held = holding.said(given.get("exact"), given.get("targets"), given.get("pin_feet"))
+    plain = {**asking.sayable(f"clip {place}", given), "controls": controls, **held}
     try:
         return msgspec.convert(plain, NamedClipQuestion)
     except msgspec.ValidationError as fault:

@@ -22,14 +22,33 @@ class Operation(NamedTuple):
     media_types: tuple[str, ...]
 
 
+class Target(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A joint that is to be in its place at a moment: at a time, or at the start, the end, the
+    event that the model's recipe names, or where the joint is highest, lowest or farthest from
+    the root. The motion that meets it is the nearest to the predicted one, as captured motions
+    stray from predictions. What lies farther off than they stray is approached as far as they
+    go, and `targets` in Trust says by how much it is missed. A joint has one target at one
+    moment.
+    """
+
+    joint: str
+    position: tuple[float, float, float]
+    time: float | UnsetType = UNSET
+    at: Literal["start", "end", "event", "highest", "lowest", "farthest"] | UnsetType = UNSET
+
+
 class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Schema PoseQuestion of the contract."""
 
     controls: dict[str, float]
     times: tuple[float, ...]
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,12 +58,16 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
 
@@ -57,12 +80,16 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     fps: float | UnsetType = UNSET
     start: float | UnsetType = UNSET
     end: float | UnsetType | None = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     level: int | UnsetType = UNSET
+    joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     loop: bool | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[Target, ...] | UnsetType = UNSET
+    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -90,7 +117,7 @@ class Camera(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One pose of each of many characters. All lists have one length, the number of
     characters, in one order; what is no list holds for each of them. Where nothing is a list
-    there is one character.
+    there is one character. Crowds are the model's predictions: they are held to nothing.
     """
 
     controls: dict[str, float | tuple[float, ...]]
@@ -106,7 +133,7 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     pixels: float | UnsetType | None = UNSET
     budget_ms: float | UnsetType | None = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
 
 
 class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -126,7 +153,7 @@ class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     controls: dict[str, float]
     nearest: int | UnsetType = UNSET
-    extrapolate: Literal["warn", "refuse"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
 
 
@@ -242,9 +269,19 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     provenance: dict[str, Any]
     roles: dict[str, str]
     sources: tuple[str, ...]
+    joint_sigma: tuple[float, ...] = ()
     kriging: ModelCardKriging | None
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
+
+
+class Met(Struct, frozen=True, kw_only=True):
+    """Something that a motion was held to."""
+
+    what: str
+    miss: float
+    unit: str
+    reached: bool
 
 
 class Trust(Struct, frozen=True, kw_only=True):
@@ -256,8 +293,23 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
+    measured: dict[str, float] = {}
+    targets: tuple[Met, ...] = ()
+
+
+class Backing(Struct, frozen=True, kw_only=True):
+    """Whether anything like these controls was captured, and by what that was told."""
+
+    supported: bool
+    beyond: dict[str, float]
+    most_beyond: float
+    variance: float
+    most_variance: float
 
 
 class CapturedClip(Struct, frozen=True, kw_only=True):
@@ -289,8 +341,29 @@ class Reasons(Struct, frozen=True, kw_only=True):
     performer: str | None
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
+    support: Backing
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
+
+
+class Suggestion(Struct, frozen=True, kw_only=True):
+    """Schema Suggestion of the contract."""
+
+    controls: dict[str, float]
+    gain: float
+    variance: float
+    nearest: str | None
+    lacking: str
+    gap: float
+
+
+class Suggestions(Struct, frozen=True, kw_only=True):
+    """Each point is ranked as if those before it had been captured already."""
+
+    model: str
+    performer: str | None
+    candidates: int
+    suggestions: tuple[Suggestion, ...]
 
 
 class ManifestEntry(Struct, frozen=True, kw_only=True):
@@ -308,8 +381,13 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    supported: bool
+    performer_seen: bool | None = None
+    joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
+    measured: dict[str, float] = {}
+    targets: tuple[Met, ...] = ()
 
 
 class Liveness(Struct, frozen=True, kw_only=True):
@@ -528,6 +606,7 @@ OPERATIONS = {
         Operation("getCrowdUsdz", "GET", "/v1/models/{model}/crowd.usdz", ("model/vnd.usdz+zip",)),
         Operation("getWhy", "GET", "/v1/models/{model}/why", ("application/json",)),
         Operation("queryWhy", "POST", "/v1/models/{model}/why", ("application/json",)),
+        Operation("getSuggestions", "GET", "/v1/models/{model}/suggestions", ("application/json",)),
         Operation(
             "getSigma",
             "GET",

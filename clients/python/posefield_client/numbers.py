@@ -68,7 +68,8 @@ class CrowdPoses(Struct, frozen=True, eq=False):
     """A pose of each of N characters, J joints each, in the order of the question.
 
     rotations [N, J, 4], the root's in the world; root_position [N, 3] in the world and bone_offsets
-    [N, J, 3], m; duration [N], s; sigma [N], m; levels [N]; error_px [N], with a camera.
+    [N, J, 3], m; duration [N], s; sigma [N], m; levels [N]; error_px [N], with a camera; supported
+    [N], whether anything like it was captured, from services that say so.
     """
 
     model: str
@@ -83,6 +84,7 @@ class CrowdPoses(Struct, frozen=True, eq=False):
     sigma: Array
     levels: Array
     error_px: Array | None = None
+    supported: Array | None = None
 
 
 def _array(kind: type, found: Any) -> Array:
@@ -116,10 +118,11 @@ SHAPES: dict[Any, dict[str, str]] = {
         "sigma": "N",
         "levels": "N",
         "error_px": "N",
+        "supported": "N",
     },
 }
 """Axes of what answers hold: a letter is one length throughout an answer, a digit that length."""
-WHOLE = ("levels", "inside", "parents", "names")
+WHOLE = ("levels", "inside", "supported", "parents", "names")
 """All others are of floating point."""
 
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 import numpy.typing as npt
 
-from posefield_client import asking, numbers
+from posefield_client import asking, holding, numbers
 from posefield_client.generated import (
     OPERATIONS,
     Liveness,
@@ -21,14 +21,16 @@ from posefield_client.generated import (
     Readiness,
     Reasons,
     SigmaQuestion,
+    Suggestions,
     WhyQuestion,
 )
+from posefield_client.holding import Exact, Targets
 from posefield_client.numbers import Pose, SigmaGrid
 from posefield_client.wire import Call, Reply, Request
 
 T = TypeVar("T")
 
-Extrapolate = Literal["warn", "refuse"]
+Extrapolate = Literal["ok", "warn", "refuse"]
 Controls = Mapping[str, float]
 Times = float | Sequence[float] | npt.NDArray[Any]
 
@@ -60,15 +62,21 @@ def pose(
     *,
     performer: str | None = None,
     level: int | None = None,
+    joint_sigma: bool | None = None,
     extrapolate: Extrapolate | None = None,
+    exact: Exact | None = None,
+    targets: Targets | None = None,
+    pin_feet: bool | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Call[Pose]:
-    """Poses at one or more times, s."""
+    """Poses at one or more times, s, of a motion that is held to targets, if some are given."""
     question = PoseQuestion(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
+        **asking.said(joint_sigma=joint_sigma),
+        **holding.said(exact, targets, pin_feet),
     )
     return Call(asking.either("PoseMsgpack", model, question), numbers.pose)
 
@@ -89,6 +97,14 @@ def why(
         **asking.said(nearest=nearest, extrapolate=extrapolate, performer=performer),
     )
     return Call(asking.either("Why", model, question), _REASONS)
+
+
+def suggest(
+    model: str, /, *, count: int | None = None, performer: str | None = None
+) -> Call[Suggestions]:
+    """Which clips to capture next; performer: who is to be captured."""
+    words = asking.said(count=count, performer=performer)
+    return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
 
 
 def sigma(
@@ -126,6 +142,7 @@ class _Json:
 
 _LIVENESS, _READINESS = _Json(Liveness), _Json(Readiness)
 _CARD, _REASONS, _LIST = _Json(ModelCard), _Json(Reasons), _Json(ModelList)
+_SUGGESTIONS = _Json(Suggestions)
 
 
 def _models(reply: Reply) -> tuple[ModelSummary, ...]:

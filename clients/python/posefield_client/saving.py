@@ -39,7 +39,8 @@ Watch = Callable[[Progress], object]
 class Saved:
     """A file that was written, and what the service said of it.
 
-    model: name@hash; sigma, m, and duration, s: of a clip; entries: of an archive, one a clip.
+    model: name@hash; sigma, m, duration, s, and whether anything like it was captured: of a clip;
+    entries: of an archive, one a clip.
     """
 
     path: Path
@@ -49,6 +50,7 @@ class Saved:
     duration: float | None
     warnings: tuple[str, ...]
     entries: tuple[ManifestEntry, ...]
+    supported: bool | None = None
 
 
 class Part:
@@ -163,7 +165,12 @@ def _saved(path: Path, reply: Reply, entries: tuple[ManifestEntry, ...]) -> Save
         _number(headers.get("posefield-duration")),
         msgspec.json.decode(lines, type=tuple[str, ...]),
         entries,
+        _truth(headers.get("posefield-supported")),
     )
+
+
+def _truth(text: str | None) -> bool | None:
+    return None if text is None else text == "true"
 
 
 def _number(text: str | None) -> float | None:

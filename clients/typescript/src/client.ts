@@ -27,6 +27,7 @@ import type {
   Reasons,
   SigmaGrid,
   SigmaQuestion,
+  Suggestions,
   Transfer,
   TransferOptions,
   WalkQuestion,
@@ -114,6 +115,16 @@ export class Client {
   async why(model: string, question: WhyQuestion, signal?: AbortSignal): Promise<Reasons> {
     const asked = this.#request(model, "/why", question);
     return this.#read(asked, (found) => read("Reasons", found), signal);
+  }
+
+  /** Which clips to capture next, and of whom. */
+  async suggestions(
+    model: string,
+    asked: { readonly count?: number; readonly performer?: string } = {},
+    signal?: AbortSignal,
+  ): Promise<Suggestions> {
+    const wanted = this.#request(model, "/suggestions", asked);
+    return this.#read(wanted, (found) => read("Suggestions", found), signal);
   }
 
   /** A clip as a file. */

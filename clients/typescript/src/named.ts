@@ -12,12 +12,17 @@ export function named(headers: Headers, fallback: string): Named {
     model: headers.get("Posefield-Model"),
     sigma: number(headers.get("Posefield-Sigma")),
     duration: number(headers.get("Posefield-Duration")),
+    supported: truth(headers.get("Posefield-Supported")),
     warnings: warnings(headers.get("Posefield-Warning")),
   };
 }
 
 function number(text: string | null): number | null {
   return text === null ? null : Number(text);
+}
+
+function truth(text: string | null): boolean | null {
+  return text === null ? null : text === "true";
 }
 
 /** Each is a JSON string in ASCII; lines of one header are joined by commas. */

@@ -53,6 +53,7 @@ export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
     boneOffsets: float32(found, "bone_offsets", [count, joints, 3]),
     duration: float32(found, "duration", [count]),
     sigma: float32(found, "sigma", [count]),
+    supported: "supported" in found ? truths(found, "supported", [count]) : null,
     levels: Int32Array.from(int8(found, "levels", [count])),
     errorPx: "error_px" in found ? float32(found, "error_px", [count]) : null,
   };
@@ -91,6 +92,10 @@ function float64(found: Packed, name: string, shape: Shape): Float64Array<ArrayB
 function int8(found: Packed, name: string, shape: Shape): Int8Array<ArrayBuffer> {
   const { buffer, byteOffset, byteLength } = bytes(found, name, "|i1", 1, shape);
   return new Int8Array(buffer, byteOffset, byteLength);
+}
+
+function truths(found: Packed, name: string, shape: Shape): boolean[] {
+  return Array.from(bytes(found, name, "|b1", 1, shape), (byte) => byte !== 0);
 }
 
 /** The bytes of an array of a shape, where numbers of their size may begin. */

@@ -2,6 +2,7 @@
 
 import { WrongQuestion } from "./errors.ts";
 import { MEDIA_TYPES } from "./schema.ts";
+import type { Target } from "./types.ts";
 
 export interface Request {
   readonly method: "GET" | "POST";
@@ -12,7 +13,7 @@ export interface Request {
   readonly mediaType?: string;
 }
 
-type Value = string | number | boolean | null | undefined;
+type Value = string | number | boolean | readonly string[] | null | undefined;
 type Question = Readonly<Record<string, unknown>>;
 
 /**
@@ -54,14 +55,28 @@ export function under(model: string, rest: string): string {
   return `/v1/models/${encodeURIComponent(model).replace("%40", "@")}${rest}`;
 }
 
-/** Each control is a parameter, a list of times is `time` again and again, a place is one text. */
-function pairs({ controls, times, camera, ...rest }: Question): string[][] {
+/**
+ * Each control is a parameter, lists of times and of targets are `time` and `target` again and
+ * again, a place is one text.
+ */
+function pairs({ controls, times, targets, camera, ...rest }: Question): string[][] {
   return [
     ...spelt((controls ?? {}) as Record<string, Value>),
     ...((times ?? []) as number[]).map((time) => ["time", text("time", time)]),
+    ...((targets ?? []) as Target[]).map((target) => ["target", words(target)]),
     ...spelt(rest as Record<string, Value>),
-    ...(camera ? [["camera", (camera as number[]).map(coordinate).join(",")]] : []),
+    ...(camera ? [["camera", place("camera", camera as number[])]] : []),
   ];
+}
+
+/** JOINT@MOMENT:X,Y,Z. */
+function words({ joint, position, time, at }: Target): string {
+  const moment = at ?? (time === undefined ? "" : plain("target", time));
+  return `${joint}@${moment}:${place("target", position)}`;
+}
+
+function place(name: string, values: readonly number[]): string {
+  return values.map((value) => plain(name, value)).join(",");
 }
 
 function spelt(values: Readonly<Record<string, Value>>): string[][] {
@@ -69,12 +84,13 @@ function spelt(values: Readonly<Record<string, Value>>): string[][] {
   return given.map(([name, value]) => [name, text(name, value)]);
 }
 
+/** Names in a list have commas between. */
 function text(name: string, value: Value): string {
   return String(finite(name, value));
 }
 
-/** A number without an exponent, which places in a query may not have. */
-function coordinate(value: number): string {
-  const said = text("camera", value);
+/** A number without an exponent, whose + a query takes for a space. */
+function plain(name: string, value: number): string {
+  const said = text(name, value);
   return said.includes("e") ? value.toFixed(20) : said;
 }

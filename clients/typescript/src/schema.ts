@@ -777,6 +777,32 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/models/{model}/suggestions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description A model's name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        /**
+         * Get which clips to capture next
+         * @description Points within what was sampled at which one more captured clip would say most of what is asked of the model, the one that is worth most first.
+         */
+        get: operations["getSuggestions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/models/{model}/sigma": {
         parameters: {
             query?: never;
@@ -1325,6 +1351,68 @@ export interface components {
          */
         Loop: boolean;
         /**
+         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer.
+         * @default false
+         */
+        JointSigma: boolean;
+        /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that the
+         *     model can measure on a motion: they have a `measure` on its card), `none`, or their names. The
+         *     motion is the nearest to the predicted one, as captured motions stray from predictions, that
+         *     does.
+         * @default auto
+         */
+        Exact: ("auto" | "none") | components["schemas"]["ControlName"][];
+        /**
+         * @description A joint that is to be in its place at a moment: at a time, or at the start, the end, the event
+         *     that the model's recipe names, or where the joint is highest, lowest or farthest from the root.
+         *     The motion that meets it is the nearest to the predicted one, as captured motions stray from
+         *     predictions. What lies farther off than they stray is approached as far as they go, and
+         *     `targets` in Trust says by how much it is missed. A joint has one target at one moment.
+         */
+        Target: {
+            /**
+             * @description Name of a joint, as the model's own skeleton has it.
+             * @example RightHand
+             */
+            joint: string;
+            /**
+             * @description Where it is to be, x y z, m, in the frame of the clip: that in which the root travels.
+             * @example [
+             *       0.3,
+             *       1.2,
+             *       0.4
+             *     ]
+             */
+            position: number[];
+            /** @description Seconds from the start of the clip, up to its duration. */
+            time?: number;
+            at?: components["schemas"]["Moment"];
+        } & (unknown | unknown);
+        /** @enum {string} */
+        Moment: "start" | "end" | "event" | "highest" | "lowest" | "farthest";
+        /**
+         * @description Joints that are to be in their places. Of a control that the same joint is measured for, the target is the nearer word.
+         * @default []
+         * @example [
+         *       {
+         *         "joint": "RightHand",
+         *         "position": [
+         *           0.3,
+         *           1.2,
+         *           0.4
+         *         ],
+         *         "at": "end"
+         *       }
+         *     ]
+         */
+        Targets: components["schemas"]["Target"][];
+        /**
+         * @description Whether feet that stand stay where they stand.
+         * @default false
+         */
+        PinFeet: boolean;
+        /**
          * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
          * @default null
          * @enum {string|null}
@@ -1337,10 +1425,13 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
+         * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
+         *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
+         *     a gap of what was sampled, and one for each target out of reach; `refuse` answers none of these.
          * @default warn
          * @enum {string}
          */
-        Extrapolate: "warn" | "refuse";
+        Extrapolate: "ok" | "warn" | "refuse";
         /**
          * @description Who moves, of the `performers` that the model's card names; null for somebody who was never seen.
          * @default null
@@ -1379,6 +1470,10 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -1400,9 +1495,13 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
         };
@@ -1424,9 +1523,10 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Who was asked for; null for somebody who was never seen. */
             performer: string | null;
-            /** @description One sentence for each control outside what was sampled. */
+            /** @description As in Trust. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
+            support: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1434,6 +1534,42 @@ export interface components {
                 count: number;
                 weight: number;
             };
+        };
+        /** @description Whether anything like these controls was captured, and by what that was told. */
+        Backing: {
+            supported: components["schemas"]["Supported"];
+            /** @description How far each control lies beyond its sampled range, as a share of it. */
+            beyond: {
+                [key: string]: number;
+            };
+            /** @description The share beyond which nothing is supported. */
+            most_beyond: number;
+            /** @description Of a plain field over the controls of the captured clips, from 0 where many are near to 1 where none is. */
+            variance: number;
+            /** @description The variance above which nothing is supported. */
+            most_variance: number;
+        };
+        /** @description Each point is ranked as if those before it had been captured already. */
+        Suggestions: {
+            model: components["schemas"]["Identity"];
+            /** @description Who is to be captured; null where clips of all count alike. */
+            performer: string | null;
+            /** @description Of how many points these were chosen. */
+            candidates: number;
+            /** @description The one that is worth most first. */
+            suggestions: components["schemas"]["Suggestion"][];
+        };
+        Suggestion: {
+            controls: components["schemas"]["Controls"];
+            /** @description Share by which the mean variance of the poses falls over all that may be asked, once this is captured. */
+            gain: number;
+            /** @description At the point itself, before, as a share of the sill. */
+            variance: number;
+            /** @description Source of the captured clip nearest to it; null in models trained before this was kept. */
+            nearest: string | null;
+            lacking: components["schemas"]["ControlName"];
+            /** @description By how much the nearest clip differs in that control, in which it differs most, as a share of its range. */
+            gap: number;
         };
         CapturedClip: {
             /** @description The motion file, and the frames of it where the clip is a part. */
@@ -1538,9 +1674,13 @@ export interface components {
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
             level?: components["schemas"]["LevelNumber"];
+            joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
             root?: components["schemas"]["Root"];
             loop?: components["schemas"]["Loop"];
+            exact?: components["schemas"]["Exact"];
+            targets?: components["schemas"]["Targets"];
+            pin_feet?: components["schemas"]["PinFeet"];
         };
         /** @description One clip of an archive, and how far it may be trusted. */
         ManifestEntry: {
@@ -1560,14 +1700,18 @@ export interface components {
             duration: number;
             /** @description As in Trust, m. */
             sigma: number;
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
+            /** @description As in Trust. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description As in Trust. */
+            targets?: components["schemas"]["Met"][];
         };
-        /**
-         * @description Names of the controls that were left out, and are the most typical for those that were given;
-         *     not there where none was. Since 2.2.0.
-         */
-        Inferred: string[];
         /** @description Where an answer comes from and what it is worth. */
         Trust: {
             model: components["schemas"]["Identity"];
@@ -1580,9 +1724,43 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            /** @description One sentence for each control outside what was sampled. */
+            supported: components["schemas"]["Supported"];
+            performer_seen?: components["schemas"]["PerformerSeen"];
+            joint_sigma?: components["schemas"]["SigmaByJoint"];
+            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
+            /** @description The controls that can be measured on a motion, as this one has them, in their units; absent where there are none. */
+            measured?: {
+                [key: string]: number;
+            };
+            /** @description Measured controls and targets that the motion was held to, and how far it stays from each; absent where there are none. */
+            targets?: components["schemas"]["Met"][];
+        };
+        /**
+         * @description Names of the controls that were left out, and are the most typical for those that were given and for
+         *     targets; not there where none was. Since 2.2.0.
+         */
+        Inferred: string[];
+        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
+        Supported: boolean;
+        /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
+        SigmaByJoint: number[];
+        /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
+        PerformerSeen: boolean;
+        /** @description Something that a motion was held to. */
+        Met: {
+            /**
+             * @description A control's name, or joint and moment of a target.
+             * @example RightHand at end
+             */
+            what: string;
+            /** @description How far the motion stays from it, in `unit`. */
+            miss: number;
+            /** @description m, m/s or deg. */
+            unit: string;
+            /** @description Whether it is met to a millimetre, or a thousandth of its unit. */
+            reached: boolean;
         };
         /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
@@ -1736,6 +1914,8 @@ export interface components {
             };
             /** @description File and frames of each captured clip; empty in models trained before this was kept. */
             sources: string[];
+            /** @description How far each joint errs, as a share of sigma; empty in models trained before this was kept. */
+            joint_sigma?: number[];
             /** @description What the weights of the captured clips hang on; null in models trained before this was kept. */
             kriging: {
                 /** @enum {string} */
@@ -1786,6 +1966,7 @@ export interface components {
         /**
          * @description One pose of each of many characters. All lists have one length, the number of characters, in
          *     one order; what is no list holds for each of them. Where nothing is a list there is one character.
+         *     Crowds are the model's predictions: they are held to nothing.
          */
         CrowdQuestion: {
             /**
@@ -1912,6 +2093,8 @@ export interface components {
             duration: number[];
             /** @description As in Trust, m. */
             sigma: number[];
+            /** @description As in Trust. */
+            supported: boolean[];
             /** @description The level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers; absent without a camera. */
@@ -2109,7 +2292,7 @@ export interface components {
         /** @description A problem as RFC 9457 describes it. Every error of this service has this shape. */
         Problem: {
             /** @enum {string} */
-            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
+            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
             title: string;
             status: number;
             /** @description What was found and what was expected, for people. */
@@ -2367,7 +2550,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2380,6 +2565,19 @@ export interface components {
                 "application/x-npz": string;
                 "application/vnd.apache.arrow.stream": string;
                 "application/vnd.msgpack": string;
+            };
+        };
+        /** @description Which clips to capture next. */
+        Suggestions: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                ETag: components["headers"]["ETag"];
+                Vary: components["headers"]["Vary"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/json": components["schemas"]["Suggestions"];
             };
         };
         /** @description What the answer is made of. */
@@ -2480,7 +2678,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2499,7 +2699,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2518,7 +2720,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2537,7 +2741,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2556,7 +2762,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2575,7 +2783,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2594,7 +2804,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2613,7 +2825,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2632,7 +2846,9 @@ export interface components {
                 "Posefield-Sigma": components["headers"]["Sigma"];
                 "Posefield-Duration": components["headers"]["Duration"];
                 "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
                 "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
                 [name: string]: unknown;
             };
             content: {
@@ -2839,7 +3055,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, or controls outside what was sampled with `extrapolate` refuse. */
+        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, something that no motion can be held to, or, with `extrapolate` refuse, controls like which nothing was captured or a target out of reach. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -2953,6 +3169,24 @@ export interface components {
         root: components["schemas"]["Root"];
         /** @description Whether the clip is a loop. */
         loop: components["schemas"]["Loop"];
+        /** @description Whether the trust says how far each joint may err. */
+        jointSigma: components["schemas"]["JointSigma"];
+        /**
+         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+         *     the model can measure on a motion), `none`, or names of controls with commas between.
+         * @example none
+         */
+        exact: string;
+        /**
+         * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+         *     moment is its `at`, or its `time` in seconds. Repeated for several.
+         * @example [
+         *       "RightHand@end:0.3,1.2,0.4"
+         *     ]
+         */
+        target: string[];
+        /** @description Whether feet that stand stay where they stand. */
+        pinFeet: components["schemas"]["PinFeet"];
         /** @description The file's unit of length; the format's usual one, if left out. */
         unit: "m" | "cm";
         /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -2961,7 +3195,7 @@ export interface components {
         unitOfGltf: "m";
         /** @description In glTF no other axis is up. */
         upOfGltf: "y";
-        /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+        /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
         count: number;
@@ -2980,6 +3214,13 @@ export interface components {
         camera: string;
         /** @description How many captured clips are listed at most, the nearest first. */
         nearest: components["schemas"]["Nearest"];
+        /** @description How many points. */
+        suggestions: number;
+        /**
+         * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+         * @example tall
+         */
+        whose: string;
         /**
          * @description The control that changes from column to column.
          * @example turn
@@ -3086,11 +3327,19 @@ export interface components {
          *     object in ASCII; absent where none was. Since 2.2.0.
          */
         Inferred: string;
+        /** @description As `supported` in Trust. */
+        Supported: "true" | "false";
         /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
          *     that the lines joined by commas and put in brackets are a JSON array.
          */
         Warning: string;
+        /**
+         * @description One header line for each of `targets` in Trust that is not reached; absent where all are. Each
+         *     is a JSON object in ASCII with `what`, `miss` and `unit`, so that the lines joined by commas and
+         *     put in brackets are a JSON array.
+         */
+        Missed: string;
         /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
         InferenceHeaderLength: number;
     };
@@ -3194,7 +3443,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3202,8 +3451,26 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3293,7 +3560,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3301,8 +3568,26 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3390,7 +3675,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3398,8 +3683,26 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3487,7 +3790,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3495,8 +3798,26 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3584,7 +3905,7 @@ export interface operations {
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3592,8 +3913,26 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
@@ -3679,7 +4018,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3687,6 +4026,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3695,6 +4036,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3782,7 +4139,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3790,6 +4147,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3798,6 +4157,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3883,7 +4258,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3891,6 +4266,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -3899,6 +4276,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -3984,7 +4377,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -3992,6 +4385,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4000,6 +4395,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4085,7 +4496,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4093,6 +4504,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4101,6 +4514,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4186,7 +4615,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4194,6 +4623,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4202,6 +4633,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4287,7 +4734,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4295,6 +4742,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4303,6 +4752,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description glTF has no other unit of length. */
                 unit?: components["parameters"]["unitOfGltf"];
                 /** @description In glTF no other axis is up. */
@@ -4388,7 +4853,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4396,6 +4861,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4404,6 +4871,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4489,7 +4972,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4497,6 +4980,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4505,6 +4990,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -4590,7 +5091,7 @@ export interface operations {
                 start?: components["parameters"]["start"];
                 /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -4598,6 +5099,8 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /** @description Whether the trust says how far each joint may err. */
+                joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /** @description What joints are called. */
@@ -4606,6 +5109,22 @@ export interface operations {
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is a loop. */
                 loop?: components["parameters"]["loop"];
+                /**
+                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
+                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @example none
+                 */
+                exact?: components["parameters"]["exact"];
+                /**
+                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
+                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @example [
+                 *       "RightHand@end:0.3,1.2,0.4"
+                 *     ]
+                 */
+                target?: components["parameters"]["target"];
+                /** @description Whether feet that stand stay where they stand. */
+                pin_feet?: components["parameters"]["pinFeet"];
                 /** @description The file's unit of length; the format's usual one, if left out. */
                 unit?: components["parameters"]["unit"];
                 /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
@@ -5138,7 +5657,7 @@ export interface operations {
                 controls?: components["parameters"]["controls"];
                 /** @description How many captured clips are listed at most, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls outside what was sampled - answer with warnings, or refuse. */
+                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
                  * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
@@ -5201,6 +5720,44 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["Unanswerable"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
+    getSuggestions: {
+        parameters: {
+            query?: {
+                /** @description How many points. */
+                count?: components["parameters"]["suggestions"];
+                /**
+                 * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+                 * @example tall
+                 */
+                performer?: components["parameters"]["whose"];
+            };
+            header?: {
+                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
+            };
+            path: {
+                /**
+                 * @description A model's name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Suggestions"];
+            304: components["responses"]["NotModified"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
             422: components["responses"]["Unanswerable"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
@@ -6148,6 +6705,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ],
   "ModelCard": [
@@ -6195,6 +6753,7 @@ export const REQUIRED = {
     "controls",
     "performer",
     "warnings",
+    "support",
     "nearest",
     "others"
   ],
@@ -6210,6 +6769,12 @@ export const REQUIRED = {
     "sigma",
     "inside"
   ],
+  "Suggestions": [
+    "model",
+    "performer",
+    "candidates",
+    "suggestions"
+  ],
   "Trust": [
     "model",
     "controls",
@@ -6217,6 +6782,7 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
+    "supported",
     "warnings"
   ]
 } as const;
@@ -6254,6 +6820,9 @@ export const LISTS = {
     "along_values",
     "sigma",
     "inside"
+  ],
+  "Suggestions": [
+    "suggestions"
   ],
   "Trust": [
     "warnings"
@@ -6293,6 +6862,7 @@ export const PROBLEM_TYPES = [
   "urn:posefield:problem:unsupported-media-type",
   "urn:posefield:problem:invalid-field",
   "urn:posefield:problem:outside-samples",
+  "urn:posefield:problem:out-of-reach",
   "urn:posefield:problem:overloaded",
   "urn:posefield:problem:late",
   "urn:posefield:problem:not-ready",

@@ -5,11 +5,16 @@ import type { components, operations } from "./schema.ts";
 type Schemas = components["schemas"];
 
 export type ManifestEntry = Schemas["ManifestEntry"];
+/** Something that a motion was held to, and by how much it misses it. */
+export type Met = Schemas["Met"];
 export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
 export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
+export type Suggestions = Schemas["Suggestions"];
 export type SigmaGrid = Schemas["SigmaGrid"];
+/** A joint that is to be in its place, at a `time` or `at` a moment of the motion. */
+export type Target = Schemas["Target"];
 export type Trust = Schemas["Trust"];
 
 /** A question as one may write it: what has a default may be left out. */
@@ -70,6 +75,8 @@ export interface CrowdPoses {
   readonly boneOffsets: Float32Array;
   readonly duration: Float32Array;
   readonly sigma: Float32Array;
+  /** N, whether anything like it was captured; from services that say so. */
+  readonly supported: readonly boolean[] | null;
   readonly levels: Int32Array;
   /** N, where a camera was given. */
   readonly errorPx: Float32Array | null;
@@ -86,6 +93,8 @@ export interface Named {
   readonly sigma: number | null;
   /** As in Trust, s; of a single clip. */
   readonly duration: number | null;
+  /** As in Trust; of a single clip. */
+  readonly supported: boolean | null;
   readonly warnings: readonly string[];
 }
 

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 
-import { Client, CONTRACT, type PoseQuestion, Problem } from "../src/index.ts";
+import { Client, CONTRACT, type PoseQuestion, Problem, type Target } from "../src/index.ts";
 import { defaults, observed, URL_OF_SERVICE } from "./service.ts";
 
 const client = new Client(URL_OF_SERVICE);
@@ -32,6 +32,30 @@ test("poses are the numbers that the service says as text", async () => {
   assert.deepEqual(found.rootPosition, Float32Array.from(said.root_position.flat()));
   assert.deepEqual(found.boneOffsets, Float32Array.from(said.bone_offsets.flat()));
   assert.equal(found.trust.model, (await client.card("reach")).identity);
+});
+
+test("a motion that is held to targets says by how much it misses them", async () => {
+  const { client, sent } = observed();
+  const far: Target = { joint: "RightHand", position: [1e-7, 1, 5], at: "end" };
+  const early = { joint: "LeftHand", position: [0.5, 1, 0], time: 0.25 };
+  const { trust } = await client.pose("reach", { ...question, targets: [far, early] });
+  const said = [...new URL(sent[0]!.path, "http://any").searchParams.getAll("target")];
+  assert.match(said[0]!, /^RightHand@end:0\.0000001[0-9]*,1,5$/);
+  assert.equal(said[1], "LeftHand@0.25:0.5,1,0");
+  const [met] = trust.targets ?? [];
+  assert.deepEqual(
+    { ...met, miss: 0 },
+    { what: "RightHand at end", miss: 0, unit: "m", reached: false },
+  );
+  assert.ok(met!.miss > 3);
+  assert.equal(trust.warnings.length, 2);
+  const refused = client.clip("reach", {
+    controls: question.controls,
+    targets: [far],
+    exact: "none",
+    extrapolate: "refuse",
+  });
+  await assert.rejects(refused, (fault: Problem) => fault.kind === "out-of-reach");
 });
 
 test("a clip is as long as its rate and frames say", async () => {
@@ -123,7 +147,7 @@ test("a refusal says what, where and under which id", async () => {
 });
 
 test("a body's fault is pointed at", async () => {
-  const controls = { stature: 1.7 };
+  const controls = { spin: 1.7 };
   const body = observed(undefined, { longestLink: 0 }).client;
   await assert.rejects(body.pose("reach", { controls, times: [0] }), (fault: unknown) => {
     return fault instanceof Problem && fault.places[0]?.pointer?.startsWith("/controls") === true;

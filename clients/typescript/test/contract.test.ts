@@ -14,6 +14,7 @@ import type {
   NamedClipQuestion,
   PoseQuestion,
   SigmaQuestion,
+  Target,
   WalkQuestion,
   WhyQuestion,
 } from "../src/index.ts";
@@ -70,6 +71,7 @@ const REACHED: Record<string, Ask> = {
   getCrowdUsdz: walk("usdz"),
   getWhy: why,
   queryWhy: why,
+  getSuggestions: (client, model, asked) => client.suggestions(model, asked as object),
   getSigmaJson: sigma,
   querySigmaJson: sigma,
   getReadiness: (client) => client.ready(),
@@ -172,8 +174,16 @@ function parts(path: string): readonly [string, string[][]] {
   return [pathname, [...searchParams].sort()];
 }
 
-const WORDS = /^(extrapolate|performer|names|root|unit|up|across|along|instancing)$/;
+const WORDS = /^(exact|extrapolate|performer|names|root|unit|up|across|along|instancing)$/;
 const NUMBERS = /^(fps|start|end|level|nearest|columns|rows|margin|count|seconds|seed|motions)$/;
+
+/** A target of JOINT@MOMENT:X,Y,Z. */
+function target(words: string): Target {
+  const [, joint, moment, place] = /^(.+)@(.+):(.+)$/.exec(words) ?? [];
+  const position = (place ?? "").split(",").map(Number);
+  const when = /^[a-z]/.test(moment ?? "") ? { at: moment as "end" } : { time: Number(moment) };
+  return { joint: joint ?? "", position, ...when };
+}
 
 /** The question that a link asks, or the body. */
 function questionOf(example: Example): unknown {
@@ -184,6 +194,7 @@ function questionOf(example: Example): unknown {
   for (const [name, value] of searchParams) {
     if (WORDS.test(name)) found[name] = value;
     else if (NUMBERS.test(name)) found[name] = Number(value);
+    else if (name === "target") found["targets"] = searchParams.getAll("target").map(target);
     else if (name === "loop") found[name] = value === "true";
     else if (name === "camera") found[name] = value.split(",").map(Number);
     else if (name === "time") found["times"] = searchParams.getAll("time").map(Number);

@@ -6,12 +6,18 @@ import { test } from "node:test";
 import { Client, PosefieldError, WrongQuestion } from "../src/index.ts";
 import { observed, serving } from "./service.ts";
 
+const HAND = { joint: "RightHand", position: [0, 1, 0] };
+
 type Ask = (client: Client, number: number) => unknown;
 
 const ASKED: Record<string, Ask> = {
   "a link's control": (client, turn) => client.clip("reach", { controls: { turn } }),
   "a link's time": (client, time) => client.pose("reach", { controls: {}, times: [0, time] }),
   "a link's setting": (client, fps) => client.file("reach", "bvh", { controls: {}, fps }),
+  "a target's place": (client, x) =>
+    client.clip("reach", { controls: {}, targets: [{ ...HAND, position: [0, x, 0], at: "end" }] }),
+  "a target's time": (client, time) =>
+    client.clip("reach", { controls: {}, targets: [{ ...HAND, time }] }),
   "a camera": (client, x) => client.crowdFile("walk", "usda", { camera: [x, 0, 0] }),
   "a body's time": (client, time) => client.crowd("reach", { controls: {}, time: [0, time] }),
   "a clip of many": (client, turn) => client.archive("reach", "bvh", [{ controls: { turn } }]),

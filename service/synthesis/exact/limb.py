@@ -17,8 +17,8 @@ class Limb:
     """A chain of joints from the root to one, with their bones (C, 3), m, and what the reduced
     tensor says of them.
 
-    rotations (C, 3, 3): mean ones. mean (3 + 3 C,), directions (r1, 3 + 3 C): of the root's position
-    and the chain's rotation vectors.
+    rotations (C, 3, 3): mean ones. mean (3 + 3 C,), directions (r1, 3 + 3 C): of the root's
+    position and the chain's rotation vectors.
     """
 
     bones: Floats

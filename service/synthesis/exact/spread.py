@@ -82,7 +82,7 @@ def _coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
     hyper = card.kriging
     assert hyper is not None
     r3 = weights["core"].shape[2]
-    order = _order(card, weights, samples)
+    order = order_of(card, weights, samples)
     held = samples[order]
     dual = weights["pose_weights"].astype(np.float64)
     trend = weights["drift_weights"][:, -r3:].astype(np.float64)
@@ -92,7 +92,7 @@ def _coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
     return found
 
 
-def _order(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
+def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
     """Place on the card (n,) of each sample of the file, which holds those first that say most."""
     held = weights["samples"][0].T
     listed = samples[:, : len(card.controls)].astype(np.float32)

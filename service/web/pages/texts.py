@@ -3,7 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from service.motion.errors import InvalidField, OutsideSamples, UnknownFormat, UnknownModel
+from service.motion.errors import (
+    InvalidField,
+    OutOfReach,
+    OutsideSamples,
+    UnknownFormat,
+    UnknownModel,
+)
 from service.web import problems
 from service.web.problems import TABLE, Kind
 
@@ -111,11 +117,20 @@ TEXTS: dict[Kind, Text] = {
         {"parameter": "fps"},
     ),
     TABLE[OutsideSamples]: Text(
-        "Controls lie outside what the model was trained from, and `extrapolate=refuse` asked "
-        "for an error rather than a warning.",
-        "Move the controls into the ranges on the model's card, or ask with `extrapolate=warn`.",
+        "Controls lie outside what the model was trained from, or in a gap of it, and "
+        "`extrapolate=refuse` asked for an error rather than a warning.",
+        "Move the controls into the ranges on the model's card and near to clips that were "
+        "captured, which `why` names, or ask with `extrapolate=warn`.",
         "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
         {"parameter": "controls"},
+    ),
+    TABLE[OutOfReach]: Text(
+        "The motion cannot meet a target, or a measured control, by going as far as captured "
+        "motions stray, and `extrapolate=refuse` asked for an error rather than a warning.",
+        "Move the target that `errors` names nearer, or ask with `extrapolate=warn`: the answer "
+        "then goes as near as it can, and its trust says by how much it misses.",
+        "targets/0: RightHand at end stays 446.2 cm from its target: out of reach",
+        {"parameter": "target"},
     ),
     problems.HEAD_TOO_LARGE: Text(
         "All header lines together are longer than the service reads. The connection is closed.",

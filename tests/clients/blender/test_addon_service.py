@@ -186,8 +186,8 @@ def test_a_model_that_disappeared(address):
 
 
 def test_a_refusal_says_what_was_found_and_expected(address):
-    with pytest.raises(faults.Refused, match="missing; give a number") as refusal:
-        clips.ask(Service(address), Question("reach", {"stature": 1.7}))
+    with pytest.raises(faults.Refused, match="no such control; this model has") as refusal:
+        clips.ask(Service(address), Question("reach", {"spin": 1.7}))
     assert refusal.value.kind == "invalid-field"
 
 

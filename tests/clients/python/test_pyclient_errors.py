@@ -97,6 +97,9 @@ def test_what_can_help_to_ask_again_is_asked_again():
     assert {name.lower() for name in again} == busy | network
 
 
+FAR = {"joint": "RightHand", "position": (0, 1, 5), "at": "end"}
+
+
 @pytest.mark.parametrize(
     ("ask", "kind"),
     [
@@ -108,6 +111,10 @@ def test_what_can_help_to_ask_again_is_asked_again():
         (
             lambda m, c: m("reach").pose(0, extrapolate="refuse", **c | {"turn": 1000}),
             errors.OutsideSamples,
+        ),
+        (
+            lambda m, c: m("reach").pose(0, extrapolate="refuse", targets=[FAR], **c),
+            errors.OutOfReach,
         ),
         (lambda m, c: m("reach").clip(fps="x", **c).content("usdc"), errors.BadParameter),
         (lambda m, c: m("reach").clip(loop=True, **c).content("usdc"), errors.InvalidField),

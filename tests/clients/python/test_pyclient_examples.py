@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
@@ -52,7 +53,16 @@ def words(request):
     for name, text in parse_qsl(urlsplit(request["path"]).query):
         given.setdefault(name, []).append(value(text))
     times = {"times": given.pop("time")} if "time" in given else {}
-    return {name: values[0] for name, values in given.items()} | times
+    targets = [target(words) for words in given.pop("target", ())]
+    held = {"targets": targets} if targets else {}
+    return {name: values[0] for name, values in given.items()} | times | held
+
+
+def target(words):
+    """A target as the client is given it, of JOINT@MOMENT:X,Y,Z."""
+    joint, moment, place = re.fullmatch("(.+)@(.+):(.+)", words).groups()
+    when = "at" if moment.isalpha() else "time"
+    return {"joint": joint, "position": json.loads(f"[{place}]"), when: value(moment)}
 
 
 def value(text):
@@ -86,6 +96,7 @@ CALLS = {
     "queryPoseMsgpack": lambda client, r: model(client, r).pose(**words(r)),
     "getWhy": lambda client, r: model(client, r).why(**words(r)),
     "queryWhy": lambda client, r: model(client, r).why(**words(r)),
+    "getSuggestions": lambda client, r: model(client, r).suggest(**words(r)),
     "getSigmaMsgpack": lambda client, r: model(client, r).sigma(**words(r)),
     "querySigmaMsgpack": lambda client, r: model(client, r).sigma(**words(r)),
     "queryCrowdMsgpack": lambda client, r: model(client, r).crowd(**words(r)).numbers,

@@ -2,13 +2,24 @@
 
 import subprocess
 import sys
+from urllib.parse import parse_qsl, urlsplit
 
 import httpx
 import msgspec
 import numpy as np
 import posefield_client
 import pytest
-from posefield_client import Camera, Client, NamedClipQuestion, files, generated, numbers, questions
+from posefield_client import (
+    Camera,
+    Client,
+    NamedClipQuestion,
+    Target,
+    asking,
+    files,
+    generated,
+    numbers,
+    questions,
+)
 from posefield_client.errors import WrongQuestion
 from posefield_client.wire import Reply
 
@@ -69,6 +80,57 @@ def test_numbers_of_numpy_are_taken_everywhere():
     body = msgspec.json.decode(crowd.request("npz").body)
     assert body["performer"] == ["p", "q"]
     assert body["camera"] == {"position": [0, 0, 0], "fov": 1, "height": 10}
+
+
+HAND = {"joint": "mixamorig:Hand", "position": np.array([0.5, -1e-7, 2]), "at": "end"}
+FOOT = Target(joint="Foot", position=(0, 0, 1), time=0.25)
+
+
+def test_targets_and_exact_controls_in_a_query():
+    asked = files.clip("m", targets=[HAND, FOOT], exact=["a", "b"], pin_feet=True, a=1)
+    assert parse_qsl(urlsplit(asked.request("bvh").target).query) == [
+        ("a", "1"),
+        ("exact", "a,b"),
+        ("target", "mixamorig:Hand@end:0.5,-0.0000001,2.0"),
+        ("target", "Foot@0.25:0.0,0.0,1.0"),
+        ("pin_feet", "true"),
+    ]
+    assert target(questions.pose("m", 0, exact="a")) == target(questions.pose("m", 0, exact=["a"]))
+
+
+def test_targets_and_exact_controls_in_a_body(monkeypatch):
+    monkeypatch.setattr(asking, "LONGEST", 0)
+    asked = questions.pose("m", 0, targets=[HAND, FOOT], exact="none", pin_feet=False, a=1)
+    expected = {
+        "controls": {"a": 1},
+        "times": [0],
+        "exact": "none",
+        "targets": [
+            {"joint": "mixamorig:Hand", "position": [0.5, -1e-7, 2], "at": "end"},
+            {"joint": "Foot", "position": [0, 0, 1], "time": 0.25},
+        ],
+        "pin_feet": False,
+    }
+    assert msgspec.json.decode(asked.request.body) == expected
+    clip = {"controls": {"a": 1}, "targets": [HAND, FOOT], "exact": "none", "pin_feet": False}
+    (sent,) = msgspec.json.decode(files.clips("m", [clip], "usdc").request("zip").body)["clips"]
+    assert sent == {name: each for name, each in expected.items() if name != "times"}
+
+
+@pytest.mark.parametrize(
+    ("targets", "said"),
+    [
+        ([{"joint": "Hand", "position": [0, 1, 2]}], "target 0: expected one of time and at"),
+        ([HAND, {**HAND, "time": 0}], "target 1: expected one of time and at"),
+        ([{**HAND, "position": [0, 1]}], "target 0: .*length 3"),
+        ([{**HAND, "position": [0, 1, float("nan")]}], "position is nan, expected a finite"),
+        ([{**HAND, "at": "soon"}], "target 0: Invalid enum value 'soon'"),
+        ([{**HAND, "when": 1}], "target 0: .*unknown field `when`"),
+    ],
+)
+def test_targets_that_are_none(targets, said):
+    with pytest.raises(WrongQuestion, match=said):
+        questions.pose("m", 0, targets=targets)
 
 
 def test_a_long_question_goes_by_post():

@@ -162,7 +162,14 @@ def test_a_text_that_is_a_word_of_the_layer_is_left_to_usd(word):
     found = made.write(Plain(), other)
     assert found is None or found == crate.ordinary(Plain(), other)
     assert made.write(Plain(), content(2, model="Anim")) is None
-    assert made.write(Plain(), content(2, warnings=["a", "a"])) is None
+
+
+def test_texts_that_occur_twice_have_a_pattern_of_their_own():
+    twice = content(1, warnings=["a", "a"])
+    assert pattern(twice) != pattern(content(1))
+    assert pattern(content(1, warnings=["model", "b"])) != pattern(content(1))
+    other = content(2, warnings=["c", "c"])
+    assert template(Plain(), twice).write(Plain(), other) == crate.ordinary(Plain(), other)
 
 
 @pytest.mark.parametrize("text", ["", "ünïcode 左腕", 'quo"ted\n', "x" * 5000])

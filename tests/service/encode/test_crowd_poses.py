@@ -17,7 +17,8 @@ from service.motion import quat
 from service.motion.crowd import CrowdPoses
 
 TENSORS = ("rotations", "root_position", "bone_offsets")
-NUMBERS = ("duration", "sigma", "levels", "error_px")
+NUMBERS = ("duration", "sigma", "supported", "levels", "error_px")
+TYPES = {"levels": np.int8, "supported": np.bool_}
 UNITS = ("length", "time", "rotation", "up", "frame", "error_px")
 
 
@@ -38,6 +39,7 @@ def crowd(skeleton, characters):
         error_px=np.abs(singles()),
         duration=np.abs(singles()),
         sigma=np.abs(singles()),
+        supported=rng.random(characters) < 0.5,
         warnings=("speed lies outside what was sampled for 3 characters, of whom 7 is the first",),
     )
 
@@ -76,7 +78,7 @@ def by_npz(poses):
 def by_json(poses):
     content = orjson.loads(CROWD_ENCODERS["json"].encode(poses))
     facts = {name: content.pop(name) for name in ("model", "names", "parents", "units", "warnings")}
-    types = dict.fromkeys(content, np.float32) | {"levels": np.int8}
+    types = dict.fromkeys(content, np.float32) | TYPES
     return {name: np.array(rows, types[name]) for name, rows in content.items()}, facts
 
 
@@ -104,7 +106,7 @@ def test_every_bit_comes_back(extension, poses):
     assert columns.keys() == {*TENSORS, *NUMBERS}
     for name in (*TENSORS, *NUMBERS):
         assert np.array_equal(columns[name], getattr(poses, name)), name
-        assert columns[name].dtype == (np.int8 if name == "levels" else np.float32), name
+        assert columns[name].dtype == TYPES.get(name, np.float32), name
     assert not np.array_equal(columns["rotations"][::-1], poses.rotations)
 
 

@@ -54,3 +54,17 @@ def plain(value):
 def test_what_is_no_plain_fact_is_an_error():
     with pytest.raises(TypeError, match="a fact of type object, expected text, a number or"):
         facts.dictionary({"what": object()})
+
+
+def test_facts_in_parts_are_whole_again():
+    plain = {"a": 1.5, "name": "a", "who": None, "also": ["x", "y", "x"], "of": [{"what": "x"}] * 2}
+    found = facts.parted(plain)
+    assert found.whole() == plain
+    assert (found.numbers, found.texts) == ((1.5,), ("x", "y"))
+
+
+def test_facts_that_differ_in_numbers_and_texts_alone_have_one_shape():
+    one, other = ({"of": [{"what": what, "miss": miss}]} for what, miss in (("u", 0.1), ("v", 0.2)))
+    assert facts.parted(one).shape == facts.parted(other).shape
+    twice = {"of": 2 * one["of"]}
+    assert facts.parted(twice).shape != facts.parted({"of": [*one["of"], *other["of"]]}).shape

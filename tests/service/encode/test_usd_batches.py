@@ -11,7 +11,7 @@ from service.encode import ENCODERS, METRES, crate, press, text, usd
 from service.encode.convention import CENTIMETRES, Convention
 from service.motion import clip as clips
 from service.motion import quat
-from service.motion.answer import ClipAnswer, Trust
+from service.motion.answer import ClipAnswer, Met, Trust
 from service.motion.skeleton import Skeleton
 
 INCHES = Convention(0.0254, "z")
@@ -149,6 +149,9 @@ FACTS = [
     {"controls": {}},
     {"controls": {"a": 0.1, "b": 0.1, "c": 0.0254, "d": 0.3, "e": 0.3}},
     {"controls": {"a": 1, "b": True, "c": 0.5}},
+    {"inferred": ("speed", "turn rate"), "measured": {"speed": 1.25, "turn rate": 0.1}},
+    {"targets": (Met("speed", 0.0, "m/s", True), Met("speed", 0.25, "m/s", False))},
+    {"targets": (Met("LeftHand at end", 1e-9, "m", True), Met("Body at 0.5 s", 0.3, "m", True))},
 ]
 
 
@@ -157,6 +160,38 @@ def test_any_facts_are_written_as_usd_does(said):
     given = [*answers(2), *answers(3, seed=4, **said)]
     for convention in (METRES, INCHES):
         assert both(given, convention)
+
+
+def held(count, frames, reached=True):
+    """Clips that differ in what they were held to, and by how much they miss it."""
+    rng = np.random.default_rng(5)
+    for index, one in enumerate(answers(count, frames)):
+        misses = rng.uniform(0, 1e-5, 3)
+        places = [f"LeftHand at {index / 10:g} s", f"Hips at 1.{index} s"]
+        names = zip(["speed", *places], misses, ("m/s", "m", "m"), strict=True)
+        met = tuple(Met(name, float(miss), unit, reached) for name, miss, unit in names)
+        measured = {"speed": float(rng.uniform(0, 2)), "turn rate": 0.25}
+        trust = replace(one.trust, targets=met, measured=measured, inferred=("turn rate",))
+        yield replace(one, trust=trust)
+
+
+@pytest.mark.parametrize("reached", [True, False])
+def test_what_clips_were_held_to_is_written_as_usd_does(reached):
+    for convention in (METRES, INCHES):
+        assert both(list(held(4, 23, reached)), convention)
+
+
+def test_clips_that_are_held_to_different_places_share_a_template(monkeypatch):
+    given = list(held(7, 39))
+    for form, write in ((crate, usd.usdc), (text, usd.usda)):
+        write(given[:2], METRES)
+        with monkeypatch.context() as patch:
+            patch.setattr(form, "ordinary", lambda *each: b"the ordinary way")
+            assert b"the ordinary way" not in write(given[2:], METRES)
+            fewer = replace(given[3].trust, targets=given[3].trust.targets[:2])
+            other = write([replace(given[3], trust=fewer)], METRES)
+        # Text says facts in its head, which is no part of a template.
+        assert (other == [b"the ordinary way"]) == (form is crate)
 
 
 def chain(joints):

@@ -90,4 +90,4 @@ def test_it_is_said_once_that_clips_are_extrapolated(model, order):
     assert asked.warnings == []
     prospects = [asked.prospects[0], dataclasses.replace(asked.prospects[1], warnings=("far",))]
     (said,) = dataclasses.replace(asked, prospects=prospects).warnings
-    assert said == "1 of 2 clips have some control outside what was sampled"
+    assert said == "1 of 2 clips lie outside what was sampled, or in a gap of it"

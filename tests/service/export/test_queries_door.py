@@ -3,11 +3,11 @@
 import pytest
 from rowing import POINT, rows, source, write_csv
 
-from service.export.columns import OPTIONS
+from service.export.columns import HELD, OPTIONS
 from service.export.queries import Defaults
 from service.motion.errors import FileError, InvalidField, OutsideSamples, UnknownFormat
 from service.synthesis import library
-from service.synthesis.question import ClipQuestion
+from service.synthesis.question import ClipQuestion, Hold
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,9 @@ def test_a_file_that_cannot_be_read_is_refused(model, tmp_path, name, said):
 
 
 def test_every_option_but_name_and_format_is_a_field_of_a_question():
-    assert set(OPTIONS) - {"name", "format"} <= set(vars(ClipQuestion({})))
+    fields = {*vars(ClipQuestion({})), *HELD}
+    assert set(OPTIONS) - {"name", "format"} <= fields
+    assert set(HELD) == set(vars(Hold()))
 
 
 def test_a_refusal_before_a_row_is_the_same_as_in_one(model, table):

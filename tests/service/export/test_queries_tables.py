@@ -178,7 +178,7 @@ def test_a_cell_that_is_no_number_is_named(model, tmp_path, cell):
         (",level", f"{ROW},-1", "level: -1, expected 0 to 3"),
         (",performer", f"{ROW},Tall", "performer: 'Tall', expected one of middle, short, tall"),
         (",format", f"{ROW},fbx", "format: 'fbx', expected one of usda, usdc, usdz, "),
-        (",extrapolate", f"{ROW},no", "extrapolate: 'no', expected one of warn, refuse"),
+        (",extrapolate", f"{ROW},no", "extrapolate: 'no', expected one of ok, warn, refuse"),
         (",start", f"{ROW},-0.1", "start: -0.1 s, expected 0 to 18.5 s"),
         (",end", f"{ROW},19", "end: 19 s, expected 0 to 18.5 s"),
         (",start,end", f"{ROW},0.5,0.4", "start: 0.5 s, expected 0 to 0.4 s"),

@@ -48,6 +48,7 @@ CARD = ModelCard(
     left_out=(0.01, 0.02, 0.5),
     beside=((0.1, 0.0), (0.2, 0.3)),
     event=Event(1, 0.75),
+    joint_sigma=(0.5, 1.32),
 )
 
 
@@ -69,7 +70,10 @@ def test_card_read_is_the_card_written():
     assert replace(read, skeleton=CARD.skeleton, kriging=CARD.kriging) == CARD
 
 
-OPTIONAL = ("performers", "roles", "sources", "kriging", "left_out", "event", "beside")
+OPTIONAL = (
+    *("performers", "roles", "sources", "kriging", "left_out", "event", "beside", "joint_sigma"),
+    "making",
+)
 
 
 @pytest.mark.parametrize("field", [f.name for f in fields(ModelCard) if f.name not in OPTIONAL])
@@ -89,11 +93,12 @@ def test_a_card_that_says_nothing_of_roles_has_none():
 
 def test_an_older_card_has_none_of_what_it_could_not_say():
     none = {"sources": "[]", "kriging": "null", "left_out": "[]", "event": "null", "beside": "[]"}
+    none["joint_sigma"] = "[]"
     none = {f"posefield.{name}": text for name, text in none.items()}
     older = {key: text for key, text in card.dump(CARD).items() if key not in none}
     read = card.load(older)
     assert (read.sources, read.kriging, read.left_out, read.event) == ((), None, (), None)
-    assert read.beside == ()
+    assert (read.beside, read.joint_sigma) == ((), ())
     assert card.dump(read) == older | none
 
 

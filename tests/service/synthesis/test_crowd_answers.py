@@ -45,7 +45,7 @@ def asked(model, count=COUNT, **given):
         rng.integers(0, 1 + len(card.performers), count),
         rng.integers(0, len(card.levels), count),
         "travelling",
-        "warn",
+        "ok",
     )
     return replace(question, **given)
 
@@ -85,6 +85,8 @@ def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
         assert np.abs(places[row] - expected).max() < FLOAT32
         assert found.duration[row] == pytest.approx(trust.duration, rel=1e-5)
         assert found.sigma[row] == pytest.approx(trust.sigma, rel=1e-3)
+        assert found.supported[row] == trust.supported
+    assert set(found.supported) == {True, False}
     assert np.array_equal(found.levels, question.detail)
     assert found.error_px is None and found.warnings == ()
     # Negative controls: another heading, and another level.
@@ -301,13 +303,25 @@ def test_missing_and_unknown_controls_are_named(model):
 def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     high = model.session.card.control("stature").maximum
     question = broken(model, "controls/stature", 9, high + 0.05)
-    found = crowd.poses(model, question)
-    assert len(found.warnings) == 1
-    assert "stature of 1 characters" in found.warnings[0]
-    assert "the first is character 9" in found.warnings[0]
+    assert crowd.poses(model, question).warnings == ()
+    found = crowd.poses(model, replace(question, extrapolate="warn"))
+    outside, gap = found.warnings
+    assert "stature of 1 characters" in outside
+    assert "the first is character 9" in outside
+    beside = ~found.supported & (np.arange(COUNT) != 9)
+    assert f"{np.count_nonzero(beside)} characters; the first, " in gap
+    assert f"character {int(np.argmax(beside))}, lies in a gap" in gap
     with pytest.raises(OutsideSamples, match="the first is character 9") as caught:
         crowd.poses(model, replace(question, extrapolate="refuse"))
     assert (caught.value.field, caught.value.index) == ("controls/stature", 9)
+
+
+def test_gaps_alone_are_refused_too(model):
+    question = replace(asked(model), extrapolate="refuse")
+    first = int(np.argmin(crowd.poses(model, asked(model)).supported))
+    with pytest.raises(OutsideSamples, match="in a gap") as caught:
+        crowd.poses(model, question)
+    assert (caught.value.field, caught.value.index) == ("controls", first)
 
 
 def test_a_heading_of_many_turns_is_the_one_within_a_turn(model):

@@ -54,6 +54,13 @@ def test_the_answer_for_a_name_is_that_of_its_label(model):
         assert not np.array_equal(answer.rotations[0], rotations[1])
 
 
+def test_whether_a_performer_was_seen_is_said_where_any_are_told_apart(model, plain):
+    seen = [model.pose(POINT, [0.5], "warn", who).trust.facts() for who in ("tall", None)]
+    assert [facts["performer_seen"] for facts in seen] == [True, False]
+    assert seen[0]["warnings"] == seen[1]["warnings"]
+    assert "performer_seen" not in plain.pose(POINT, [0.5], "warn").trust.facts()
+
+
 def test_nobody_is_asked_for_unless_somebody_is(model):
     silent, nobody = model.pose(POINT, [0.5], "warn"), model.pose(POINT, [0.5], "warn", None)
     assert differ(silent, nobody) == 0.0

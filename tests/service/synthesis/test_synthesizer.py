@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import library
 from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 # The graph answers in float32, and sums a batch in another order than one row.
@@ -215,7 +217,70 @@ def test_outside_the_samples_a_client_may_ask_for_a_refusal(model):
 def test_the_bounds_of_the_card_are_inside(model):
     for end in ("minimum", "maximum"):
         corner = {c.name: getattr(c, end) for c in model.session.card.controls}
-        assert model.pose(corner, [0.0], "refuse").trust.warnings == ()
+        # Nobody is smallest, sitting and reaching lowest at once: a corner may be a gap.
+        warnings = model.pose(corner, [0.0], "warn").trust.warnings
+        assert not any("outside" in warning for warning in warnings)
+        beyond = {**corner, "turn": 1.01 * corner["turn"]}
+        assert "outside" in model.pose(beyond, [0.0], "warn").trust.warnings[0]
+
+
+def between(model):
+    """A point within the box that is like nothing captured: the hand high and the body sitting."""
+    card = model.session.card
+    rng = np.random.Generator(np.random.PCG64(4))
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    drawn = rng.uniform(low, high, (200, len(low)))
+    point = drawn[np.argmin(model.door.support.holds(drawn))]
+    return {c.name: float(v) for c, v in zip(card.controls, point, strict=True)}
+
+
+def test_a_gap_of_what_was_sampled_is_told_by_a_flag_and_as_it_was_asked_to(model):
+    gap = between(model)
+    ok, warned = (model.pose(gap, [0.0], policy).trust for policy in ("ok", "warn"))
+    assert not ok.supported and not warned.supported
+    assert ok.warnings == ()
+    assert len(warned.warnings) == 1 and "in a gap" in warned.warnings[0]
+    with pytest.raises(OutsideSamples, match="in a gap") as caught:
+        model.pose(gap, [0.0], "refuse")
+    assert caught.value.field == "controls"
+    # Negative control: what was captured is answered whatever is asked.
+    assert model.pose(POINT, [0.0], "refuse").trust.supported
+
+
+def test_outside_the_samples_a_client_may_ask_for_the_flag_alone(model):
+    trust = model.pose(OUTSIDE, [0.0], "ok").trust
+    assert trust.warnings == () and not trust.supported
+    assert trust.facts()["supported"] is False
+
+
+def test_a_little_beyond_a_control_is_said_and_supported(model):
+    card = model.session.card
+    example = dict(zip((c.name for c in card.controls), card.examples[20], strict=True))
+    turn = card.control("turn")
+    beyond = {**example, "turn": turn.maximum + 0.02 * (turn.maximum - turn.minimum)}
+    trust = model.pose(beyond, [0.0], "warn").trust
+    assert "outside" in trust.warnings[0]
+    assert trust.supported == model.door.support.held(list(trust.controls.values()))
+
+
+def test_sigma_of_each_joint_is_its_share_of_sigma(model):
+    trust = model.pose(POINT, [0.0], "warn").trust
+    assert trust.joint_sigma == () and "joint_sigma" not in trust.facts()
+    found = model.clip(ClipQuestion(POINT, joint_sigma=True)).trust
+    card = model.session.card
+    assert len(found.joint_sigma) == len(card.skeleton) == len(card.joint_sigma)
+    shares = np.array(found.joint_sigma) / trust.sigma
+    assert shares == pytest.approx(card.joint_sigma, abs=1e-4)
+    assert np.sqrt(np.mean(np.square(shares))) == pytest.approx(1.0, abs=0.01)
+    assert found.facts()["joint_sigma"] == list(found.joint_sigma)
+    assert model.by_joint(trust) == found
+
+
+def test_a_model_that_cannot_say_how_far_its_joints_err_says_so(model):
+    old = replace(model.session, card=replace(model.session.card, joint_sigma=()))
+    with pytest.raises(InvalidField, match="train it again") as caught:
+        Synthesizer("old", old).clip(ClipQuestion(POINT, joint_sigma=True))
+    assert caught.value.field == "joint_sigma"
 
 
 def test_farther_outside_there_is_less_trust(model):

@@ -6,6 +6,7 @@ import { choose, ladder, pixels } from "../detail.ts";
 import * as door from "./door.ts";
 import type { Answers, Graph, Rows } from "./graph.ts";
 import { turned, turnRoot } from "./plane.ts";
+import * as support from "./support.ts";
 
 /** Levels differ in how long a clip takes; so does float32. */
 const SLACK = 0.1;
@@ -47,9 +48,17 @@ export async function crowd(
     boneOffsets: block.offsets,
     duration: block.duration,
     sigma: block.sigma,
+    supported: supported(card, rows),
     levels,
     errorPx,
   };
+}
+
+function supported(card: ModelCard, { count, controls }: Rows): boolean[] {
+  const [own, width] = [support.of(card), card.controls.length];
+  return Array.from({ length: count }, (_, row) =>
+    own.holds([...controls.subarray(row * width, (row + 1) * width)]),
+  );
 }
 
 function size(asked: CrowdQuestion): number {

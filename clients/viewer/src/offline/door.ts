@@ -54,6 +54,8 @@ export function warnings(card: ModelCard, values: readonly number[]): string[] {
   });
 }
 
+export const GAP = "these controls lie in a gap of what was sampled: nothing like it was captured";
+
 export function sampled({ minimum, maximum }: Control, value: number): boolean {
   const slack = SLACK * (maximum - minimum);
   return value >= minimum - slack && value <= maximum + slack;

@@ -22,6 +22,7 @@ import * as door from "./door.ts";
 import { type Answers, Graph, type Ort } from "./graph.ts";
 import { sigma } from "./grid.ts";
 import { straightened } from "./plane.ts";
+import * as support from "./support.ts";
 
 /** The graph takes a time after the end for the end, s. */
 const AFTER = 1e9;
@@ -34,6 +35,7 @@ interface Asked {
   readonly performer: string | null;
   readonly level: number;
   readonly warnings: string[];
+  readonly supported: boolean;
 }
 
 export class Offline implements Source {
@@ -118,16 +120,19 @@ export class Offline implements Source {
 
   #asked(question: Pick<ClipQuestion, "controls" | "performer" | "level" | "extrapolate">): Asked {
     const values = door.point(this.#card, question.controls);
-    const warnings = door.warnings(this.#card, values);
-    if (question.extrapolate === "refuse" && warnings.length)
-      throw new door.Refused(warnings.join("; "));
+    const policy = question.extrapolate ?? "warn";
+    const found = door.warnings(this.#card, values);
+    const supported = support.of(this.#card).holds(values);
+    const said = found.length || supported ? found : [door.GAP];
+    if (policy === "refuse" && said.length) throw new door.Refused(said.join("; "));
     return {
       controls: question.controls,
       point: Float32Array.from(values),
       who: Int32Array.of(door.performer(this.#card, question.performer)),
       performer: question.performer ?? null,
       level: door.level(this.#card, question.level ?? 0),
-      warnings,
+      warnings: policy === "warn" ? said : [],
+      supported,
     };
   }
 
@@ -136,10 +141,13 @@ export class Offline implements Source {
     return this.#graph.run({ count: 1, controls: asked.point, times, who: asked.who }, asked.level);
   }
 
-  #trust({ controls, performer, level, warnings }: Asked, found: Answers): Trust {
+  #trust(asked: Asked, found: Answers): Trust {
+    const { controls, performer, level, supported, warnings } = asked;
     const [duration, sigma] = [found.duration[0]!, found.sigma[0]!];
     const model = this.#card.identity;
-    return { model, controls, performer, level, duration, sigma, warnings } as Trust;
+    const seen = this.#card.performers.length ? { performer_seen: performer !== null } : {};
+    const own = { model, controls, performer, level, duration, sigma, supported, warnings };
+    return { ...own, ...seen } as Trust;
   }
 }
 

@@ -1,0 +1,46 @@
+"""What poses and clips are held to: measured controls, and joints that are to be in places."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
+
+import msgspec
+from msgspec import UNSET
+
+from posefield_client import asking
+from posefield_client.errors import WrongQuestion
+from posefield_client.generated import Target
+
+Exact = Literal["auto", "none"] | str | Sequence[str]
+"""The usual, nothing, or the names of measured controls."""
+
+Targets = Iterable[Target | Mapping[str, Any]]
+
+
+def said(exact: Exact | None, targets: Targets | None, pin_feet: bool | None) -> dict[str, Any]:
+    """Those that are said, as fields of a question."""
+    found: dict[str, Any] = {}
+    if exact is not None:
+        found["exact"] = _exact(exact)
+    if targets is not None:
+        found["targets"] = tuple(_target(place, each) for place, each in enumerate(targets))
+    if pin_feet is not None:
+        found["pin_feet"] = bool(pin_feet)
+    return found
+
+
+def _exact(given: Exact) -> Any:
+    if isinstance(given, str):
+        return given if given in ("auto", "none") else (given,)
+    return tuple(given)
+
+
+def _target(place: int, given: Target | Mapping[str, Any]) -> Target:
+    """The target; WrongQuestion where it is none, or says not just one moment."""
+    name = f"target {place}"
+    try:
+        found = msgspec.convert(asking.sayable(name, given), Target)
+    except msgspec.ValidationError as fault:
+        raise WrongQuestion(f"{name}: {fault}") from None
+    if (found.time is UNSET) == (found.at is UNSET):
+        raise WrongQuestion(f"{name}: expected one of time and at")
+    return found

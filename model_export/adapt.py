@@ -1,0 +1,95 @@
+"""A trained model and a few clips of somebody new to a model that knows them too.
+
+Nothing of the original data is needed: the model's own samples are motions, which it holds reduced.
+The new clips are aligned to what the model expects of somebody never seen, what of them its bases
+cannot say extends these, and every field is solved again with the parameters that it has.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import canonical, extend, kriging, new_fields, threads
+from model_export import travel as travels
+from model_export.canonical import Known, Moved
+from model_export.decoder import Decoder
+from model_export.extend import Extended
+from model_export.field_bank import FieldBank
+from model_export.ingest import Example
+from model_export.kriging import Kriging
+from model_export.model import Model
+from model_export.new_fields import Laid
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """A model that knows one performer more, and what was seen on the way.
+
+    missed (k,): mean squared joint distance, m², of each new clip from what all others predict.
+    """
+
+    model: Model
+    moved: Moved
+    extended: Extended
+    missed: Floats
+
+
+def adapt(known: Known, examples: Sequence[Example], performer: str) -> Adapted:
+    """Model that also knows a performer of some examples, by a name that it does not know yet."""
+    begun = canonical.begin(known, examples)
+    return solve(known, canonical.move(known, begun), performer)
+
+
+def solve(known: Known, moved: Moved, performer: str) -> Adapted:
+    """The same of examples that have been moved to the model's canonical time."""
+    with threads.one():
+        parents, weights = known.skeleton.parents, known.joint_weights
+        extended = extend.extend(known.model, parents, weights, moved.numbers, known.truncation)
+        laid = new_fields.lay(known.model.bank, known.groups, moved.examples, performer)
+        return _solved(known.model, moved, extended, laid)
+
+
+def _solved(model: Model, moved: Moved, extended: Extended, laid: Laid) -> Adapted:
+    reduced = extended.full.truncated(extended.ranks)
+    pose = kriging.solve(laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2])
+    bones, proportions = new_fields.bones(laid, model.bank, model.proportions, moved.offsets)
+    durations = np.log(moved.aligned.durations)[:, None]
+    new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
+    solved = {
+        name: new_fields.solve(laid, model.bank, name, values) for name, values in new.items()
+    }
+    # In the order in which the model has them.
+    others = {name: solved.get(name, bones) for name in model.bank.others}
+    missed, sill = _missed(model.bank, laid, moved, extended)
+    bank = FieldBank(laid.low, laid.high, laid.performers, pose, others, sill)
+    own = extended.tensor
+    decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
+    adapted = Model(bank, model.timing, decoder, proportions, model.travel)
+    return Adapted(adapted, moved, extended, missed)
+
+
+def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tuple[Floats, float]:
+    """Mean squared joint distance (k,), m², of the new clips from what all others predict, and the
+    sill, m², with them."""
+    hyper, points, k = laid.hyper(old.pose.hyper), laid.samples.points, len(moved.examples)
+    left_out = kriging.leave_out(hyper, points, laid.samples.groups)
+    variances = kriging.left_out_variances(hyper, points, left_out)[-k:]
+    residuals = left_out[-k:] @ extended.full.motions
+    frames = extended.tensor.values.shape[1]
+    missed = np.sum(np.square(residuals), axis=1) / (extended.tensor.weight * frames)
+    for values in moved.travels.values():
+        missed += travels.spread(_travel_residuals(old, laid, values))
+    n = len(points) - k
+    return missed, float((n * old.sill + np.sum(missed / variances)) / (n + k))
+
+
+def _travel_residuals(old: FieldBank, laid: Laid, new: Floats) -> Floats:
+    """Residuals (k, 3) of the new clips' travel, left out."""
+    field, both = old.others["travel"], np.vstack([old.at_samples("travel"), new])
+    if isinstance(field, Kriging):
+        hyper, groups = laid.hyper(field.hyper), laid.samples.groups
+        left_out = kriging.leave_out(hyper, laid.samples.points, groups)
+        return left_out[-len(new) :] @ both
+    return laid.samples.from_mean(both)[-len(new) :]

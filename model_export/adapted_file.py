@@ -1,0 +1,232 @@
+"""An adapted model to one file: levels of detail, card, and the gate that every file passes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from model_export import adapt, canonical, cost, exams, export, fidelity, new_clips, thin, threads
+from model_export.adapt import Adapted
+from model_export.exams import Exam
+from model_export.export import FEW_VALUES, Exported
+from model_export.fidelity import Judge, Moment
+from model_export.ingest import Example
+from model_export.kriging import Kriging
+from model_export.levels import FINALS, QUESTIONS, Laddered, Workshop
+from model_export.reopen import Reopened
+from service.motion.card import Control, ModelCard
+from service.motion.conventions import Floats
+from service.motion.detail import Level
+from service.motion.errors import InvalidField
+
+
+@dataclass(frozen=True)
+class Newcomer:
+    """Somebody new to a model: name, clips, and the licence of these, with notes on how they were
+    read."""
+
+    performer: str
+    examples: Sequence[Example]
+    licence: str
+    notes: Sequence[str] = ()
+
+
+def refuse_name(card: ModelCard, performer: str) -> None:
+    """Raise InvalidField for a model that tells nobody apart, and a name that it knows or that is
+    none."""
+    if not card.performers:
+        raise InvalidField(
+            "performer", f"model {card.name} tells no performers apart, expected one that does"
+        )
+    if performer in card.performers:
+        known = ", ".join(card.performers)
+        raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
+    if not performer.strip():
+        raise InvalidField("performer", f"{performer!r}, expected a name")
+
+
+def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
+    """File of a model that knows a newcomer too; the same file and clips give the same bytes.
+
+    Raises InvalidField for a name that it cannot be asked for by, TrainingError for clips of
+    another action, and as `export` does.
+    """
+    refuse_name(reopened.card, newcomer.performer)
+    with threads.one():
+        begun = canonical.begin(reopened.known, newcomer.examples)
+        examples = new_clips.measured_again(reopened, newcomer.examples, begun)
+        moved = canonical.move(reopened.known, examples)
+        canonical.refuse_strangers(reopened.known, moved)
+        adapted = adapt.solve(reopened.known, moved, newcomer.performer)
+        laddered = _ladder(reopened, adapted)
+        return export.finished(
+            laddered.model,
+            lambda parity: _card(reopened, adapted, newcomer, laddered.levels, parity),
+        )
+
+
+def _ladder(reopened: Reopened, adapted: Adapted) -> Laddered:
+    """Model with levels as good as those of the one that it was made of.
+
+    Joints are compared with those of the finest level: what that had lost before is added.
+    """
+    shop = _workshop(reopened, adapted)
+    finest, *coarser = reopened.card.levels
+    model = shop.model
+    for level in coarser:
+        allowed = np.sqrt(max(level.rms**2 - finest.rms**2, finest.rms**2))
+        model = shop.lowered(model, level.joints, float(allowed))
+    every = range(len(model.decoder.rungs))
+    return Laddered(model, tuple(_as_lost(shop.level(model, n), finest) for n in every))
+
+
+def _as_lost(found: Level, finest: Level) -> Level:
+    """Level whose errors count in those of the old finest one: both are of different parts of the
+    motions, so that their squares add."""
+
+    def both(name: str) -> float:
+        return _short(np.hypot(getattr(found, name), getattr(finest, name)))
+
+    return replace(
+        found,
+        rms=both("rms"),
+        p99=both("p99"),
+        max=both("max"),
+        pose=both("pose"),
+        effector=None if found.effector is None else both("effector"),
+    )
+
+
+def _workshop(reopened: Reopened, adapted: Adapted) -> Workshop:
+    known, extended = reopened.known, adapted.extended
+    parents, moment = known.skeleton.parents, _moment(reopened.card)
+    bank = thin.ordered(adapted.model.bank)
+    offsets = adapted.model.proportions.numpy(adapted.model.bank.at_samples("offsets"))
+    whole = fidelity.positions(extended.tensor, extended.tensor.values, parents, offsets)
+    uncut = exams.uncut(adapted.model, extended.full)
+
+    def exam(questions: int) -> Exam:
+        return exams.against(uncut, parents, moment, questions)
+
+    return Workshop(
+        extended.full,
+        replace(adapted.model, bank=bank),
+        {"rms": 1.0},
+        Judge(extended.tensor, parents, offsets, known.joint_weights, moment, whole),
+        exam(QUESTIONS),
+        exam(FINALS),
+        thin.lesson(bank),
+    )
+
+
+def _moment(card: ModelCard) -> Moment | None:
+    if card.event is None:
+        return None
+    return Moment(card.event.joint, round((card.frames - 1) * card.event.share))
+
+
+def _card(
+    reopened: Reopened,
+    adapted: Adapted,
+    newcomer: Newcomer,
+    levels: tuple[Level, ...],
+    parity: float,
+) -> ModelCard:
+    """The old card with what is new. The family's skeleton at rest stays what it was: whoever has
+    bound a character to it need not do it again."""
+    old, bank, clips = reopened.card, adapted.model.bank, adapted.moved.examples
+    own = tuple(tuple(map(float, clip.controls)) for clip in clips)
+    seconds = (*old.durations, *adapted.moved.aligned.durations.tolist())
+    left_out = (*old.left_out, *map(_short, np.sqrt(adapted.missed)))
+    fields = bank.others.items()
+    made = {n: export.solved_with(f.hyper) for n, f in fields if isinstance(f, Kriging)}
+    return replace(
+        old,
+        controls=_controls(old.controls, np.array([*old.examples, *own])),
+        samples=len(bank.pose.samples),
+        levels=levels,
+        durations=(min(seconds), max(seconds)),
+        performers=bank.performers,
+        examples=(*old.examples, *own),
+        moved_by=tuple(np.argmax(bank.pose.samples[:, len(bank.low) :], axis=1).tolist()),
+        sources=(*old.sources, *(clip.row.source for clip in clips)),
+        left_out=left_out,
+        kriging=export.plainly(bank.pose.hyper),
+        making=replace(reopened.making, fields=made),
+        diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
+        provenance=_provenance(reopened, newcomer),
+    )
+
+
+def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
+    """Controls with what was sampled of them (N, d)."""
+    return tuple(
+        replace(
+            control,
+            minimum=float(own.min()),
+            maximum=float(own.max()),
+            default=float(np.sort(own)[len(own) // 2]),
+            values=tuple(np.unique(own).tolist()) if len(np.unique(own)) <= FEW_VALUES else (),
+        )
+        for control, own in zip(old, values.T, strict=True)
+    )
+
+
+def _diagnostics(
+    reopened: Reopened,
+    adapted: Adapted,
+    newcomer: Newcomer,
+    left_out: Sequence[float],
+    parity: float,
+) -> dict[str, Any]:
+    """The old ones, but for what the new clips change."""
+    old, model = reopened.card.diagnostics, adapted.model
+    freedoms, frames, samples = old["tensor"]
+    shape = freedoms, frames, samples + len(newcomer.examples)
+    kept = model.decoder.reduced.core.shape
+    compression = asdict(cost.compressed(shape, kept, len(model.bank.low)))
+    return {
+        **old,
+        "compression": {name: _short(ratio) for name, ratio in compression.items()},
+        "leave_one_out_rms_m": _short(np.sqrt(np.mean(np.square(left_out)))),
+        "scales": [_short(scale) for scale in model.bank.pose.hyper.scales],
+        "tensor": list(shape),
+        "parity_m": float(f"{parity:.1e}"),
+        "notes": [*old["notes"], *_notes(reopened, adapted, newcomer)],
+    }
+
+
+def _notes(reopened: Reopened, adapted: Adapted, newcomer: Newcomer) -> list[str]:
+    moved, names = adapted.moved, reopened.card.skeleton.names
+    listed = ", ".join(example.row.source for example in moved.examples)
+    parent = f"{reopened.card.name}@{reopened.digest[:16]}"
+    said = f"adapted from {parent} to {newcomer.performer!r} by {len(moved.examples)} clips"
+    adapting = f"{said}: {listed}"
+    return [adapting, *newcomer.notes, *export.found(moved.findings, moved.examples, names)]
+
+
+def _provenance(reopened: Reopened, newcomer: Newcomer) -> Mapping[str, Any]:
+    """Where the old model came from, what it was, and where the new clips come from."""
+    old = reopened.card.provenance
+    step = {
+        "parent_sha256": reopened.digest,
+        "performer": newcomer.performer,
+        "clips": len(newcomer.examples),
+        "data_sha256": export.digest(
+            {f"{i} {e.row.place.name}": e for i, e in enumerate(newcomer.examples)}
+        ),
+        "licence": newcomer.licence,
+    }
+    return {
+        **old,
+        "licence": f"{old['licence']}; clips of {newcomer.performer}: {newcomer.licence}",
+        "clips": old["clips"] + len(newcomer.examples),
+        "adapted": [*old.get("adapted", []), step],
+        "versions": {name: version(name) for name in old["versions"]},
+    }
+
+
+def _short(value: Any) -> float:
+    return float(f"{float(value):.4g}")

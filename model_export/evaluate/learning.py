@@ -1,0 +1,168 @@
+"""What suggested clips are worth: the procedural family from 40 samples to 92.
+
+Samples are added as they are suggested, by controls that the body can do, or as chance has it, each
+with the noise of the family; what is trained from them is compared with the truth.
+"""
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, cpu_count, delayed
+
+from model_export import ingest, recipe, threads
+from model_export.evaluate import errors, methods, motion, truth
+from model_export.evaluate.methods import Asked
+from model_export.evaluate.protocol import RATE, Report
+from model_export.recipe import Recipe
+from model_export.sample import family, write
+from model_export.sample import truth as truths
+from model_export.sample.controls import Controls
+from model_export.sample.family import Sample
+from model_export.train import Trained, train
+from service.motion import support, worth
+from service.motion.conventions import Floats, Indices
+
+START, END = 40, family.COUNT
+SIZES = (START, 53, 66, 79, END)
+CANDIDATES, ASKED, SEED = 600, 150, 31
+SUGGESTED, CHANCE = "suggested", "at random"
+
+
+@dataclass(frozen=True)
+class Learning:
+    """Mean global and root-relative distance to the truth, m, at so many samples, by how they were
+    added (2, S)."""
+
+    sizes: tuple[int, ...]
+    errors: dict[str, Floats]
+
+    @property
+    def reached(self) -> float:
+        """Samples at which those suggested are as good as all of those added at random."""
+        own, aim = self.errors[SUGGESTED][0], self.errors[CHANCE][0, -1]
+        below = int(np.argmax(own <= aim)) if np.any(own <= aim) else len(own)
+        if below in (0, len(own)):
+            return float(self.sizes[min(below, len(own) - 1)])
+        before, after = own[below - 1], own[below]
+        share = (before - aim) / (before - after)
+        return float(np.interp(share, (0, 1), self.sizes[below - 1 : below + 1]))
+
+    @property
+    def faster(self) -> float:
+        """How many random samples one that is suggested is worth."""
+        return (self.sizes[-1] - self.sizes[0]) / (self.reached - self.sizes[0])
+
+
+def measure(report: Report, sizes: Sequence[int] = SIZES) -> Learning:
+    """Learning at some sizes, the smallest first; the same at every call."""
+    trials = _trials()
+    parts = [(way, size) for way in (SUGGESTED, CHANCE) for size in sizes[way == CHANCE :]]
+    with tempfile.TemporaryDirectory() as scratch:
+        folders = [Path(scratch) / f"{way.split()[-1]}_{size}" for way, size in parts]
+        for (way, size), folder in zip(parts, folders, strict=True):
+            write.some(folder, trials[way][:size])
+        found = dict(zip(parts, _done([delayed(_error)(f) for f in folders], report), strict=True))
+    found[CHANCE, sizes[0]] = found[SUGGESTED, sizes[0]]
+    ways = (SUGGESTED, CHANCE)
+    return Learning(tuple(sizes), {w: np.array([found[w, size] for size in sizes]).T for w in ways})
+
+
+def _done(jobs: Sequence[object], report: Report) -> list[tuple[float, float]]:
+    parallel = Parallel(n_jobs=min(cpu_count(), len(jobs)), return_as="generator")
+    found = []
+    for count, part in enumerate(parallel(jobs), start=1):
+        report(count, len(jobs))
+        found.append(part)
+    return found
+
+
+def _trials() -> dict[str, list[Sample]]:
+    """Samples by how they were added: the same at first, and then 52 of each kind."""
+    rng = np.random.Generator(np.random.PCG64(SEED))
+    known = list(family.samples())
+    first = [known[i] for i in sorted(rng.choice(len(known), START, replace=False).tolist())]
+    # Not those at which the truth is asked.
+    candidates = truth.points(truth.POINTS + CANDIDATES)[truth.POINTS :]
+    ways = {SUGGESTED: _suggested(first, candidates), CHANCE: rng.permutation(len(candidates))}
+    added = {
+        way: [candidates[i].tolist() for i in order[: END - START]] for way, order in ways.items()
+    }
+    return {
+        way: [*first, *(_sample(point, rng) for point in points)] for way, points in added.items()
+    }
+
+
+def _suggested(first: Sequence[Sample], candidates: Floats) -> Indices:
+    """What a model of the first samples ranks highest."""
+    controls = np.array([_row(sample.controls) for sample in first])
+    own = support.of(controls)
+    with tempfile.TemporaryDirectory() as scratch:
+        trained = _trained(write.some(Path(scratch) / "first", first))[1]
+    hyper = trained.pose.hyper
+    ranked = worth.rank(hyper, own.scaled(candidates), own.scaled(controls), END - START)
+    return np.array([at for at, _ in ranked])
+
+
+def _trained(recipe_file: Path) -> tuple[Recipe, Trained]:
+    own = recipe.read(recipe_file)
+    examples, _ = ingest.ingest(own, recipe_file.parent)
+    with threads.one():
+        return own, train(own, examples, lambda _: None)
+
+
+def _row(own: Controls) -> list[float]:
+    return [own.stature, own.hip_height, own.turn, own.target_height]
+
+
+def _sample(point: list[float], rng: np.random.Generator) -> Sample:
+    rounded = Controls(*(round(value, 4) for value in point))
+    return Sample("somebody", rounded, family.trial(rounded, rng))
+
+
+def _error(folder: Path) -> tuple[float, float]:
+    """Global and root-relative distance of what a family is trained to, m."""
+    own, trained = _trained(folder / "recipe.toml")
+    with threads.one():
+        points = truth.points(ASKED)
+        found = methods.ours(own, trained, Asked(points, [""] * len(points)))
+        captured = [motion.of_clip(truths.clip(list(p), RATE), None) for p in points]
+        pairs = zip(found, captured, strict=True)
+        mean = errors.mean([errors.compare(made, true, ()) for made, true in pairs])
+    return mean.absolute.mean, mean.relative.mean
+
+
+def facts(found: Learning) -> dict[str, object]:
+    """Figures as JSON holds them."""
+    return {
+        "samples": list(found.sizes),
+        **{
+            way.replace(" ", "_"): {
+                "global_cm": [round(100 * e, 3) for e in own[0].tolist()],
+                "relative_cm": [round(100 * e, 3) for e in own[1].tolist()],
+            }
+            for way, own in found.errors.items()
+        },
+        "reached": round(found.reached, 1),
+        "faster": round(found.faster, 2),
+    }
+
+
+def table(found: Learning) -> str:
+    """The curve in Markdown."""
+    return "\n".join(_lines(found))
+
+
+def _lines(found: Learning) -> Iterator[str]:
+    yield "| samples | " + " | ".join(map(str, found.sizes)) + " |"
+    yield "|---" * (1 + len(found.sizes)) + "|"
+    for way, own in found.errors.items():
+        for name, row in zip(("global", "relative"), own, strict=True):
+            yield f"| {way}, {name} | " + " | ".join(f"{100 * e:.2f}" for e in row) + " |"
+    yield ""
+    yield (
+        f"Centimetres from the truth. Suggested samples are at {found.reached:.0f} where random "
+        f"ones are at {found.sizes[-1]}: {found.faster:.1f} times as fast."
+    )

@@ -1,0 +1,117 @@
+"""A model's tensor with more clips in it than its bases were made for.
+
+The old samples are what the model holds of them: reduced motions. What of the new clips the bases
+of degrees of freedom and frames cannot say becomes further columns of these, as many as keep what
+is left out within what the model itself was allowed to leave out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model_export import hosvd, metric, tensor
+from model_export.chart import Chart
+from model_export.decoder import Decoder
+from model_export.hosvd import Multilinear
+from model_export.model import Model
+from model_export.tensor import CONSTANT, MotionTensor
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Extended:
+    """The old samples, then the new clips: tensor, its decomposition, and the ranks that lose
+    nothing of it."""
+
+    tensor: MotionTensor
+    full: Multilinear
+    ranks: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class _Space:
+    """The metric of the model's poses, and its degrees of freedom in it.
+
+    varies (D,): which degrees of freedom do. root, inverse (D', D'): to the metric's coordinates
+    and back. directions (D', r1): orthonormal; turn (r1, r1): the core's coordinates to theirs.
+    """
+
+    varies: Floats
+    root: Floats
+    inverse: Floats
+    directions: Floats
+    turn: Floats
+
+
+def extend(
+    model: Model, parents: tuple[int, ...], joint_weights: Floats, numbers: Floats, allowed: float
+) -> Extended:
+    """Tensor of a model's samples and new pose vectors (k, T, D).
+
+    joint_weights (J,); allowed: root mean square distance that leaving out may cost these, m.
+    """
+    decoder, weight = model.decoder, float(joint_weights.sum())
+    old = _reduced(decoder)
+    space = _space(model, parents, joint_weights, numbers, old)
+    centred = (numbers - decoder.mean)[..., space.varies] @ space.root
+    # Half of the squared distance for either mode.
+    clips, frames = numbers.shape[:2]
+    budget = allowed**2 * weight * clips * frames / 2.0
+    directions = _more(space.directions, centred, budget)
+    coordinates = (centred @ directions).swapaxes(1, 2)
+    times = np.linalg.qr(decoder.reduced.bases[1])[0]
+    longer = _more(times, coordinates, budget)
+    new = (coordinates @ longer @ longer.T).transpose(1, 2, 0)
+    turned = hosvd.mode_dot(old, space.turn, 0)
+    turned = np.pad(turned, ((0, len(new) - len(turned)), (0, 0), (0, 0)))
+    whole = _tensor(np.concatenate([turned, new], axis=2), space, directions, decoder, weight)
+    full = hosvd.decompose(whole.values)
+    samples = min(decoder.reduced.core.shape[2] + clips, full.core.shape[2])
+    return Extended(whole, full, (len(new), longer.shape[1], samples))
+
+
+def _reduced(decoder: Decoder) -> Floats:
+    """Motions (r1, T, n) of the samples in the coordinates of the first mode."""
+    core, (_, times, samples) = decoder.reduced.core, decoder.reduced.bases
+    return hosvd.mode_dot(hosvd.mode_dot(core, times, 1), samples, 2)
+
+
+def _space(
+    model: Model,
+    parents: tuple[int, ...],
+    joint_weights: Floats,
+    numbers: Floats,
+    old: Floats,
+) -> _Space:
+    decoder, own_chart = model.decoder, Chart(model.decoder.means)
+    known = decoder.mean + old.transpose(2, 1, 0) @ decoder.directions
+    offsets = model.proportions.numpy(model.bank.at_samples("offsets"))
+    gram = tensor.gram(known, own_chart, parents, offsets, joint_weights)
+    moves = np.ptp(numbers.reshape(-1, numbers.shape[-1]), axis=0) > CONSTANT
+    varies = moves | np.any(decoder.directions != 0.0, axis=0)
+    root, inverse = metric.whitening(gram[np.ix_(varies, varies)])
+    directions, turn = np.linalg.qr((decoder.directions[:, varies] @ root).T)
+    return _Space(varies, root, inverse, directions, turn)
+
+
+def _more(basis: Floats, rows: Floats, budget: float) -> Floats:
+    """Orthonormal basis (D, r) with as few further columns as leave a squared distance within a
+    budget out of rows (..., D)."""
+    flat = rows.reshape(-1, rows.shape[-1])
+    left = flat - flat @ basis @ basis.T
+    values, vectors = np.linalg.eigh(left.T @ left)
+    kept = np.count_nonzero(np.cumsum(np.maximum(values, 0.0)) > budget)
+    found = vectors[:, len(values) - kept :]
+    # What rounding has left of the old columns in them.
+    found, _ = np.linalg.qr(found - basis @ (basis.T @ found))
+    return np.hstack([basis, found])
+
+
+def _tensor(
+    values: Floats, space: _Space, directions: Floats, decoder: Decoder, weight: float
+) -> MotionTensor:
+    whiten, unwhiten = np.zeros((2, len(values), len(decoder.mean)))
+    whiten[:, space.varies] = directions.T @ space.root
+    unwhiten[:, space.varies] = directions.T @ space.inverse
+    own_chart = Chart(decoder.means)
+    return MotionTensor(values, decoder.mean, whiten, unwhiten.T, own_chart, weight)

@@ -1,0 +1,195 @@
+"""Files of new clips to examples of a model that is there: checked against its card.
+
+Controls that the card says how to measure are measured, of the clip that a model would be trained
+from; all others stand in a table.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from model_export import data, ingest, measured, table
+from model_export.ingest import Example
+from model_export.reopen import Reopened
+from model_export.table import Row, Table
+from service.motion import bvh, measure
+from service.motion.card import Control
+from service.motion.clip import Clip
+from service.motion.conventions import Floats
+from service.motion.errors import RecipeError
+from service.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Source:
+    """What the motion files leave unsaid, as in a recipe."""
+
+    metres_per_unit: float
+    up: Literal["y", "z"]
+    root_offset: Literal["replace", "add"] | None = None
+
+
+def of_files(
+    reopened: Reopened, paths: Sequence[Path], source: Source, performer: str
+) -> tuple[list[Example], list[str]]:
+    """Examples of whole files, whose controls are all measured, and notes on what was assumed.
+
+    Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
+    another skeleton; BvhError for a file that cannot be read.
+    """
+    typed = [control.name for control in reopened.card.controls if control.measure is None]
+    needed = [*typed, *reopened.making.landmarks]
+    if needed:
+        raise RecipeError(
+            paths[0],
+            f"nothing says {', '.join(map(repr, needed))}, which cannot be measured, expected a "
+            "table with a column for each",
+        )
+    rows = [_row(path, performer) for path in paths]
+    table.refuse_repeats(rows)
+    return _examples(reopened, rows, source, [{} for _ in rows])
+
+
+def of_table(
+    reopened: Reopened, path: Path, source: Source, performer: str
+) -> tuple[list[Example], list[str]]:
+    """Examples of a table's rows: `file` beside the table, `first_frame` and `last_frame` where
+    they are, landmarks, and controls by their names; those that can be measured may be missing.
+
+    Raises RecipeError naming line and column of what cannot be used, and as `of_files`.
+    """
+    own = table.opened(path)
+    landmarks, controls = reopened.making.landmarks, reopened.card.controls
+    typed = [control.name for control in controls if control.measure is None]
+    own.require(
+        {
+            "file": "the motion file",
+            **dict.fromkeys(landmarks, "a landmark"),
+            **dict.fromkeys(typed, "a control that cannot be measured"),
+        }
+    )
+    own.expect_only({"file", "first_frame", "last_frame", *landmarks, *(c.name for c in controls)})
+    rows, given = [], []
+    for line, record in own.records:
+        rows.append(_row_of(own, line, record, performer, tuple(landmarks)))
+        names = [control.name for control in controls if control.name in record]
+        given.append({name: own.number(line, record, name) for name in names})
+    table.refuse_repeats(rows)
+    return _examples(reopened, rows, source, given)
+
+
+def _row(path: Path, performer: str) -> Row:
+    return Row(path, str(path), None, performer, 0, None, np.zeros(0), ())
+
+
+def _row_of(
+    own: Table, line: int, record: dict[str, str], performer: str, landmarks: tuple[str, ...]
+) -> Row:
+    first = own.frame(line, record, "first_frame") if "first_frame" in record else 0
+    last = own.frame(line, record, "last_frame") if "last_frame" in record else None
+    if last is not None and last <= first:
+        raise RecipeError(own.name, f"frames {first} to {last}, expected at least two", line)
+    try:
+        place = data.find(Path(own.name).parent, record["file"])
+    except RecipeError as fault:
+        raise RecipeError(own.name, f"column 'file': {fault.message}", line) from fault
+    marks = tuple(own.frame(line, record, column) for column in landmarks)
+    return Row(place, own.name, line, performer, first, last, np.zeros(0), marks)
+
+
+def _examples(
+    reopened: Reopened, rows: Sequence[Row], source: Source, given: Sequence[Mapping[str, float]]
+) -> tuple[list[Example], list[str]]:
+    files = {str(row.place): bvh.read(row.place) for row in rows}
+    examples, notes = [], []
+    for row, values in zip(rows, given, strict=True):
+        example, said = _example(reopened, row, source, files[str(row.place)])
+        controls = _controls(reopened, example, values)
+        examples.append(replace(example, controls=controls))
+        notes += [note for note in said if note not in notes]
+    return examples, notes
+
+
+def _example(
+    reopened: Reopened, row: Row, source: Source, file: bvh.BvhFile
+) -> tuple[Example, list[str]]:
+    own = reopened.card
+    whole = bvh.to_clip(
+        file,
+        metres_per_unit=source.metres_per_unit,
+        up=source.up,
+        root_offset=source.root_offset or "replace",
+    )
+    cut, last = ingest.cut(whole, row)
+    clip, notes = _of_skeleton(cut, own.skeleton, row)
+    if source.root_offset is None:
+        notes += ingest.offset_notes(file, row)
+    clip, jumps, said = ingest.canonical(clip, row, own.cyclic, own.root == "in_place")
+    marks = ingest.landmarks(row, last)
+    nothing = np.full(len(own.controls), np.nan)
+    return Example(row, clip, nothing, marks, jumps), notes + said
+
+
+def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str]]:
+    """Clip of the family's joints alone, and a note on those that it has besides.
+
+    Raises RecipeError where joints are missing or hang on others.
+    """
+    own = clip.skeleton
+    missing = [name for name in family.names if name not in own.names]
+    if missing:
+        raise row.fault(
+            f"{row.place} has no joints {missing}, which the model has: expected a clip of the "
+            "same skeleton"
+        )
+    kept = [joint for joint, name in enumerate(own.names) if name in family.names]
+    smaller = ingest.keep(clip, kept) if ingest.closed(own, kept) else None
+    if smaller is None or not smaller.skeleton.same_tree(family):
+        raise row.fault(
+            f"{row.place} has the model's joints in another order or hierarchy: expected a clip of "
+            "the same skeleton"
+        )
+    others = [name for name in own.names if name not in family.names]
+    said = f"{row.place}: joints {others}, which the model does not have, were left out"
+    return smaller, [said] if others else []
+
+
+def measured_again(
+    reopened: Reopened, before: Sequence[Example], after: Sequence[Example]
+) -> list[Example]:
+    """Examples that begin elsewhere than before, with what was measured of them measured anew: of a
+    cycle on an arc, the way from one phase is not that from another."""
+    found = []
+    for old, new in zip(before, after, strict=True):
+        said = zip(reopened.card.controls, old.controls, _controls(reopened, old, {}), strict=True)
+        given = {control.name: float(own) for control, own, again in said if own != again}
+        found.append(replace(new, controls=_controls(reopened, new, given)))
+    return found
+
+
+def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) -> Floats:
+    """Controls (d,) of an example: those given, and the others measured or as they are."""
+    seen = measured.seen(example.clip)
+
+    def value(control: Control, own: float) -> float:
+        if control.name in given:
+            return given[control.name]
+        if control.measure is None:
+            return own
+        at = _landmark(reopened, control, example) * (len(example.clip) - 1)
+        found = measure.value(control.measure, replace(seen, landmark=at))
+        return round(found, measured.DECIMALS) + 0.0
+
+    pairs = zip(reopened.card.controls, example.controls.tolist(), strict=True)
+    return np.array([value(control, own) for control, own in pairs])
+
+
+def _landmark(reopened: Reopened, control: Control, example: Example) -> float:
+    """Share of the clip at which a control is measured, where that is at a landmark."""
+    if control.measure is None or control.measure.share is None:
+        return 0.0
+    times = np.array(list(reopened.making.landmarks.values()))
+    return example.landmarks[int(np.argmin(np.abs(times - control.measure.share)))]

@@ -1,0 +1,118 @@
+"""The fields of a model laid through new samples too, with the parameters that they have.
+
+Only where the samples lie in half-ranges may change: a sampled range that grows is a longer unit
+of its control, and the scales grow with it, so that all distances stay what they were.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model_export import kriging, samples
+from model_export.decoder import Proportions
+from model_export.field_bank import Constant, Field, FieldBank
+from model_export.fields import SAME_BONE
+from model_export.ingest import Example
+from model_export.kriging import Hyper
+from model_export.samples import Samples
+from model_export.tune import LABELS, NUGGETS, SCALES
+from service.motion.conventions import Floats, Indices
+from service.motion.field import half_ranges
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Old samples and new ones: the ends (d,) of what is sampled, performers in the order of their
+    labels, and by how much each range grew (d,)."""
+
+    low: Floats
+    high: Floats
+    performers: tuple[str, ...]
+    samples: Samples
+    growth: Floats
+
+    def hyper(self, old: Hyper) -> Hyper:
+        """The same field's parameters for ranges that grew."""
+        return replace(old, scales=old.scales * self.growth)
+
+
+def lay(bank: FieldBank, old_groups: Indices, examples: Sequence[Example], performer: str) -> Laid:
+    """Samples of a bank with their groups (n,), and those of a new performer's examples, which are
+    left out by their takes."""
+    d = len(bank.low)
+    old = (bank.pose.samples[:, :d] * (bank.high - bank.low) + bank.low + bank.high) / 2.0
+    new = np.stack([example.controls for example in examples])
+    low, high = np.minimum(bank.low, new.min(axis=0)), np.maximum(bank.high, new.max(axis=0))
+    performers = tuple(sorted((*bank.performers, performer)))
+    moved_by = [bank.performers[i] for i in np.argmax(bank.pose.samples[:, d:], axis=1)]
+    labels = samples.labels([*moved_by, *([performer] * len(new))], performers)
+    points = np.hstack([half_ranges(np.vstack([old, new]), low, high), labels])
+    groups = np.concatenate([old_groups, 1 + old_groups.max() + samples.takes(examples)])
+    growth = (high - low) / (bank.high - bank.low)
+    return Laid(low, high, performers, Samples(points, d, groups), growth)
+
+
+def solve(laid: Laid, bank: FieldBank, name: str, new: Floats) -> Field:
+    """One of a bank's other fields through its old values and new ones (k, m)."""
+    field, old = bank.others[name], bank.at_samples(name)
+    if isinstance(field, Constant):
+        # What the controls do not explain of the others they do not explain of these.
+        n, k = len(old), len(new)
+        return Constant((n * field.mean + new.sum(axis=0)) / (n + k))
+    hyper = laid.hyper(field.hyper)
+    return kriging.solve(hyper, laid.samples.points, np.vstack([old, new]))
+
+
+def bones(
+    laid: Laid, bank: FieldBank, proportions: Proportions, offsets: Floats
+) -> tuple[Field, Proportions]:
+    """Field of bone offsets that has those of new clips (k, J, 3) too, m."""
+    known = bank.at_samples("offsets")
+    old, new, longer = _spanned(proportions, known, offsets)
+    both, field = np.vstack([old, new]), bank.others["offsets"]
+    if not isinstance(field, Constant):
+        return kriging.solve(laid.hyper(field.hyper), laid.samples.points, both), longer
+    apart = longer.numpy(new) - longer.numpy(old[:1])
+    if np.abs(apart).max() <= SAME_BONE:
+        return Constant(old[0]), longer
+    return kriging.solve(_by_performer(laid, bank), laid.samples.points, both), longer
+
+
+def _by_performer(laid: Laid, bank: FieldBank) -> Hyper:
+    """Parameters of a field in which each performer has values of their own everywhere."""
+    scales = SCALES[0] * laid.growth
+    return Hyper(bank.pose.hyper.covariance, (0,), scales, NUGGETS[0], LABELS[1])
+
+
+def _spanned(
+    proportions: Proportions, known: Floats, offsets: Floats
+) -> tuple[Floats, Floats, Proportions]:
+    """Coefficients of old (n, r) and new clips, of as many more directions as these need."""
+    flat = proportions.directions.reshape(len(proportions.directions), -1)
+    centred = (offsets - proportions.mean).reshape(len(offsets), -1)
+    own = centred @ np.linalg.pinv(flat)
+    left, values, right = np.linalg.svd(centred - own @ flat, full_matrices=False)
+    rank = 0
+    while rank < len(values) and _worst(left, values, right, rank) > SAME_BONE:
+        rank += 1
+    more = right[:rank] * _signs(right[:rank])[:, None]
+    directions = np.vstack([flat, more]).reshape(-1, *proportions.mean.shape)
+    directions[:, 0] = 0.0
+    beyond = left[:, :rank] * values[:rank] * _signs(right[:rank])
+    return (
+        np.pad(known, ((0, 0), (0, rank))),
+        np.hstack([own, beyond]),
+        Proportions(proportions.mean, directions),
+    )
+
+
+def _worst(left: Floats, values: Floats, right: Floats, rank: int) -> float:
+    """Largest number that the first parts of a decomposition leave out."""
+    return float(np.abs((left[:, rank:] * values[rank:]) @ right[rank:]).max())
+
+
+def _signs(rows: Floats) -> Floats:
+    """Sign (r,) of the largest entry of each row, so that none hangs on the machine."""
+    largest = np.argmax(np.round(np.abs(rows), 9), axis=1)
+    return np.where(rows[np.arange(len(rows)), largest] < 0, -1.0, 1.0)

@@ -1,0 +1,191 @@
+"""A model file to the model in float64 that it was made of, without the data.
+
+The graph holds dual weights, not what the fields were laid through. These are had back from the
+dual weights and the system that made them, which hangs on controls, performers and the parameters
+of each field: the card has the pose's, the graph scales and labels of all, and `Making` the rest.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from model_export import kriging
+from model_export.canonical import Known
+from model_export.decoder import Decoder, Proportions
+from model_export.field_bank import POSE, Constant, Field, FieldBank
+from model_export.hosvd import Multilinear
+from model_export.kriging import Hyper, Kriging
+from model_export.model import Model
+from model_export.timing import Timing
+from model_export.travel import Travel
+from model_export.warp import WarpBasis
+from service.motion import field
+from service.motion.card import Making, ModelCard
+from service.motion.conventions import Floats, Indices
+from service.motion.errors import ModelError
+from service.synthesis import freeze, session
+from service.synthesis.exact import reduced, spread
+
+# Numbers of float32 are this near to those that they were, in half-ranges.
+SAME = 1e-5
+
+
+@dataclass(frozen=True)
+class Reopened:
+    """What a model file was made of. digest: SHA-256 of its content."""
+
+    known: Known
+    card: ModelCard
+    making: Making
+    digest: str
+
+
+@dataclass(frozen=True)
+class _File:
+    """Numbers of a model file by name, with its card; `source` names it in errors."""
+
+    numbers: Mapping[str, Floats]
+    card: ModelCard
+    making: Making
+    source: str
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in self.numbers:
+            raise ModelError(self.source, f"has no numbers named {name!r}: it cannot be reopened")
+        return self.numbers[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.numbers
+
+
+def load(path: Path) -> Reopened:
+    """The same of a file's content; ModelError where it cannot be read."""
+    return reopen(session.read(path), str(path))
+
+
+def reopen(content: bytes, source: str) -> Reopened:
+    """Model of one level, and its card, from the bytes of a file; `source` names it in errors.
+
+    Raises ModelError where the service could not open it, and for files older than what this takes.
+    """
+    own_card = session.open_bytes(content, source).card
+    if own_card.making is None or own_card.kriging is None:
+        raise ModelError(
+            source,
+            "was written before models could be adapted: its card does not say what its fields "
+            "were solved with; train it again",
+        )
+    numbers = {name: _plain(array) for name, array in freeze.weights(content).items()}
+    file = _File(numbers, own_card, own_card.making, source)
+    return Reopened(_known(file), own_card, own_card.making, session.sha256(content))
+
+
+def _plain(array: Any) -> Floats:
+    return array if np.issubdtype(array.dtype, np.integer) else array.astype(np.float64)
+
+
+def _known(file: _File) -> Known:
+    card, making = file.card, file.making
+    bank = _bank(file)
+    model = Model(bank, _timing(file), _decoder(file, bank), _bones(file), _travel(card))
+    names = card.skeleton.names
+    return Known(
+        model,
+        card.skeleton,
+        np.array(list(making.landmarks.values())),
+        np.array([making.joint_weights.get(name, 1.0) for name in names]),
+        making.in_phase,
+        card.root == "in_place",
+        float(card.diagnostics["truncation_rms_m"]),
+        spread.groups(card, bank.pose.samples),
+    )
+
+
+def _travel(card: ModelCard) -> Travel | None:
+    return Travel(card.frames) if card.cyclic else None
+
+
+def _timing(file: _File) -> Timing:
+    return Timing(WarpBasis(len(file["warp_still"])), file.card.frames)
+
+
+def _bones(file: _File) -> Proportions:
+    directions = file["offset_directions"]
+    mean = file["offset_mean"].reshape(-1, 3)
+    return Proportions(mean, directions.reshape(len(directions), -1, 3))
+
+
+def _bank(file: _File) -> FieldBank:
+    """Fields over the samples in the order of the card."""
+    card = file.card
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    points = field.half_ranges(np.array(card.examples), low, high)
+    who = np.array(card.moved_by or [0] * len(points))
+    labels = np.eye(max(len(card.performers), 1), len(card.performers))[who]
+    points = np.hstack([points, labels])
+    order = _order(file, points)
+    others = {name: _other(file, name, points, order) for name in _widths(file)}
+    assert card.kriging is not None
+    pose = _solved(file, POSE, (card.kriging, points, order))
+    return FieldBank(low, high, card.performers, pose, others, float(file["sill"]))
+
+
+def _order(file: _File, points: Floats) -> Indices:
+    """Place on the card (n,) of each sample of the graph."""
+    order, held = spread.order_of(file.card, file.numbers, points), file["samples"][0].T
+    if np.abs(points[order, : len(file.card.controls)] - held).max() > SAME:
+        raise ModelError(file.source, "its card lists other samples than its graph holds")
+    return order
+
+
+def _widths(file: _File) -> dict[str, int]:
+    """How many values each field beside the pose has, in their order."""
+    travel = {"travel": 3} if file.card.cyclic else {}
+    bones, warp = len(file["offset_directions"]), len(file["warp_still"])
+    return {**travel, "offsets": bones, "duration": 1, "warp": warp}
+
+
+def _columns(file: _File, name: str) -> slice:
+    """Where a field stands in the weights of one and the controls, after two of the variance."""
+    start = 2
+    for other, width in _widths(file).items():
+        if other == name:
+            return slice(start, start + width)
+        start += width
+    return slice(start, None)
+
+
+def _other(file: _File, name: str, points: Floats, order: Indices) -> Field:
+    if f"{name}_weights" not in file:
+        return Constant(file["drift_weights"][0, _columns(file, name)])
+    if name not in file.making.fields:
+        raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
+    nugget, *drifts = file.making.fields[name]
+    fields = [POSE, *(other for other in _widths(file) if f"{other}_weights" in file)]
+    place, own = fields.index(name), file.card.kriging
+    assert own is not None
+    label = np.sqrt(file["squared_labels"][place].item()) if file.card.performers else 0.0
+    scales = np.sqrt(file["squared_scales"][place, :, 0])
+    hyper = Hyper(own.covariance, tuple(map(int, drifts)), scales, nugget, label)
+    return _solved(file, name, (hyper, points, order))
+
+
+def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Kriging:
+    """Field of one name through what its dual weights say that it was laid through."""
+    hyper, points, order = laid
+    near = np.empty_like(file[f"{name}_weights"])
+    near[order] = file[f"{name}_weights"]
+    functions = 1 + max(hyper.drifts) * len(hyper.scales)
+    dual = np.vstack([near, file["drift_weights"][:functions, _columns(file, name)]])
+    return kriging.solve(hyper, points, kriging.values(hyper, points, dual))
+
+
+def _decoder(file: _File, bank: FieldBank) -> Decoder:
+    """Decoder whose first mode's coordinates are those of the core."""
+    held = reduced.read(file.numbers, file.card.levels[0])
+    core = held.core.transpose(1, 0, 2)
+    bases = np.eye(len(core)), held.time, bank.pose.values
+    return Decoder(Multilinear(core, bases), held.mean, held.directions.T, held.rotations)

@@ -1,0 +1,280 @@
+"""Poses and clips that are held to targets and measured controls, and what is refused of these."""
+
+import json
+from urllib.parse import urlencode
+
+import measured
+import numpy as np
+import pytest
+from asking import asker, unpacked
+
+from service.motion import skeleton
+from service.synthesis.library import Library
+from service.web.app import create_app
+from service.web.settings import Settings
+
+MODEL = "/v1/models/reach"
+CONTROLS = {"stature": 1.72, "hip_height": 0.9, "turn": 20.0, "target_height": 1.1}
+NEAR = (-0.2, 1.1, 0.49)
+AT_END = {"joint": "RightHand", "position": NEAR, "at": "end"}
+EARLY = {"joint": "RightHand", "position": (-0.32, 0.87, 0.23), "time": 0.4}
+FAR = {"joint": "LeftHand", "position": (0, 1, 5), "at": "end"}
+WORDS = "RightHand@end:-0.2,1.1,0.49"
+
+# Words of a query, status, problem, parameter at fault, words of the detail
+IN_QUERY = [
+    ("target", "RightHand", 400, "bad-parameter", "target", "expected JOINT@MOMENT:X,Y,Z, m"),
+    ("target", "@end:0,1,0", 400, "bad-parameter", "target", "expected JOINT@MOMENT:X,Y,Z"),
+    ("target", "RightHand@soon:0,1,0", 400, "bad-parameter", "target", "seconds or one of start"),
+    ("target", "RightHand@nan:0,1,0", 400, "bad-parameter", "target", "seconds or one of start"),
+    ("target", "RightHand@end:0,1", 400, "bad-parameter", "target", "expected JOINT@MOMENT:X,Y,Z"),
+    ("target", "RightHand@end:0,NaN,0", 400, "bad-parameter", "target", "expected JOINT@MOMENT"),
+    ("target", "RightHand@end:0,1e400,0", 400, "bad-parameter", "target", "expected JOINT@MOMENT"),
+    ("target", "RightHand@end:0,101,0", 422, "invalid-field", "target", "expected -100 to 100 m"),
+    ("target", "Tail@end:0,1,0", 422, "invalid-field", "target", "'Tail', expected one of Hips"),
+    ("target", "RightHand@-1:0,1,0", 422, "invalid-field", "target", "-1 s, expected 0 to"),
+    ("target", "RightHand@1.6:0,1,0", 422, "invalid-field", "target", "1.6 s, expected 0 to 1.3"),
+    ("exact", "", 400, "bad-parameter", "exact", "expected auto, none or names of controls"),
+    ("exact", "turn,", 400, "bad-parameter", "exact", "expected auto, none or names of controls"),
+    ("exact", "spin", 422, "invalid-field", "exact", "expected controls of this model: stature"),
+    ("exact", "turn", 422, "invalid-field", "exact", "not measured on a motion, expected some of:"),
+    ("pin_feet", "yes", 400, "bad-parameter", "pin_feet", "expected one of true, false"),
+]
+
+# Fields of a body, status, problem, place at fault, words of the detail
+IN_BODY = [
+    ({"targets": {}}, 400, "bad-body", "/targets", "Expected `array`"),
+    ({"targets": [{**AT_END, "time": 0}]}, 400, "bad-body", "/targets/0", "time and at"),
+    (
+        {"targets": [AT_END, {"joint": "Hips", "position": [0, 1, 0]}]},
+        400,
+        "bad-body",
+        "/targets/1",
+        "neither time nor at, expected one",
+    ),
+    ({"targets": [{**AT_END, "at": "soon"}]}, 400, "bad-body", "/targets/0/at", "'soon'"),
+    ({"targets": [{**AT_END, "frame": 1}]}, 400, "bad-body", "/targets/0/frame", "unknown field"),
+    ({"targets": [{**AT_END, "joint": 27}]}, 400, "bad-body", "/targets/0/joint", "Expected `str`"),
+    ({"targets": [{**AT_END, "position": [0, 1]}]}, 400, "bad-body", "/targets/0/position", "ngth"),
+    (
+        {"targets": [{**AT_END, "position": [0, "1", 0]}]},
+        400,
+        "bad-body",
+        "/targets/0/position/1",
+        "Expected `float`",
+    ),
+    (
+        {"targets": [AT_END, {**AT_END, "joint": "Tail"}]},
+        422,
+        "invalid-field",
+        "/targets/1/joint",
+        "expected one of Hips, LeftUpLeg",
+    ),
+    (
+        {"targets": [{**AT_END, "position": [0, 0, -200]}]},
+        422,
+        "invalid-field",
+        "/targets/0/position/2",
+        "-200 m, expected -100 to 100 m",
+    ),
+    (
+        {"targets": [{**EARLY, "time": -1}]},
+        422,
+        "invalid-field",
+        "/targets/0/time",
+        "expected 0 to",
+    ),
+    ({"targets": [{**EARLY, "time": 1.6}]}, 422, "invalid-field", "/targets/0/time", "to 1.3"),
+    (
+        {"targets": [EARLY, AT_END, {**EARLY, "position": [0, 0, 0]}]},
+        422,
+        "invalid-field",
+        "/targets/2",
+        "RightHand at 0.4 s has a target already (targets/0), expected one",
+    ),
+    ({"targets": [AT_END] * 33}, 422, "invalid-field", "/targets", "more than 32"),
+    ({"exact": "turn"}, 400, "bad-body", "/exact", "Invalid enum value 'turn'"),
+    ({"exact": []}, 400, "bad-body", "/exact", "length >= 1"),
+    ({"exact": ["spin"]}, 422, "invalid-field", "/exact", "expected controls of this model"),
+    ({"exact": ["turn"]}, 422, "invalid-field", "/exact", "'turn' is not measured on a motion"),
+    ({"pin_feet": 1}, 400, "bad-body", "/pin_feet", "Expected `bool`"),
+]
+
+
+def query(path, **more):
+    return f"{MODEL}/{path}?{urlencode({**CONTROLS, **more}, doseq=True)}"
+
+
+def problem(answer):
+    """Status, kind, place and words of a refusal."""
+    assert answer.headers["content-type"] == "application/problem+json", answer.text
+    found = answer.json()
+    (place,) = found["errors"]
+    kind = found["type"].rpartition(":")[2]
+    return answer.status_code, kind, place.get("pointer", place.get("parameter")), found["detail"]
+
+
+@pytest.mark.parametrize(("name", "words", "status", "kind", "place", "said"), IN_QUERY)
+@pytest.mark.parametrize("path", ["clip.usda", "pose"])
+def test_bad_words_are_refused(ask, path, name, words, status, kind, place, said):
+    times = {"time": 0} if path == "pose" else {}
+    found = problem(ask("GET", query(path, **{name: words}, **times)))
+    assert found[:3] == (status, kind, place)
+    assert said in found[3]
+
+
+@pytest.mark.parametrize(("fields", "status", "kind", "place", "said"), IN_BODY)
+@pytest.mark.parametrize("path", ["clip.bvh", "pose", "clips"])
+def test_bad_fields_are_refused(ask, path, fields, status, kind, place, said):
+    body = {"controls": CONTROLS, **fields}
+    if path == "pose":
+        body["times"] = [0]
+    if path == "clips":
+        body, place = {"format": "bvh", "clips": [{"controls": CONTROLS}, body]}, f"/clips/1{place}"
+    found = problem(ask("POST", f"{MODEL}/{path}", json=body))
+    assert found[:3] == (status, kind, place)
+    assert said in found[3]
+
+
+def test_nan_is_no_place(ask):
+    content = json.dumps(
+        {"controls": CONTROLS, "targets": [{**AT_END, "position": [0, 1, np.nan]}]}
+    )
+    headers = {"content-type": "application/json"}
+    answer = ask("POST", f"{MODEL}/clip", content=content, headers=headers)
+    assert problem(answer)[:2] == (400, "bad-body")
+
+
+@pytest.mark.parametrize("operation", ["crowd", "why"])
+def test_what_is_held_to_nothing_takes_no_targets(ask, operation):
+    body = {"controls": CONTROLS, "targets": [AT_END]} | (
+        {"time": 0} if operation == "crowd" else {}
+    )
+    found = problem(ask("POST", f"{MODEL}/{operation}", json=body))
+    assert found[:3] == (400, "bad-body", "/targets")
+
+
+def places(clip, joint):
+    """Where a joint of a clip's JSON is in each frame."""
+    rotations, roots = np.array(clip["rotations"]), np.array(clip["root_position"])
+    offsets = np.array(clip["bone_offsets"])
+    translations = np.repeat(offsets[None], len(roots), axis=0)
+    translations[:, 0] = roots
+    found, _ = skeleton.forward(tuple(clip["parents"]), rotations, translations)
+    return found[:, clip["names"].index(joint)]
+
+
+def test_a_clip_meets_its_target(ask):
+    plain, held = (
+        ask("GET", query("clip.json", fps=25, **more)).json()
+        for more in ({}, {"target": "RightHand@0.4:-0.32,0.87,0.23"})
+    )
+    assert np.abs(places(held, "RightHand")[10] - EARLY["position"]).max() < 1e-5
+    assert np.abs(places(plain, "RightHand")[10] - EARLY["position"]).max() > 5e-3
+    (met,) = held["trust"]["targets"]
+    assert met["miss"] < 1e-5
+    assert met | {"miss": 0} == {
+        "what": "RightHand at 0.4 s",
+        "miss": 0,
+        "unit": "m",
+        "reached": True,
+    }
+    assert "targets" not in plain["trust"] and held["trust"]["warnings"] == []
+
+
+def test_poses_are_those_of_the_clip(ask):
+    clip = ask("GET", query("clip.json", fps=25, target=WORDS)).json()
+    times = [0, 0.4, 1.2]
+    pose = ask("GET", query("pose", time=times, target=WORDS)).json()
+    assert pose["trust"] == clip["trust"]
+    for name in ("rotations", "root_position"):
+        expected = np.array(clip[name])[[0, 10, 30]]
+        # Poses travel in single precision.
+        assert np.abs(np.array(pose[name]) - expected).max() < 1e-6
+    free = ask("GET", query("pose", time=times)).json()
+    assert np.abs(np.array(free["rotations"]) - np.array(pose["rotations"])).max() > 1e-4
+
+
+@pytest.mark.parametrize("extension", ["bvh", "usdc", "glb", "npz"])
+def test_what_is_missed_is_said_in_headers(ask, extension):
+    answer = ask("GET", query(f"clip.{extension}", target="LeftHand@end:0,1,5"))
+    (missed,) = json.loads(f"[{answer.headers['posefield-missed']}]")
+    assert (missed["what"], missed["unit"]) == ("LeftHand at end", "m")
+    assert 4 < missed["miss"] < 5
+    (said,) = json.loads(f"[{answer.headers['posefield-warning']}]")
+    centimetres = f"{100 * missed['miss']:.1f} cm"
+    assert said == f"LeftHand at end stays {centimetres} from its target: out of reach"
+    met = ask("GET", query(f"clip.{extension}", target=WORDS))
+    assert "posefield-missed" not in met.headers and "posefield-warning" not in met.headers
+
+
+def test_what_is_missed_can_be_refused(ask):
+    strict = {"controls": CONTROLS, "targets": [FAR], "extrapolate": "refuse"}
+    found = problem(ask("POST", f"{MODEL}/clip", json=strict))
+    assert found[:3] == (422, "out-of-reach", "/targets/0")
+    assert found[3].startswith("targets/0: LeftHand at end stays 4")
+    assert problem(ask("POST", f"{MODEL}/pose", json={**strict, "times": [0]})) == found
+    by_query = query("pose", time=0, target="LeftHand@end:0,1,5", extrapolate="refuse")
+    assert problem(ask("GET", by_query))[:3] == (422, "out-of-reach", "target")
+    many = {"format": "bvh", "clips": [{"controls": CONTROLS}, strict]}
+    found = problem(ask("POST", f"{MODEL}/clips", json=many))
+    assert found[:3] == (422, "out-of-reach", "/clips/1/targets/0")
+    reached = {**strict, "targets": [AT_END]}
+    assert ask("POST", f"{MODEL}/clip", json=reached).status_code == 200
+
+
+def test_clips_of_an_archive_are_held_each_to_its_own(ask):
+    clips = [{"controls": CONTROLS, "targets": [each]} for each in (AT_END, FAR)]
+    body = {"format": "usda", "clips": [*clips, {"controls": CONTROLS}]}
+    answer = ask("POST", f"{MODEL}/clips.zip", json=body)
+    assert json.loads(f"[{answer.headers['posefield-warning']}]") == [
+        "1 of 3 clips miss some target"
+    ]
+    files = unpacked("zip", answer.content)
+    near, far, free = map(json.loads, files["manifest.jsonl"].splitlines())
+    assert near["targets"][0]["reached"] and not far["targets"][0]["reached"]
+    assert far["warnings"] and "targets" not in free
+    alone = ask("POST", f"{MODEL}/clip.usda", json=clips[0])
+    assert files["clip-000000.usda"] == alone.content != files["clip-000002.usda"]
+
+
+def test_other_targets_are_other_answers_to_a_cache(ask):
+    first = ask("GET", query("clip.bvh", target=WORDS))
+    held = {"if-none-match": first.headers["etag"]}
+    assert ask("GET", query("clip.bvh", target=WORDS), headers=held).status_code == 304
+    other = query("clip.bvh", target=WORDS.replace("1.1", "1.11"))
+    assert ask("GET", other, headers=held).status_code == 200
+
+
+@pytest.fixture(scope="module")
+def ask_measured(labelled_path):
+    """Ask a model of which `target_height` is measured on the motion."""
+    return asker(create_app(Library({"reach": measured.reaching(labelled_path)}), Settings()))
+
+
+def test_a_measured_control_is_met_if_not_asked_otherwise(ask_measured):
+    found = {
+        exact: ask_measured("GET", query("clip.json", exact=exact)).json()["trust"]
+        for exact in ("auto", "none", "target_height")
+    }
+    assert found["auto"] == found["target_height"]
+    assert abs(found["auto"]["measured"]["target_height"] - 1.1) < 1e-5
+    assert abs(found["none"]["measured"]["target_height"] - 1.1) > 1e-4
+    (met,) = found["auto"]["targets"]
+    assert (met["what"], met["unit"], met["reached"]) == ("target_height", "m", True)
+    assert "targets" not in found["none"]
+    plain = ask_measured("GET", query("clip.json")).json()["trust"]
+    assert plain == found["auto"]
+
+
+def test_a_target_is_nearer_than_the_control_of_its_joint(ask_measured):
+    clip = ask_measured("GET", query("clip.json", target=WORDS)).json()
+    assert [met["what"] for met in clip["trust"]["targets"]] == ["RightHand at end"]
+    both = ask_measured("GET", query("clip", target=WORDS, exact="target_height"))
+    assert problem(both)[:3] == (422, "invalid-field", "exact")
+
+
+def test_the_card_says_what_is_measured(ask_measured):
+    card = ask_measured("GET", MODEL).json()
+    found = {control["name"]: control.get("measure") for control in card["controls"]}
+    assert found["target_height"]["quantity"] == "height" and found["turn"] is None

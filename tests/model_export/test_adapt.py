@@ -1,0 +1,273 @@
+"""A model that is shown a few clips of somebody new knows them, and forgets nobody."""
+
+from dataclasses import replace
+
+import newcomers
+import numpy as np
+import pytest
+
+from model_export import (
+    adapt,
+    canonical,
+    export,
+    ingest,
+    kriging,
+    new_fields,
+    phase,
+    reopen,
+    train,
+)
+from model_export.evaluate import errors, methods, motion
+from model_export.evaluate.methods import Asked
+from model_export.field_bank import Constant
+from model_export.sample import stroll
+from service.motion import quat
+from service.motion.errors import TrainingError
+
+SHOWN, ASKED = (2.0, 7.0, 12.0), (4.0, 9.5)
+
+
+@pytest.fixture(scope="module")
+def recipe():
+    return newcomers.recipe()
+
+
+@pytest.fixture(scope="module")
+def trained(recipe, tmp_path_factory):
+    folder = newcomers.write(tmp_path_factory.mktemp("family") / "small")
+    return train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def known(recipe, trained):
+    return canonical.known(recipe, trained)
+
+
+def examples(trained, who, controls):
+    """Examples of a performer at values of the control."""
+    row = trained.examples[0].row
+    return [
+        ingest.Example(
+            replace(row, place=row.place.with_name(f"{who}{value:g}.bvh"), performer=who),
+            ingest.canonical(newcomers.clip(who, value), row, False, False)[0],
+            np.array([value]),
+            (),
+            (),
+        )
+        for value in controls
+    ]
+
+
+@pytest.fixture(scope="module")
+def adapted(trained, known):
+    return adapt.adapt(known, examples(trained, "cy", SHOWN), "cy")
+
+
+def misses(recipe, trained, model, name):
+    """Mean distance of a model's answers from the newcomer's own clips that it was not shown, m."""
+    asked = examples(trained, "cy", ASKED)
+    said = Asked(np.stack([e.controls for e in asked]), [name] * len(asked))
+    made = methods.ours(recipe, replace(trained, model=model), said)
+    pairs = zip(made, asked, strict=True)
+    return np.mean(
+        [
+            errors.compare(own, motion.of_clip(e.clip, None), ()).plain_relative.mean
+            for own, e in pairs
+        ]
+    )
+
+
+def test_a_newcomer_is_met_by_name_and_nobody_else_is(recipe, trained, known, adapted):
+    unknown = misses(recipe, trained, trained.model, "")
+    own = misses(recipe, trained, adapted.model, "cy")
+    assert own < 0.35 * unknown
+    # Negative controls: another name, and another's clips under the newcomer's name.
+    assert misses(recipe, trained, adapted.model, "a") > 2.0 * own
+    others = adapt.adapt(known, examples(trained, "b", SHOWN), "cy")
+    assert misses(recipe, trained, others.model, "cy") > 2.0 * own
+
+
+def test_more_clips_are_nearer(recipe, trained, known, adapted):
+    one = adapt.adapt(known, examples(trained, "cy", SHOWN[1:2]), "cy")
+    three = misses(recipe, trained, adapted.model, "cy")
+    assert three < misses(recipe, trained, one.model, "cy")
+
+
+def test_the_newcomer_has_bones_of_their_own(trained, adapted):
+    labels = np.eye(4)[[adapted.model.bank.performers.index(who) for who in ("cy", "a")]]
+    found = adapted.model.evaluate(np.array([[6.0]] * 2), np.zeros((2, 1)), labels).bone_offsets
+    expected = examples(trained, "cy", SHOWN)[0].offsets
+    assert np.abs(found[0] - expected).max() < 0.002
+    assert np.abs(found[1] - expected).max() > 0.02
+
+
+def test_those_who_were_known_are_met_as_before(trained, known, adapted):
+    old, new = trained.model, adapted.model
+    assert new.bank.performers == ("a", "b", "cy", "d")
+    assert old.bank.performers == ("a", "b", "d")
+    controls, times = trained.laid.half_ranges * 7.0 + 7.0, np.full((newcomers.CLIPS, 1), 0.5)
+    whose = [old.bank.performers[i] for i in trained.laid.moved_by]
+
+    def joints(model, names):
+        order = [model.bank.performers.index(name) for name in names]
+        labels = np.eye(len(model.bank.performers))[order]
+        return model.evaluate(controls, times, labels).positions(known.skeleton.parents)
+
+    gaps = np.linalg.norm(joints(new, whose) - joints(old, whose), axis=-1).mean()
+    # Negative control: asked for by the places of their labels, which have moved.
+    wrong = ["cy" if name == "d" else name for name in whose]
+    assert gaps < 0.004 < np.linalg.norm(joints(new, wrong) - joints(old, whose), axis=-1).mean()
+
+
+def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(known, adapted):
+    extended, reduced = adapted.extended, known.model.decoder.reduced
+    n, k = len(reduced.bases[2]), len(SHOWN)
+    assert extended.tensor.values.shape[2] == n + k
+    numbers = extended.tensor.numbers(extended.full.truncated(extended.ranks).restored())
+    decoder = known.model.decoder
+    place = np.tile(np.arange(known.model.timing.frames, dtype=float), (n, 1))
+    expected = decoder.mean + decoder.reduced_poses(reduced.bases[2], place) @ decoder.directions
+    assert np.abs(numbers[:n] - expected).max() < 1e-9
+
+    def lost(numbers):
+        gaps = (numbers[n:] - adapted.moved.numbers) @ extended.tensor.whiten.T
+        return np.sqrt(np.sum(gaps**2) / (k * gaps.shape[1] * extended.tensor.weight))
+
+    assert lost(numbers) < known.truncation
+    # Negative control: by the old bases alone more is lost.
+    r1, r2, _ = reduced.core.shape
+    assert extended.ranks[0] > r1
+    fewer = extended.full.truncated((r1, r2, extended.ranks[2])).restored()
+    assert lost(extended.tensor.numbers(fewer)) > lost(numbers)
+
+
+def test_a_range_that_grows_moves_no_field(trained, known):
+    """The same distances in a longer unit: the old samples alone give the very same field."""
+    bank = known.model.bank
+    far = examples(trained, "cy", (30.0,))
+    laid = new_fields.lay(bank, known.groups, far, "cy")
+    assert (laid.low, laid.high) == (0.0, 30.0) and laid.growth == pytest.approx(30 / 14)
+    n, values = len(bank.pose.samples), bank.pose.values
+    rng = np.random.Generator(np.random.PCG64(1))
+    controls = rng.uniform(-5.0, 20.0, (50, 1))
+    nobody = np.zeros((50, len(bank.performers)))
+    before = bank.pose.predict(bank.points(controls, nobody))
+
+    def after(hyper):
+        solved = kriging.solve(hyper, laid.samples.points[:n], values)
+        grown = replace(bank, low=laid.low, high=laid.high)
+        return solved.predict(grown.points(controls, np.zeros((50, 4))))
+
+    hyper = laid.hyper(bank.pose.hyper)
+    assert np.abs(after(hyper) - before).max() < 1e-9
+    # Negative control: scales that stayed as they were.
+    assert np.abs(after(bank.pose.hyper) - before).max() > 1e-3
+
+
+def test_what_the_controls_do_not_explain_is_the_mean_of_all(trained, known):
+    bank = known.model.bank
+    others = bank.others | {"duration": Constant(np.array([0.5]))}
+    flat = replace(bank, others=others)
+    laid = new_fields.lay(flat, known.groups, examples(trained, "cy", SHOWN), "cy")
+    field = new_fields.solve(laid, flat, "duration", np.array([[1.0], [1.5], [2.0]]))
+    assert field.mean == pytest.approx((newcomers.CLIPS * 0.5 + 4.5) / (newcomers.CLIPS + 3))
+
+
+@pytest.mark.parametrize("size", [1.0, 1.2])
+def test_bones_that_were_all_alike_are_told_apart_by_name(trained, known, size):
+    mean = trained.model.proportions.mean
+    bank = replace(known.model.bank, others=known.model.bank.others | {"offsets": flat(trained)})
+    laid = new_fields.lay(bank, known.groups, examples(trained, "cy", SHOWN), "cy")
+    own = np.repeat((size * mean)[None], len(SHOWN), axis=0)
+    field, longer = new_fields.bones(laid, bank, trained.model.proportions, own)
+    assert isinstance(field, Constant) == (size == 1.0)
+    points = np.array([[-0.5, 0, 1, 0, 0], [-0.5, 0, 0, 1, 0]], dtype=float)
+    found = longer.numpy(field.predict(points))
+    assert np.abs(found[1] - own[0]).max() < 1e-3
+    assert np.abs(found[0] - mean).max() < 1e-3
+
+
+def flat(trained):
+    """A field of bones that are the mean everywhere."""
+    return Constant(np.zeros(len(trained.model.proportions.directions)))
+
+
+def test_sigma_says_that_the_newcomer_is_known(adapted):
+    model, who = adapted.model, adapted.model.bank.performers.index("cy")
+    point, time = np.array([[7.0]]), np.zeros((1, 1))
+    own = model.evaluate(point, time, np.eye(4)[[who]]).sigma
+    nobody = model.evaluate(point, time, np.zeros((1, 4))).sigma
+    assert own < 0.8 * nobody
+
+
+def test_a_clip_of_another_action_is_refused_with_the_numbers(trained, known):
+    good = examples(trained, "cy", SHOWN)
+    canonical.refuse_strangers(known, canonical.move(known, good))
+    rotations = good[1].clip.rotations.copy()
+    rotations[:, 1] = quat.about(np.array([1.0, 0.0, 0.0]), np.array(2.0))
+    strange = [good[0], replace(good[1], clip=replace(good[1].clip, rotations=rotations))]
+    with pytest.raises(TrainingError, match=r"cy7\.bvh: lies \d+\.\d cm .* times the .* at most 2"):
+        canonical.refuse_strangers(known, canonical.move(known, strange))
+
+
+def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, adapted):
+    content = export.export(recipe, trained, []).content
+    reopened = reopen.reopen(content, "small.onnx").known
+    found = adapt.adapt(reopened, examples(trained, "cy", SHOWN), "cy").model
+    rng = np.random.Generator(np.random.PCG64(2))
+    question = (
+        rng.uniform(0, 14, (60, 1)),
+        rng.uniform(0, 1, (60, 2)),
+        np.eye(5, 4)[[*range(5)] * 12],
+    )
+    parents = known.skeleton.parents
+    expected = adapted.model.evaluate(*question).positions(parents)
+    assert np.linalg.norm(
+        found.evaluate(*question).positions(parents) - expected, axis=-1
+    ).max() < (1e-4)
+    # Negative control: one clip fewer is another model.
+    fewer = adapt.adapt(reopened, examples(trained, "cy", SHOWN[:2]), "cy").model
+    gaps = np.linalg.norm(fewer.evaluate(*question).positions(parents) - expected, axis=-1)
+    assert gaps.max() > 1e-3
+
+
+@pytest.fixture(scope="module")
+def walkers(strides):
+    """A walk of two walkers who are told apart, and strides that a third shows."""
+    plain = stroll.recipe()
+    told = plain.kriging.model_copy(update={"label": "performer"})
+    recipe = plain.model_copy(update={"kriging": told})
+    named = [
+        replace(e, row=replace(e.row, performer="ab"[i % 2])) for i, e in enumerate(strides[3:])
+    ]
+    trained = train.train(recipe, named, lambda _: None)
+    return recipe, trained, strides[:3]
+
+
+def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
+    recipe, trained, shown = walkers
+    model = adapt.adapt(canonical.known(recipe, trained), shown, "new").model
+    who = np.eye(3)[[model.bank.performers.index("new")]]
+    for example in shown:
+        seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]
+        found = model.evaluate(example.controls[None], np.array([[0.0, seconds]]), who)
+        way = example.clip.root_path[-1] - example.clip.root_path[0]
+        gone = found.root_position[0, 1] - found.root_position[0, 0]
+        assert np.linalg.norm(gone - way) < 0.05 < np.linalg.norm(way)
+        # All but where the root is and heads: the last pose is the first.
+        ends = found.rotations[0, :, 1:]
+        assert np.abs(ends[0] - ends[1]).max() < 1e-9
+        middle = model.evaluate(example.controls[None], np.array([[seconds / 2]]), who)
+        assert np.abs(middle.rotations[0, 0, 1:] - ends[0]).max() > 0.1
+
+
+def test_a_cycle_that_was_cut_elsewhere_is_begun_with_the_family(walkers):
+    recipe, trained, shown = walkers
+    known = canonical.known(recipe, trained)
+    late = [phase.begin(example, 0.3) for example in shown]
+    assert canonical.begin(replace(known, in_phase=False), late) == tuple(late)
+    found = canonical.begin(replace(known, in_phase=True), late)
+    cut, begun, right = (canonical.move(known, clips) for clips in (late, found, shown))
+    assert begun.distances.max() < 1.5 * right.distances.max()
+    assert cut.distances.min() > 2.0 * begun.distances.max()
+    assert [round(example.shift, 1) for example in begun.examples] == [-0.3] * 3

@@ -1,0 +1,148 @@
+"""`posefield adapt`: a model file and clips to a model file that knows one performer more."""
+
+import json
+
+import newcomers
+import numpy as np
+import pytest
+
+from model_export import export, ingest, train
+from service.synthesis import session
+from service.synthesis.question import ClipQuestion
+from service.synthesis.synthesizer import Synthesizer
+
+SHOWN = (2.0, 7.0, 12.5)
+SAID = ("--performer", "cy", "--unit", "1", "--up", "y", "--licence", "CC0-1.0")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return newcomers.write(tmp_path_factory.mktemp("family") / "small")
+
+
+@pytest.fixture(scope="module")
+def base(folder):
+    recipe = newcomers.recipe()
+    trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
+    path = folder / "small.onnx"
+    path.write_bytes(export.export(recipe, trained, []).content)
+    return path
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    return newcomers.write_newcomer(tmp_path_factory.mktemp("cy") / "cy", SHOWN)
+
+
+@pytest.fixture
+def adapted(posefield, base, table, tmp_path):
+    path = tmp_path / "new.onnx"
+    code, out, _ = posefield("adapt", base, "--table", table, "-o", path, *SAID, "--json")
+    assert code == 0
+    return path, json.loads(out)
+
+
+def test_the_new_file_says_who_it_knows_and_where_that_comes_from(base, adapted):
+    path, facts = adapted
+    old, new = (session.load(p).card for p in (base, path))
+    assert facts["clips"] == new.samples == old.samples + 3 == len(new.examples)
+    assert (old.performers, new.performers) == (("a", "b", "d"), ("a", "b", "cy", "d"))
+    whose = [new.performers[i] for i in new.moved_by]
+    assert whose == [*(old.performers[i] for i in old.moved_by), "cy", "cy", "cy"]
+    assert new.examples[-3:] == tuple((value,) for value in SHOWN)
+    assert new.sources[-1] == "2.bvh" and len(new.left_out) == new.samples
+    assert len(new.levels) == len(old.levels) and new.skeleton.same_tree(old.skeleton)
+    step = new.provenance["adapted"][0]
+    assert step["parent_sha256"] == session.sha256(base.read_bytes())
+    assert (step["performer"], step["clips"], step["licence"]) == ("cy", 3, "CC0-1.0")
+    assert "adapted from small@" not in new.diagnostics["notes"][0]
+    assert (
+        f"adapted from tiny@{session.digest(base.read_bytes())} to 'cy' by 3 clips"
+        in (new.diagnostics["notes"][-1])
+    )
+    assert 0.0 < facts["parity_m"] < export.ALLOWED
+
+
+def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp_path):
+    again = tmp_path / "again.onnx"
+    assert posefield("adapt", base, "--table", table, "-o", again, *SAID)[0] == 0
+    assert again.read_bytes() == adapted[0].read_bytes()
+    # Negative control: another clip makes another file.
+    fewer = table.with_name("fewer.csv")
+    fewer.write_text("".join(table.read_text().splitlines(keepends=True)[:-1]))
+    assert posefield("adapt", base, "--table", fewer, "-o", again, *SAID)[0] == 0
+    assert again.read_bytes() != adapted[0].read_bytes()
+
+
+def head(path, who, level=0):
+    """Path of the head in a clip of somebody, on the whole."""
+    model = Synthesizer("small", session.load(path))
+    answer = model.clip(ClipQuestion({"speed": 4.0}, performer=who, level=level))
+    return answer.clip.positions()[:, 2].mean(axis=0)
+
+
+def test_the_service_answers_for_the_newcomer_at_every_level(adapted):
+    path, _ = adapted
+    true = newcomers.clip("cy", 4.0)
+    expected = ingest.canonical(true, None, False, False)[0].positions()[:, 2].mean(axis=0)
+    for number, level in enumerate(session.load(path).card.levels):
+        own, other = (np.linalg.norm(head(path, who, number) - expected) for who in ("cy", "a"))
+        assert own < 0.02 + 2.0 * level.rms
+        # Negative control: by another's name it is somebody else's.
+        assert other > 1.5 * own
+
+
+def test_a_model_can_be_adapted_again(posefield, adapted, tmp_path):
+    path, _ = adapted
+    other, said = tmp_path / "two.onnx", [*SAID]
+    said[1] = "Bo"
+    table = newcomers.write_newcomer(tmp_path / "bo", (3.0, 8.0), "b")
+    assert posefield("adapt", path, "--table", table, "-o", other, *said)[0] == 0
+    card = session.load(other).card
+    assert card.performers == ("Bo", "a", "b", "cy", "d")
+    assert [step["performer"] for step in card.provenance["adapted"]] == ["cy", "Bo"]
+    assert card.diagnostics["notes"][-1].startswith("adapted from tiny@")
+
+
+def refused(posefield, said, *words):
+    code, _, err = posefield("adapt", *words)
+    assert said in err
+    return code
+
+
+def test_questions_that_cannot_be_meant(posefield, base, table, tmp_path):
+    out, clip = ("-o", tmp_path / "x.onnx"), table.with_name("0.bvh")
+    known = ("--performer", "a", *SAID[2:])
+    assert (
+        refused(posefield, "'a' is known already, as are: a, b, d", base, clip, *out, *known) == 2
+    )
+    blank = ("--performer", " ", *SAID[2:])
+    assert refused(posefield, "expected a name", base, clip, *out, *blank) == 2
+    assert refused(posefield, "either motion files or --table", base, *out, *SAID) == 2
+    both = (clip, "--table", table)
+    assert refused(posefield, "either motion files or --table", base, *both, *out, *SAID) == 2
+    assert refused(posefield, "ends in .onnx", base, clip, "-o", tmp_path / "x.bin", *SAID) == 2
+    assert refused(posefield, "cannot be measured", base, clip, *out, *SAID) == 3
+    negative = (*SAID[:3], "-1", *SAID[4:])
+    assert refused(posefield, "expected a length in metres", base, clip, *out, *negative) == 2
+    assert refused(posefield, "Missing option '--licence'", base, clip, *out, *SAID[:-2]) == 2
+    assert not (tmp_path / "x.onnx").exists()
+
+
+def test_files_that_cannot_be_used(posefield, base, table, tmp_path):
+    out = ("-o", tmp_path / "x.onnx")
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(base.read_bytes()[:-100])
+    assert refused(posefield, "broken.onnx", broken, "--table", table, *out, *SAID) == 3
+    missing = tmp_path / "none.csv"
+    assert (
+        refused(posefield, "none.csv: cannot be read", base, "--table", missing, *out, *SAID) == 3
+    )
+    centimetres = (*SAID[:3], "0.01", *SAID[4:])
+    assert refused(posefield, "in another unit?", base, "--table", table, *out, *centimetres) == 4
+    assert not (tmp_path / "x.onnx").exists()
+
+
+def test_a_model_that_tells_nobody_apart_is_refused(posefield, model_path, table, tmp_path):
+    words = (model_path, "--table", table, "-o", tmp_path / "x.onnx", *SAID)
+    assert refused(posefield, "tells no performers apart", *words) == 2

@@ -1,0 +1,46 @@
+"""What suggested clips are worth: how fast is said as it is meant."""
+
+import numpy as np
+import pytest
+
+from model_export import ingest, recipe
+from model_export.evaluate import learning
+from model_export.evaluate.learning import CHANCE, SUGGESTED, Learning
+from model_export.sample import family, write
+
+SIZES = (40, 60, 80, 100)
+
+
+def curve(suggested, chance):
+    rows = {SUGGESTED: suggested, CHANCE: chance}
+    return Learning(SIZES, {way: np.array([row, row]) / 100.0 for way, row in rows.items()})
+
+
+def test_it_is_as_fast_as_it_comes_to_where_chance_ends():
+    found = curve([4.0, 2.0, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
+    assert (found.reached, found.faster) == (pytest.approx(60.0), pytest.approx(3.0))
+    between = curve([4.0, 2.5, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
+    assert (between.reached, between.faster) == (pytest.approx(70.0), pytest.approx(2.0))
+
+
+def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
+    same = curve([4.0, 3.0, 2.5, 2.0], [4.0, 3.0, 2.5, 2.0])
+    assert same.faster == pytest.approx(1.0)
+    assert curve([4.0, 3.5, 3.0, 2.5], [4.0, 3.0, 2.5, 2.0]).faster == pytest.approx(1.0)
+
+
+def test_it_is_told_as_a_table_and_as_figures():
+    found = curve([4.0, 2.0, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
+    assert "| suggested, global | 4.00 | 2.00 | 1.50 | 1.00 |" in learning.table(found)
+    assert "3.0 times as fast" in learning.table(found)
+    facts = learning.facts(found)
+    assert facts["at_random"] == {"global_cm": [4, 3, 2.5, 2], "relative_cm": [4, 3, 2.5, 2]}
+    assert facts["samples"] == list(SIZES)
+
+
+def test_samples_of_ones_own_are_a_family(tmp_path):
+    chosen = list(family.samples())[3:6]
+    file = write.some(tmp_path / "own", chosen)
+    found, _ = ingest.ingest(recipe.read(file), file.parent)
+    expected = [[*vars(sample.controls).values()] for sample in chosen]
+    assert [example.controls.tolist() for example in found] == expected

@@ -1,0 +1,139 @@
+"""A model file, opened without its data, is the model that it was made of."""
+
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import pytest
+
+from model_export import canonical, kriging, reopen
+from model_export.field_bank import Constant
+from service.motion import card as cards
+from service.motion.errors import ModelError
+
+# What float32 may cost, m.
+SAME = 1e-5
+
+
+@pytest.fixture(scope="module")
+def content(labelled_path):
+    return labelled_path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def reopened(content):
+    return reopen.reopen(content, "labelled.onnx")
+
+
+def asked(model, count=200):
+    """Controls, times and labels of questions within what was sampled; some are about nobody."""
+    rng = np.random.Generator(np.random.PCG64(8))
+    controls = rng.uniform(model.bank.low, model.bank.high, (count, len(model.bank.low)))
+    performers = len(model.bank.performers)
+    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, count)]
+    return controls, rng.uniform(0.0, 1.2, (count, 3)), labels
+
+
+def farthest(one, other, parents):
+    """Largest distance between the joints of two models' answers to the same questions, m."""
+    question = asked(one)
+    own, its = (model.evaluate(*question).positions(parents) for model in (one, other))
+    return float(np.linalg.norm(own - its, axis=-1).max())
+
+
+def test_a_reopened_model_answers_as_the_trained_one(labelled_exported, reopened):
+    trained, own = labelled_exported.model, reopened.known
+    parents = own.skeleton.parents
+    assert farthest(trained, own.model, parents) < SAME
+    question = asked(trained)
+    expected, found = trained.evaluate(*question), own.model.evaluate(*question)
+    assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-4
+    assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-6
+    # Negative control: one sample of one clip, moved by a hundredth of what samples differ by.
+    bank, reduced = own.model.bank, own.model.decoder.reduced
+    values = reduced.bases[2].copy()
+    values[3] += 0.01 * np.ptp(values, axis=0)
+    pose = kriging.solve(bank.pose.hyper, bank.pose.samples, values)
+    other = replace(own.model, bank=replace(bank, pose=pose))
+    assert farthest(trained, other, parents) > 10 * SAME
+
+
+def test_what_the_fields_were_laid_through_comes_back(labelled, reopened):
+    """Dual weights alone do not tell: a wrong nugget answers alike everywhere but there."""
+    bank = reopened.known.model.bank
+    for name, field in bank.others.items():
+        expected = labelled.values[name]
+        scale = np.ptp(expected, axis=0).max()
+        assert np.abs(bank.at_samples(name) - expected).max() < 1e-4 * scale
+        assert isinstance(field, Constant) == (name not in reopened.making.fields)
+    fields = {n: (3.0 * v[0], *v[1:]) for n, v in reopened.making.fields.items()}
+    wrong = wrong_nuggets(reopened, fields)
+    gaps = [np.abs(wrong[name] - labelled.values[name]).max() for name in fields]
+    assert max(gaps) > 1e-3
+
+
+def wrong_nuggets(reopened, fields):
+    """Values at the samples that would come of other nuggets."""
+    bank = reopened.known.model.bank
+    found = {}
+    for name in fields:
+        field = bank.others[name]
+        hyper = replace(field.hyper, nugget=fields[name][0])
+        found[name] = kriging.values(hyper, field.samples, field.dual)
+    return found
+
+
+def test_the_motions_of_the_samples_come_back_in_the_cards_order(labelled, reopened):
+    decoder = reopened.known.model.decoder
+    place = np.tile(np.arange(labelled.model.timing.frames, dtype=float), (5, 1))
+    own, its = (d.reduced.bases[2][:5] for d in (labelled.model.decoder, decoder))
+    expected = labelled.model.decoder.numpy(own, place)
+    found = decoder.numpy(its, place)
+    assert np.abs(found[0] - expected[0]).max() < SAME
+    assert np.abs(found[1] - expected[1]).max() < SAME
+    # Negative control: other samples are other motions.
+    shifted = decoder.numpy(decoder.reduced.bases[2][1:6], place)
+    assert np.abs(shifted[1] - expected[1]).max() > 100 * SAME
+
+
+def test_what_is_known_is_what_training_knows(labelled_recipe, labelled, reopened):
+    expected, found = canonical.known(labelled_recipe, labelled), reopened.known
+    assert np.array_equal(found.joint_weights, expected.joint_weights)
+    assert np.array_equal(found.groups, expected.groups)
+    assert found.truncation == pytest.approx(expected.truncation, rel=1e-3)
+    assert (found.in_phase, found.in_place) == (expected.in_phase, expected.in_place)
+    assert len(found.landmarks) == 0
+
+
+def rewritten(content, change):
+    """The file with its metadata changed."""
+    model = onnx.load_from_string(content)
+    entries = {p.key: p.value for p in model.metadata_props}
+    change(entries)
+    del model.metadata_props[:]
+    for key, value in entries.items():
+        model.metadata_props.add(key=key, value=value)
+    return model.SerializeToString()
+
+
+def test_a_file_older_than_this_is_refused(content):
+    older = rewritten(content, lambda entries: entries.pop("posefield.making"))
+    assert cards.load({p.key: p.value for p in onnx.load_from_string(older).metadata_props})
+    with pytest.raises(ModelError, match=r"old\.onnx: was written before models could be adapted"):
+        reopen.reopen(older, "old.onnx")
+
+
+def test_a_field_whose_making_is_missing_is_named(content):
+    def change(entries):
+        entries["posefield.making"] = entries["posefield.making"].replace("warp", "woof")
+
+    with pytest.raises(ModelError, match="does not say what its field 'warp' is made with"):
+        reopen.reopen(rewritten(content, change), "odd.onnx")
+
+
+def test_a_card_of_another_graph_is_refused(content):
+    def change(entries):
+        entries["posefield.examples"] = entries["posefield.examples"].replace("1.62", "1.64")
+
+    with pytest.raises(ModelError, match="lists other samples than its graph holds"):
+        reopen.reopen(rewritten(content, change), "odd.onnx")

@@ -1,0 +1,104 @@
+"""Whether anything like some controls was captured: what the box and the plain field say."""
+
+import numpy as np
+import pytest
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF
+
+from service.motion import field, support
+
+CLOSE = 1e-9
+WIDE = np.array([2.0, 30.0, 0.5])
+
+
+@pytest.fixture
+def controls(rng):
+    """Controls (40, 3) of a family, in units of their own."""
+    return np.array([1.0, -5.0, 0.0]) + WIDE * rng.random((40, 3))
+
+
+@pytest.fixture
+def own(controls):
+    return support.of(controls)
+
+
+def test_the_variance_is_that_of_a_gaussian_process(own, controls, rng):
+    points = np.array([1.0, -5.0, 0.0]) + WIDE * rng.uniform(-0.3, 1.3, (50, 3))
+    assert np.allclose(own.variance(points), judged(own, controls, points), atol=CLOSE)
+    # Negative control: with another scale it would not be.
+    other = judged(own, controls, points, 1.01 * support.SCALE)
+    assert not np.allclose(own.variance(points), other, atol=CLOSE)
+
+
+def judged(own, controls, points, scale=support.SCALE):
+    """Variance (B,) by scikit-learn."""
+    ends = controls.min(axis=0), controls.max(axis=0)
+    process = GaussianProcessRegressor(RBF(scale), alpha=support.NUGGET, optimizer=None)
+    process.fit(field.half_ranges(controls, *ends), np.zeros(len(controls)))
+    return process.predict(field.half_ranges(points, *ends), return_std=True)[1] ** 2
+
+
+def test_left_out_each_sample_is_as_the_others_support_it(own, controls):
+    for clip in range(len(controls)):
+        others = support.Support(own.low, own.high, np.delete(own.samples, clip, axis=0))
+        assert others.variance(controls[[clip]])[0] == pytest.approx(own.left_out[clip], abs=CLOSE)
+    # Negative control: with itself among them it would be another.
+    assert own.variance(controls[:1])[0] < 0.9 * own.left_out[0]
+
+
+def test_much_that_is_near_leaves_no_variance_and_nothing_leaves_all(controls):
+    crowded = support.of(np.vstack([controls, np.tile(controls[:1], (400, 1))]))
+    assert crowded.variance(controls[:1])[0] < 2e-4
+    # Negative control: once captured, it leaves more.
+    assert support.of(controls).variance(controls[:1])[0] > 2e-3
+    assert support.of(controls).variance(controls[:1] + 100.0 * WIDE)[0] == pytest.approx(1.0)
+
+
+def test_units_do_not_matter(own, controls, rng):
+    points = np.array([1.0, -5.0, 0.0]) + WIDE * rng.uniform(-0.3, 1.3, (50, 3))
+    scale, shift = np.array([100.0, -0.01, 3.0]), np.array([7.0, 1.0, 0.0])
+    moved = support.of(controls * scale + shift)
+    assert np.allclose(moved.variance(points * scale + shift), own.variance(points), atol=CLOSE)
+    assert np.array_equal(moved.holds(points * scale + shift), own.holds(points))
+
+
+def test_one_is_told_as_many_are(own, rng):
+    points = np.array([1.0, -5.0, 0.0]) + WIDE * rng.uniform(-0.3, 1.3, (5_000, 3))
+    many = own.holds(points)
+    assert many.tolist() == [own.held(point) for point in points.tolist()]
+    plainly = (own.beyond(points) <= support.BEYOND).all(axis=1)
+    assert np.array_equal(many, plainly & (own.variance(points) <= own.limit))
+    assert set(many) == {True, False}
+
+
+def test_what_lies_farther_beyond_a_control_than_a_tenth_of_its_range_is_not_held(own, controls):
+    for control, width in enumerate(np.ptp(controls, axis=0)):
+        for end, outward in ((own.high, 1.0), (own.low, -1.0)):
+            # A sample that is the outermost already.
+            sample = controls[np.argmin(np.abs(controls[:, control] - end[control]))].copy()
+            sample[control] = end[control] + outward * 0.1001 * width
+            assert not own.held(sample.tolist())
+            assert own.beyond(sample[None])[0, control] == pytest.approx(0.1001)
+            sample[control] = end[control] + outward * 0.0999 * width
+            assert (own.beyond(sample[None])[0] <= support.BEYOND).all()
+
+
+def test_far_away_is_no_overflow(own, controls):
+    far = controls[:2] + 1e6 * WIDE
+    assert own.holds(far).tolist() == [False, False]
+    assert not own.held(far[0].tolist())
+
+
+def test_a_gap_between_two_clusters_is_seen(rng):
+    clusters = np.vstack([rng.random((30, 2)) * [0.2, 1.0], rng.random((30, 2)) * [0.2, 1.0]])
+    clusters[30:, 0] += 0.8
+    own = support.of(clusters)
+    across = np.stack([np.linspace(0.35, 0.65, 30), rng.random(30)], axis=1)
+    assert not own.holds(across).any()
+    # Negative control: where all of it was captured, the same points are held.
+    whole = support.of(rng.random((60, 2)))
+    assert whole.holds(np.clip(across, 0.1, 0.9)).mean() > 0.8
+
+
+def test_of_the_captured_clips_a_twentieth_is_beyond_the_limit(own, controls):
+    assert np.count_nonzero(own.left_out > own.limit) == len(controls) // 20

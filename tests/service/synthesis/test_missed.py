@@ -1,0 +1,42 @@
+"""What is said of goals that a motion does not meet."""
+
+import pytest
+
+from service.motion.answer import Met
+from service.motion.errors import OutOfReach
+from service.motion.measure import Measure
+from service.synthesis.exact import missed
+from service.synthesis.exact.goals import Goal, Goals
+
+HIGH = Measure("height", (3,), "highest")
+GOALS = Goals((("speed", Measure("speed"), 2.0),), (Goal("hand at 1 s", HIGH, (0, 0, 0), 1.0),))
+SLOW = Met("speed", 0.1234, "m/s", False)
+SHORT = Met("hand at 1 s", 0.1234, "m", False)
+FINE = Met("hand at 1 s", 1e-6, "m", True)
+
+
+def test_each_miss_is_a_sentence():
+    assert missed.sentences([SLOW, SHORT]) == (
+        "speed stays 0.123 m/s from its target: out of reach",
+        "hand at 1 s stays 12.3 cm from its target: out of reach",
+    )
+    assert missed.sentences([FINE]) == ()
+
+
+@pytest.mark.parametrize(
+    ("met", "field"),
+    [
+        ([SLOW, SHORT], "controls/speed"),
+        ([SLOW, FINE], "controls/speed"),
+        ([Met("speed", 0.0, "m/s", True), SHORT], "targets/0"),
+    ],
+)
+def test_the_first_miss_is_named(met, field):
+    with pytest.raises(OutOfReach) as caught:
+        missed.refuse(GOALS, met)
+    assert caught.value.field == field
+    assert caught.value.message == "; ".join(missed.sentences(met))
+
+
+def test_what_is_met_is_not_refused():
+    missed.refuse(GOALS, [Met("speed", 0.0, "m/s", True), FINE])

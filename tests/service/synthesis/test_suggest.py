@@ -1,0 +1,94 @@
+"""Which clips to capture next: points that can be asked for, ranked, and what is lacking there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.encode import suggestions
+from service.motion.errors import InvalidField
+from service.synthesis import library
+from service.synthesis.suggest import DRAWN, SuggestQuestion, suggest
+from service.synthesis.synthesizer import Synthesizer
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return library.load([labelled_path]).models["labelled"]
+
+
+def test_points_lie_in_the_box_and_the_first_is_worth_most(model):
+    found = suggest(model, SuggestQuestion(20))
+    assert (found.model, found.candidates, len(found.suggestions)) == (model.identity, DRAWN, 20)
+    for control in model.session.card.controls:
+        values = [each.controls[control.name] for each in found.suggestions]
+        assert control.minimum <= min(values) < max(values) <= control.maximum
+    assert found.suggestions[0].gain > found.suggestions[-1].gain > 0.0
+    assert found == suggest(model, SuggestQuestion(20))
+
+
+def test_the_nearest_clip_and_what_it_lacks_are_named(model):
+    card = model.session.card
+    width = np.array([c.maximum - c.minimum for c in card.controls])
+    for each in suggest(model, SuggestQuestion(5)).suggestions:
+        gaps = np.abs(np.array(card.examples) - list(each.controls.values())) / width
+        nearest = int(np.argmin(np.linalg.norm(gaps, axis=1)))
+        assert each.nearest == card.sources[nearest]
+        assert each.gap == pytest.approx(gaps[nearest].max())
+        assert each.lacking == card.controls[int(np.argmax(gaps[nearest]))].name
+
+
+def test_candidates_that_are_given_are_ranked_and_no_others(model):
+    card = model.session.card
+    names = [control.name for control in card.controls]
+    given = [dict(zip(names, map(float, example), strict=True)) for example in card.examples[:5]]
+    # In the middle of the box, where nobody half sits.
+    given.append({c.name: 0.5 * (c.minimum + c.maximum) for c in card.controls})
+    found = suggest(model, SuggestQuestion(6, None, given))
+    assert found.candidates == 6
+    assert {tuple(each.controls.values()) for each in found.suggestions} == {
+        tuple(each.values()) for each in given
+    }
+    assert max(found.suggestions, key=lambda each: each.variance).controls == given[-1]
+
+
+def test_who_is_to_be_captured_matters(model):
+    everybody, tall, short = (
+        suggest(model, SuggestQuestion(1, who)) for who in (None, "tall", "short")
+    )
+    assert tall.performer == "tall"
+    # What others did says less of one than what all did says of anybody.
+    assert tall.suggestions[0].variance > everybody.suggestions[0].variance
+    assert tall.suggestions[0].controls != short.suggestions[0].controls
+
+
+def test_a_model_that_does_not_say_its_field_is_ranked_by_a_plain_one(model):
+    old = replace(model.session, card=replace(model.session.card, kriging=None))
+    found = suggest(Synthesizer("old", old), SuggestQuestion(3))
+    assert [each.gain for each in found.suggestions] == sorted(
+        (each.gain for each in found.suggestions), reverse=True
+    )
+    assert 0.0 < found.suggestions[0].variance <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("asked", "field"),
+    [
+        (lambda: SuggestQuestion(0), "count"),
+        (lambda: SuggestQuestion(201), "count"),
+        (lambda: SuggestQuestion(1, "somebody"), "performer"),
+        (lambda: SuggestQuestion(1, None, [{"turn": 1.0}]), "candidates/0/controls/stature"),
+    ],
+)
+def test_what_cannot_be_ranked_is_named(model, asked, field):
+    with pytest.raises(InvalidField) as caught:
+        suggest(model, asked())
+    assert caught.value.field == field
+
+
+def test_they_are_said_in_a_line_each(model):
+    found = suggest(model, SuggestQuestion(3))
+    heading, *lines = suggestions.text(found).splitlines()
+    assert heading.split()[:2] == ["gain", "variance"] and len(lines) == 3
+    assert lines[0].startswith(f"{100 * found.suggestions[0].gain:.1f} %")
+    assert suggestions.plain(found)["suggestions"][0]["lacking"] in lines[0]
