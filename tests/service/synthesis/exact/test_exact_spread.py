@@ -36,7 +36,7 @@ def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_ex
     samples = opened.weigher.samples
     found = spread._coefficients(opened.card, weights, samples)
     bases = labelled.model.decoder.reduced.bases[2]
-    order = spread._order(opened.card, weights, samples)
+    order = spread.order_of(opened.card, weights, samples)
     assert np.abs(found - bases).max() < 1e-5
     assert not np.array_equal(order, np.arange(len(order)))
     # Negative control: in the order of the file they are other clips'.
