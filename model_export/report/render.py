@@ -14,6 +14,7 @@ from model_export.report import (
     page,
     sizes,
     spectra,
+    trust,
     variograms,
     warps,
 )
@@ -56,6 +57,7 @@ def _chapters(trained: Trained, ladder: Ladder, own: About) -> dict[str, Chapter
         "figures": figures.of(trained, missed.worst),
         "calibration": calibration.of(trained),
         "coverage": coverage.of(trained, controls),
+        "trust": trust.of(own.exported),
         "variograms": variograms.of(trained, controls),
         "spectra": spectra.of(trained),
         "sizes": sizes.of(trained),

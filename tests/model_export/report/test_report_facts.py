@@ -21,8 +21,10 @@ from model_export.report import (
     warps,
 )
 from model_export.report.calibration import Calibration
+from model_export.report.trust import Trust
 from model_export.report.warps import Warps
 from model_export.warp import DENSE
+from service.motion.measure import Measure
 
 # JSON holds six digits.
 DIGITS = 1e-5
@@ -156,6 +158,23 @@ def test_a_control_that_tells_performers_apart_is_said_so(trained, controls):
     values[0, 0] += 0.01
     assert replace(found, values=values).labels() == ()
     assert replace(found, performers=("",) * len(values)).labels() == ()
+
+
+def test_trust_says_what_to_capture_and_which_joints_err(facts, exported):
+    found = facts["trust"]
+    card = exported.card
+    assert found["measured"] == {}
+    assert list(found["joint_sigma"].values()) == sorted(card.joint_sigma, reverse=True)
+    assert set(found["joint_sigma"]) == set(card.skeleton.names)
+    gains = [point["gain"] for point in found["suggestions"]]
+    assert gains == sorted(gains, reverse=True) and gains[-1] > 0.0
+    assert 0.0 < found["support_limit"] < 1.0
+    hand = Measure("height", (card.skeleton.names.index("RightHand"),), "end")
+    told = replace(card, controls=(replace(card.controls[0], measure=hand), *card.controls[1:]))
+    held = Trust(told, 0.5, ())
+    assert held.measured == {card.controls[0].name: "height of RightHand at end"}
+    assert "RightHand" in held.section().words[0]
+    assert "RightHand" not in Trust(card, 0.5, ()).section().words[0]
 
 
 def test_coverage_says_where_nothing_is(facts, trained):
