@@ -17,6 +17,9 @@ from model_export.model import Model
 from model_export.tensor import CONSTANT, MotionTensor
 from service.motion.conventions import Floats
 
+# A model that was cut nowhere may still leave out what nobody sees, m.
+LEAST = 1e-4
+
 
 @dataclass(frozen=True)
 class Extended:
@@ -56,7 +59,7 @@ def extend(
     centred = (numbers - decoder.mean)[..., space.varies] @ space.root
     # Half of the squared distance for either mode.
     clips, frames = numbers.shape[:2]
-    budget = allowed**2 * weight * clips * frames / 2.0
+    budget = max(allowed, LEAST) ** 2 * weight * clips * frames / 2.0
     directions = _more(space.directions, centred, budget)
     coordinates = (centred @ directions).swapaxes(1, 2)
     times = np.linalg.qr(decoder.reduced.bases[1])[0]

@@ -214,5 +214,7 @@ def refuse_repeats(rows: Sequence[Row]) -> None:
     for row in rows:
         key = (str(row.place), row.first_frame, row.last_frame)
         if key in seen:
-            raise row.fault(f"the same frames of the same file as {seen[key].named}")
+            line = seen[key].line
+            again = "as before" if line is None else f"as line {line}"
+            raise row.fault(f"the same frames of the same file {again}")
         seen[key] = row

@@ -10,6 +10,7 @@ from model_export import (
     adapt,
     canonical,
     export,
+    extend,
     ingest,
     kriging,
     new_fields,
@@ -139,6 +140,17 @@ def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(kno
     assert extended.ranks[0] > r1
     fewer = extended.full.truncated((r1, r2, extended.ranks[2])).restored()
     assert lost(extended.tensor.numbers(fewer)) > lost(numbers)
+
+
+def test_a_model_that_was_cut_nowhere_takes_up_no_rounding_errors(known, adapted):
+    whole = replace(known, truncation=0.0)
+    moved, parents = adapted.moved, known.skeleton.parents
+    found = extend.extend(whole.model, parents, known.joint_weights, moved.numbers, 0.0)
+    gaps = (moved.numbers - found.tensor.mean) @ found.tensor.whiten.T
+    said = found.full.truncated(found.ranks).restored()[:, :, -len(SHOWN) :]
+    assert np.sqrt(np.mean(np.sum((gaps - said.transpose(2, 1, 0)) ** 2, axis=-1))) < 1e-3
+    freedoms = np.count_nonzero(np.ptp(moved.numbers, axis=(0, 1)) > 1e-9)
+    assert adapted.extended.ranks[0] < found.ranks[0] <= freedoms
 
 
 def test_a_range_that_grows_moves_no_field(trained, known):

@@ -99,7 +99,7 @@ def test_a_control_that_nobody_can_measure_is_asked_for(reopened, table):
         ("file,speed,haste\n0.bvh,1,2\n", r"columns \['haste'\], expected some of"),
         ("file,speed,last_frame\n0.bvh,1,99\n", "frame 99, but .* has frames 0 to 30"),
         ("file,speed,last_frame\n0.bvh,1,0\n", "frames 0 to 0, expected at least two"),
-        ("file,speed\n0.bvh,1\n0.bvh,2\n", "same frames of the same file as line 2, 0.bvh"),
+        ("file,speed\n0.bvh,1\n0.bvh,2\n", "same frames of the same file as line 2"),
     ],
 )
 def test_tables_that_cannot_be_meant(reopened, table, text, said):
@@ -110,7 +110,7 @@ def test_tables_that_cannot_be_meant(reopened, table, text, said):
 
 def test_the_same_file_twice_is_refused(reopened, table):
     own = with_measure(reopened, Measure("height", (0,), "end"))
-    with pytest.raises(RecipeError, match=r"same frames of the same file as 0\.bvh"):
+    with pytest.raises(RecipeError, match="same frames of the same file as before"):
         new_clips.of_files(own, [table.parent / "0.bvh"] * 2, METRES, "cy")
 
 

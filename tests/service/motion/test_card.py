@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from service.motion import card
-from service.motion.card import Control, Event, ModelCard
+from service.motion.card import Control, Event, Making, ModelCard
 from service.motion.detail import Level
 from service.motion.field import Hyper
 from service.motion.skeleton import Skeleton
@@ -70,9 +70,8 @@ def test_card_read_is_the_card_written():
     assert replace(read, skeleton=CARD.skeleton, kriging=CARD.kriging) == CARD
 
 
-OPTIONAL = (
-    *("performers", "roles", "sources", "kriging", "left_out", "event", "beside", "joint_sigma"),
-    "making",
+OPTIONAL = tuple(
+    "performers roles sources kriging left_out event beside joint_sigma making".split()
 )
 
 
@@ -83,6 +82,21 @@ def test_card_without_one_of_its_fields_is_refused_by_name(field):
     with pytest.raises(ValueError) as refusal:
         card.load(metadata)
     assert str(refusal.value) == f"incomplete posefield metadata: '{field}'"
+
+
+def test_a_making_travels_in_the_file_and_no_client_is_told():
+    made = Making({"warp": (0.25, 0.0, 1.0)}, {"peak": 0.4}, {"Hand": 2.0}, in_phase=True)
+    written = card.dump(replace(CARD, making=made))
+    assert card.load(written).making == made
+    assert "making" not in card.plain_values(replace(CARD, making=made))
+    # What there is nothing to say of takes no bytes.
+    few = Making({"warp": (0.25, 1.0)})
+    assert (
+        card.dump(replace(CARD, making=few))["posefield.making"]
+        == '{"fields": {"warp": [0.25, 1.0]}}'
+    )
+    assert card.load(card.dump(replace(CARD, making=few))).making == few
+    assert card.load(card.dump(CARD)).making is None
 
 
 def test_a_card_that_says_nothing_of_roles_has_none():
