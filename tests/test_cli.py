@@ -107,10 +107,10 @@ def test_a_gap_is_warned_of_and_refused_where_that_is_asked(posefield, refused, 
 
 def test_sigma_by_joint_is_said_where_it_is_asked_for(posefield, labelled_path, tmp_path):
     code, out, _ = posefield("pose", labelled_path, *CONTROLS, "--joint-sigma")
-    assert code == 0 and len(json.loads(out)["trust"]["joint_sigma"]) == 31
+    assert code == 0 and len(json.loads(out)["trust"]["joint_sigma"]) == 33
     clip = ["clip", labelled_path, *CONTROLS, "-o", tmp_path / "clip.json", "--json"]
     assert "joint_sigma" not in json.loads(posefield(*clip)[1])
-    assert len(json.loads(posefield(*clip, "--joint-sigma")[1])["joint_sigma"]) == 31
+    assert len(json.loads(posefield(*clip, "--joint-sigma")[1])["joint_sigma"]) == 33
 
 
 # --- suggest --------------------------------------------------------------------------------------
