@@ -15,6 +15,7 @@ import client
 import clips_http
 import crowd
 import crowd_usd
+import exact
 import export
 import export_cluster
 import export_formats
@@ -45,6 +46,7 @@ def main() -> None:
     rows: list[Row] = [
         *precompute.rows(made),
         *runtime.rows(made),
+        *exact.rows(made),
         *export_formats.rows(made),
         *crowd.rows(made),
         *crowd_usd.rows(),

@@ -306,7 +306,7 @@ def suggest(
     count: Annotated[int, typer.Option(help="points to list")] = COUNT,
     performer: Annotated[
         str | None,
-        typer.Option(help="who is to be captured; if not said, clips of all count alike"),
+        typer.Option(help="whose clips alone count as captured; everybody's if not said"),
     ] = None,
     candidates: Annotated[
         Path | None,

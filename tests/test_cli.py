@@ -58,7 +58,7 @@ def test_it_is_a_command_of_its_own():
     command = str(Path(sys.executable).parent / "posefield")
     done = subprocess.run([command, "--help"], capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    for name in ("sample", "train", "inspect", "pose", "clip", "why", "serve", "check"):
+    for name in ("sample", "train", "inspect", "pose", "clip", "why", "suggest", "serve", "check"):
         assert re.search(rf"\b{name}\b", done.stdout)
 
 
@@ -76,8 +76,9 @@ def test_a_process_ends_with_the_code_of_its_fault(tmp_path):
 
 def test_why_lists_the_nearest_clips_and_the_others(posefield, labelled_path):
     code, out, err = posefield("why", labelled_path, *CONTROLS, *TALL, "--nearest", 3)
-    head, *lines, others = out.splitlines()
+    head, *lines, others, support = out.splitlines()
     assert (code, err, len(lines)) == (0, "", 3)
+    assert support.startswith("something like it was captured: variance 0.0")
     assert head.split() == ["clip", "distance", "weight"]
     assert re.fullmatch(
         r"reach_\d+\.bvh +0\.\d{3} +\d+\.\d %  (tall|middle|short), stature .*", lines[0]
@@ -92,6 +93,46 @@ def test_why_answers_as_json(posefield, labelled_path):
     weights = [clip["weight"] for clip in found["nearest"]]
     assert len(weights) == 10 and found["others"]["count"] == 36
     assert abs(sum(weights) + found["others"]["weight"] - 1.0) < 1e-7
+
+
+def test_a_gap_is_warned_of_and_refused_where_that_is_asked(posefield, refused, labelled_path):
+    sitting = ["-c", "stature=1.88", "-c", "hip_height=0.46", "-c", "turn=90"]
+    asked = ["pose", labelled_path, *sitting, "-c", "target_height=1.9"]
+    code, out, err = posefield(*asked)
+    assert (code, json.loads(out)["trust"]["supported"]) == (0, False)
+    assert err.startswith("warning: ")
+    assert posefield(*asked, "--extrapolate", "ok")[2] == ""
+    refused(2, *asked, "--extrapolate", "refuse")
+
+
+def test_sigma_by_joint_is_said_where_it_is_asked_for(posefield, labelled_path, tmp_path):
+    code, out, _ = posefield("pose", labelled_path, *CONTROLS, "--joint-sigma")
+    assert code == 0 and len(json.loads(out)["trust"]["joint_sigma"]) == 31
+    clip = ["clip", labelled_path, *CONTROLS, "-o", tmp_path / "clip.json", "--json"]
+    assert "joint_sigma" not in json.loads(posefield(*clip)[1])
+    assert len(json.loads(posefield(*clip, "--joint-sigma")[1])["joint_sigma"]) == 31
+
+
+# --- suggest --------------------------------------------------------------------------------------
+
+
+def test_suggest_lists_points_and_answers_as_json(posefield, labelled_path):
+    code, out, err = posefield("suggest", labelled_path, "--count", 2)
+    assert (code, err, len(out.splitlines())) == (0, "", 3)
+    found = json.loads(posefield("suggest", labelled_path, "--performer", "tall", "--json")[1])
+    assert (found["performer"], len(found["suggestions"])) == ("tall", 10)
+
+
+def test_suggest_ranks_what_can_be_captured(posefield, refused, labelled_path, tmp_path):
+    table = tmp_path / "can.csv"
+    heading = "stature,hip_height,turn,target_height"
+    table.write_text(f"{heading}\n1.75,0.9,10,1.0\n1.7,0.7,-20,0.8\n")
+    words = ["suggest", labelled_path, "--candidates", table]
+    found = json.loads(posefield(*words, "--json")[1])
+    assert found["candidates"] == 2
+    assert {each["controls"]["turn"] for each in found["suggestions"]} == {10.0, -20.0}
+    table.write_text(f"{heading}\n1.75,0.9,10,high\n")
+    assert "can.csv:2" in refused(2, *words)
 
 
 def test_why_of_nothing_is_refused(refused, labelled_path):

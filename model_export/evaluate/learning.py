@@ -16,12 +16,11 @@ from model_export import ingest, recipe, threads
 from model_export.evaluate import errors, methods, motion, truth
 from model_export.evaluate.methods import Asked
 from model_export.evaluate.protocol import RATE, Report
-from model_export.recipe import Recipe
 from model_export.sample import family, write
 from model_export.sample import truth as truths
 from model_export.sample.controls import Controls
 from model_export.sample.family import Sample
-from model_export.train import Trained, train
+from model_export.train import train
 from service.motion import support, worth
 from service.motion.conventions import Floats, Indices
 
@@ -96,21 +95,10 @@ def _trials() -> dict[str, list[Sample]]:
 
 
 def _suggested(first: Sequence[Sample], candidates: Floats) -> Indices:
-    """What a model of the first samples ranks highest."""
-    controls = np.array([_row(sample.controls) for sample in first])
-    own = support.of(controls)
-    with tempfile.TemporaryDirectory() as scratch:
-        trained = _trained(write.some(Path(scratch) / "first", first))[1]
-    hyper = trained.pose.hyper
-    ranked = worth.rank(hyper, own.scaled(candidates), own.scaled(controls), END - START)
+    """What is ranked highest where the first samples are known."""
+    own = support.of(np.array([_row(sample.controls) for sample in first]))
+    ranked = worth.rank(own.scaled(candidates), own.samples, END - START)
     return np.array([at for at, _ in ranked])
-
-
-def _trained(recipe_file: Path) -> tuple[Recipe, Trained]:
-    own = recipe.read(recipe_file)
-    examples, _ = ingest.ingest(own, recipe_file.parent)
-    with threads.one():
-        return own, train(own, examples, lambda _: None)
 
 
 def _row(own: Controls) -> list[float]:
@@ -124,8 +112,10 @@ def _sample(point: list[float], rng: np.random.Generator) -> Sample:
 
 def _error(folder: Path) -> tuple[float, float]:
     """Global and root-relative distance of what a family is trained to, m."""
-    own, trained = _trained(folder / "recipe.toml")
+    own = recipe.read(folder / "recipe.toml")
+    examples, _ = ingest.ingest(own, folder)
     with threads.one():
+        trained = train(own, examples, lambda _: None)
         points = truth.points(ASKED)
         found = methods.ours(own, trained, Asked(points, [""] * len(points)))
         captured = [motion.of_clip(truths.clip(list(p), RATE), None) for p in points]

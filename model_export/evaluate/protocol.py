@@ -2,19 +2,30 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
-from model_export import export, threads
-from model_export.evaluate import errors, exact, flags, folds, methods, motion, newcomers, truth
+from model_export import export, fidelity, threads
+from model_export.evaluate import (
+    errors,
+    exact,
+    flags,
+    folds,
+    methods,
+    motion,
+    newcomers,
+    shown,
+    truth,
+)
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.exact import Correction
 from model_export.evaluate.flags import Flags
 from model_export.evaluate.folds import Fold
 from model_export.evaluate.methods import EXACT, OURS, Asked
 from model_export.evaluate.motion import Event, Motion
+from model_export.evaluate.shown import CAPTURED, Stills
 from model_export.ingest import Example
 from model_export.recipe import Recipe
 from model_export.sample import truth as truths
@@ -26,6 +37,9 @@ from service.motion.errors import TrainingError
 RATE = 120.0
 # Truths asked at a time, so that progress is seen and memory bounded.
 BATCH = 50
+
+# Methods whose answers are kept to be looked at.
+OWN = (OURS, EXACT, *newcomers.SHOWN)
 
 Report = Callable[[int, int], None]
 """Is told how many parts are done, and of how many."""
@@ -39,7 +53,8 @@ class Result:
     was not asked. sigma (C,): predicted standard deviation of ours, m; joint_sigma (C, J): of each
     joint, by name in `joints`. corrections (C,): what it took to hold ours to the captured event;
     none where the recipe names no event. flags: how the support flag does on the same clips; none
-    against the truth, which is everywhere.
+    against the truth, which is everywhere. stills: of the captured clips and of our own answers,
+    with the joints' parents.
     """
 
     family: str
@@ -51,6 +66,8 @@ class Result:
     joints: tuple[str, ...]
     corrections: tuple[Correction, ...]
     flags: Flags | None = None
+    stills: Stills = field(default_factory=dict)
+    parents: tuple[int, ...] = ()
 
     def asked(self, name: str) -> list[int]:
         """Places of the clips that a method was asked for."""
@@ -70,6 +87,8 @@ class _Part:
     sigma: Floats
     joint_sigma: Floats
     corrections: list[Correction]
+    stills: Stills
+    parents: tuple[int, ...]
 
     def of(self, name: str) -> Sequence[Errors | None]:
         """Errors of a method, none of one that was not asked."""
@@ -203,7 +222,15 @@ def _compared(
         ]
         for name, named in motions.items()
     }
-    return _Part(places, compared, found.sigma, found.joint_sigma, corrections)
+    named = {CAPTURED: held.captured, **{name: motions[name] for name in motions if name in OWN}}
+    moment = fidelity.moment(recipe, trained.examples)
+    stills = {
+        name: [shown.still(own, moment.joint) if moment else None for own in made_of]
+        for name, made_of in named.items()
+    }
+    parents = trained.skeleton.parents
+    trust = found.sigma, found.joint_sigma
+    return _Part(places, compared, *trust, corrections, stills, parents)
 
 
 @dataclass(frozen=True)
@@ -223,6 +250,11 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
     # Where a fold holds the last but one performer out, nobody is told apart in it.
     methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
     gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
+    stills = {
+        name: [s for part in listed for s in part.stills.get(name, [None] * len(part.places))]
+        for name in (CAPTURED, *OWN)
+        if any(name in part.stills for part in listed)
+    }
     return Result(
         recipe.name,
         asked.protocol,
@@ -232,4 +264,6 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
         np.concatenate([part.joint_sigma for part in listed])[order],
         asked.joints,
         tuple(corrections[i] for i in order if corrections),
+        stills={name: [own[i] for i in order] for name, own in stills.items()},
+        parents=listed[0].parents,
     )

@@ -67,7 +67,7 @@ SHARE: dict[str, Any] = {"shown": "{:.1%}", "worst": False}
 
 
 def _time(key: str, words: str, seconds: Floats) -> Figure:
-    # What else the machine does is no part of it.
+    # A median: some clips come when the machine has woken up.
     return Figure(key, words, 1e3 * np.full(1, np.median(seconds)), worst=False)
 
 

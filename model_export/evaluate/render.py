@@ -6,9 +6,10 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from model_export.evaluate import reach, summary
+from model_export.evaluate import reach, shown, summary
 from model_export.evaluate.learning import Learning
-from model_export.evaluate.methods import DEFINITIONS, OURS
+from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
+from model_export.evaluate.newcomers import SHOWN
 from model_export.evaluate.protocol import Result
 from model_export.evaluate.summary import Summary
 from model_export.report import page, picture
@@ -45,8 +46,34 @@ def _section(result: Result) -> Section:
         TITLES[result.protocol],
         (summary.LEGEND, _verdict(found), *summary.trust_said(result)),
         (Table(summary.HEAD, tuple(one.cells() for one in found)), *_held(result)),
-        (_bars(result, found), _clips(result, found), _calibration(result)),
+        (_bars(result, found), _clips(result, found), _calibration(result), *_stills(result)),
     )
+
+
+PANELS: dict[str, dict[str, str]] = {
+    "leave_one_clip_out": {OURS: "predicted", EXACT: "held to the target"},
+    "leave_one_performer_out": {
+        OURS: "nothing shown",
+        **{name: f"{count} shown" for name, count in SHOWN.items() if count < max(SHOWN.values())},
+    },
+}
+"""What is drawn of a clip, and what is said of it."""
+
+
+def _stills(result: Result) -> list[Picture]:
+    """The reach of a clip in the middle of all, at its event."""
+    words = PANELS.get(result.protocol, {})
+    place = shown.chosen(result.stills, tuple(words)) if words else None
+    if place is None:
+        return []
+    clip = result.clips[place]
+    own = shown.scene(result.stills, words, clip, place, result.parents)
+    caption = (
+        f"{clip} at its event, in orange over the captured body; dotted, the way of the joint that "
+        "counts there, and a cross where it was captured. Half of all clips are met nearer by the "
+        "first of the answers."
+    )
+    return [shown.drawn(f"{result.protocol}-reach", own, caption)]
 
 
 def _held(result: Result) -> list[Table]:

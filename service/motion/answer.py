@@ -186,7 +186,7 @@ class Suggestion:
     """A point to capture.
 
     gain: share by which the mean variance over all that may be asked falls if it is. variance: at
-    the point itself, as a share of the sill. nearest: source of the captured clip nearest to it;
+    the point itself, from 0 to 1. nearest: source of the captured clip nearest to it;
     none for models that do not keep them. lacking: the control in which that differs most, by
     `gap`, a share of its range.
     """
@@ -203,7 +203,7 @@ class Suggestion:
 class Suggestions:
     """Points to capture next, the one that is worth most first; each as if those before it were.
 
-    model: name@contenthash. performer: who is to be captured; for none clips of all counted alike.
+    model: name@contenthash. performer: whose clips alone counted as captured; none for everybody's.
     candidates: of how many points they were chosen.
     """
 

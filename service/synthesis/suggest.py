@@ -1,32 +1,29 @@
 """Which clips to capture next: points all over what was sampled, or such as are given, ranked."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import worth
 from service.motion.answer import Suggestion, Suggestions
 from service.motion.card import Control, ModelCard
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 from service.motion.errors import InvalidField
-from service.motion.field import Hyper
 from service.motion.support import Support
-from service.motion.worth import Worth, rank
+from service.motion.worth import Worth
 from service.synthesis import door, limits
 from service.synthesis.synthesizer import Synthesizer
 
 COUNT, MOST = 10, 200
 DRAWN, GIVEN = 1000, 10_000
 """Candidates that are drawn, and that may be given."""
-# The field of cards that do not say theirs: 5 % of the covariance is left at one over the scale.
-PLAIN_SCALE = 0.4
-PLAIN = Hyper("gaussian", (0,), np.zeros(0), 0.05)
 
 
 @dataclass(frozen=True)
 class SuggestQuestion:
     """How many points, and of which: candidates by their controls, or for none points all over the
-    box that was sampled. performer: who is to be captured; for none, clips of all count alike."""
+    box that was sampled. performer: whose clips alone count as captured; all do for none."""
 
     count: int = COUNT
     performer: str | None = None
@@ -40,30 +37,22 @@ class SuggestQuestion:
 def suggest(model: Synthesizer, asked: SuggestQuestion) -> Suggestions:
     """Points to capture, the one that is worth most first, each as if those before it were.
 
-    The field is that of the poses, with what training found of it. InvalidField for a performer
-    that there is not, and a candidate that cannot be used.
+    InvalidField for a performer that there is not, and a candidate that cannot be used.
     """
     card, own = model.session.card, model.door.support
-    labels = door.labels(card.performers, asked.performer)
+    door.labels(card.performers, asked.performer)
     points = _given(model, asked.candidates) if asked.candidates else _drawn(own)
-    hyper, samples = _field(card, own, asked.performer)
-    whose = np.repeat(labels, len(points), axis=0)[:, : samples.shape[1] - points.shape[1]]
-    ranked = rank(hyper, np.hstack([own.scaled(points), whose]), samples, asked.count)
-    found = tuple(_suggestion(card, own, points[at], worth) for at, worth in ranked)
+    captured = _captured(card, asked.performer)
+    ranked = worth.rank(own.scaled(points), own.samples[captured], asked.count)
+    found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
     return Suggestions(model.identity, asked.performer, len(points), found)
 
 
-def _field(card: ModelCard, own: Support, performer: str | None) -> tuple[Hyper, Floats]:
-    """The field of the poses, or where the card does not say it a plain one, and its samples.
-
-    Performers are told apart where one is asked for.
-    """
-    samples = own.scaled(np.array(card.examples))
-    if card.kriging is None:
-        return replace(PLAIN, scales=np.full(len(card.controls), PLAIN_SCALE)), samples
+def _captured(card: ModelCard, performer: str | None) -> Indices:
+    """Which of the captured clips count."""
     if performer is None:
-        return replace(card.kriging, label=0.0), samples
-    return card.kriging, np.hstack([samples, np.eye(len(card.performers))[list(card.moved_by)]])
+        return np.arange(len(card.examples))
+    return np.flatnonzero(np.array(card.moved_by) == card.performers.index(performer))
 
 
 def _given(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
@@ -98,18 +87,19 @@ def _drawn(own: Support) -> Floats:
     return own.low + share * (own.high - own.low)
 
 
-def _suggestion(card: ModelCard, own: Support, point: Floats, worth: Worth) -> Suggestion:
+def _suggestion(
+    card: ModelCard, own: Support, captured: Indices, point: Floats, found: Worth
+) -> Suggestion:
     """A point with what is near it, and what that lacks."""
-    gaps = 0.5 * np.abs(own.samples - own.scaled(point[None]))
+    gaps = 0.5 * np.abs(own.samples[captured] - own.scaled(point[None]))
     nearest = int(np.argmin(np.sum(np.square(gaps), axis=1)))
     control = int(np.argmax(gaps[nearest]))
     names = [each.name for each in card.controls]
-    source = card.sources[nearest] if card.sources else None
     return Suggestion(
         dict(zip(names, point.tolist(), strict=True)),
-        worth.gain,
-        worth.variance,
-        source,
+        found.gain,
+        found.variance,
+        card.sources[captured[nearest]] if card.sources else None,
         names[control],
         float(gaps[nearest, control]),
     )

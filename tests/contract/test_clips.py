@@ -95,7 +95,7 @@ def test_an_archive_says_where_it_comes_from(ask, questions, loaded):
     assert answer.headers["content-disposition"] == 'attachment; filename="reach.zip"'
     assert answer.headers["content-type"] == "application/zip"
     warning = json.loads(answer.headers["posefield-warning"])
-    assert warning == "1 of 4 clips have some control outside what was sampled"
+    assert warning == "1 of 4 clips lie outside what was sampled, or in a gap of it"
     within = ask("POST", f"{CLIPS}.tar", json=asked("usdc", questions[:3]))
     assert "posefield-warning" not in within.headers
 

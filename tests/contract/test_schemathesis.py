@@ -177,8 +177,9 @@ def narrowed(spec, card, digest):
 
 
 def narrow_holds(parts, card, times):
-    """What this model can be held to: no control of it is measured, and which places are out of
-    reach, or that two targets differ, cannot be said in a schema."""
+    """What this model can be held to: no control of it is measured, it has no feet to pin, and
+    which places are out of reach, or that two targets differ, cannot be said in a schema."""
+    parts["schemas"]["PinFeet"] = {"type": "boolean", "enum": [False]}
     parts["schemas"]["Exact"] = parts["parameters"]["exact"]["schema"] = {"enum": ["auto", "none"]}
     parts["schemas"]["Extrapolate"] = {"enum": ["warn"]}
     target = parts["schemas"]["Target"]["properties"]

@@ -12,7 +12,7 @@ from service.motion import support
 from service.motion.errors import InvalidField
 
 NAMES = ("left", "up")
-RAISED = np.array([0.0, 3.0, 0.0, 0.0])
+RAISED = np.array([0.0, 30.0, 0.0, 0.0])
 
 
 @pytest.fixture
@@ -34,9 +34,9 @@ def test_what_is_captured_evenly_is_seldom_flagged_and_what_is_beyond_always(con
 def test_a_fold_does_not_know_what_it_holds_out(controls, parts):
     alone = np.vstack([controls, [[5.0, 1.0]], [[5.0, 1.1]]])
     apart = flags.measure(alone, NAMES, [*parts, Fold((60, 61))])
-    # Both strangers of the last fold are flagged: with them in the training they would not be.
+    # Both strangers of the last fold are flagged, who stand far beyond what all others know.
     assert apart.alarms >= 2 / 62
-    assert support.of(alone).holds(alone[60:]).all()
+    assert (support.of(alone).beyond(alone[60:]) == 0.0).all()
 
 
 def test_two_families_are_joined_by_what_both_have_and_their_gap_is_flagged(small_recipe, examples):

@@ -293,7 +293,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
-    supported: bool
+    supported: bool | None = None
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
@@ -341,7 +341,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     performer: str | None
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
-    support: Backing
+    support: Backing | None = None
     nearest: tuple[CapturedClip, ...]
     others: ReasonsOthers
 
@@ -381,7 +381,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
-    supported: bool
+    supported: bool | None = None
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]

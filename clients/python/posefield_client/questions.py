@@ -102,7 +102,7 @@ def why(
 def suggest(
     model: str, /, *, count: int | None = None, performer: str | None = None
 ) -> Call[Suggestions]:
-    """Which clips to capture next; performer: who is to be captured."""
+    """Which clips to capture next; performer: whose alone count as captured."""
     words = asking.said(count=count, performer=performer)
     return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
 

@@ -1526,7 +1526,7 @@ export interface components {
             /** @description As in Trust. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
-            support: components["schemas"]["Backing"];
+            support?: components["schemas"]["Backing"];
             /** @description The nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
             /** @description How many clips are not listed, and what they count for together. */
@@ -1552,7 +1552,7 @@ export interface components {
         /** @description Each point is ranked as if those before it had been captured already. */
         Suggestions: {
             model: components["schemas"]["Identity"];
-            /** @description Who is to be captured; null where clips of all count alike. */
+            /** @description Whose clips alone counted as captured; null for everybody's. */
             performer: string | null;
             /** @description Of how many points these were chosen. */
             candidates: number;
@@ -1561,9 +1561,9 @@ export interface components {
         };
         Suggestion: {
             controls: components["schemas"]["Controls"];
-            /** @description Share by which the mean variance of the poses falls over all that may be asked, once this is captured. */
+            /** @description Share by which the mean of `variance`, as Backing has it, falls over all that may be asked, once this is captured. */
             gain: number;
-            /** @description At the point itself, before, as a share of the sill. */
+            /** @description As Backing has it, at the point itself, before. */
             variance: number;
             /** @description Source of the captured clip nearest to it; null in models trained before this was kept. */
             nearest: string | null;
@@ -1700,7 +1700,7 @@ export interface components {
             duration: number;
             /** @description As in Trust, m. */
             sigma: number;
-            supported: components["schemas"]["Supported"];
+            supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
             warnings: string[];
@@ -1724,7 +1724,7 @@ export interface components {
             duration: number;
             /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
             sigma: number;
-            supported: components["schemas"]["Supported"];
+            supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
             /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
@@ -1742,7 +1742,7 @@ export interface components {
          *     targets; not there where none was. Since 2.2.0.
          */
         Inferred: string[];
-        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. */
+        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. Always there since 2.2.0. */
         Supported: boolean;
         /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
         SigmaByJoint: number[];
@@ -2094,7 +2094,7 @@ export interface components {
             /** @description As in Trust, m. */
             sigma: number[];
             /** @description As in Trust. */
-            supported: boolean[];
+            supported?: boolean[];
             /** @description The level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers; absent without a camera. */
@@ -3217,7 +3217,7 @@ export interface components {
         /** @description How many points. */
         suggestions: number;
         /**
-         * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+         * @description Whose clips alone count as captured, of the `performers` that the model's card names; everybody's, if left out.
          * @example tall
          */
         whose: string;
@@ -3327,7 +3327,7 @@ export interface components {
          *     object in ASCII; absent where none was. Since 2.2.0.
          */
         Inferred: string;
-        /** @description As `supported` in Trust. */
+        /** @description As `supported` in Trust; always there since 2.2.0. */
         Supported: "true" | "false";
         /**
          * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
@@ -5731,7 +5731,7 @@ export interface operations {
                 /** @description How many points. */
                 count?: components["parameters"]["suggestions"];
                 /**
-                 * @description Who is to be captured, of the `performers` that the model's card names; if left out, clips of all count alike.
+                 * @description Whose clips alone count as captured, of the `performers` that the model's card names; everybody's, if left out.
                  * @example tall
                  */
                 performer?: components["parameters"]["whose"];
@@ -6705,7 +6705,6 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
-    "supported",
     "warnings"
   ],
   "ModelCard": [
@@ -6753,7 +6752,6 @@ export const REQUIRED = {
     "controls",
     "performer",
     "warnings",
-    "support",
     "nearest",
     "others"
   ],
@@ -6782,7 +6780,6 @@ export const REQUIRED = {
     "level",
     "duration",
     "sigma",
-    "supported",
     "warnings"
   ]
 } as const;

@@ -85,6 +85,8 @@ function trust(answer: CrowdPoses, { controls, performer, level }: State): Poses
     level,
     duration: answer.duration[0]!,
     sigma: answer.sigma[0]!,
+    // Services older than 2.2.0 warn of what lies outside, and say no more.
+    supported: answer.supported?.[0] ?? answer.warnings.length === 0,
     warnings: [...answer.warnings],
   };
 }

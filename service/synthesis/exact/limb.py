@@ -17,8 +17,8 @@ class Limb:
     """A chain of joints from the root to one, with their bones (C, 3), m, and what the reduced
     tensor says of them.
 
-    rotations (C, 4): mean ones. mean (3 + 3 C,), directions (r1, 3 + 3 C): of the root's position
-    and the chain's rotation vectors.
+    rotations (C, 3, 3): mean ones. mean (3 + 3 C,), directions (r1, 3 + 3 C): of the root's
+    position and the chain's rotation vectors.
     """
 
     bones: Floats
@@ -31,11 +31,12 @@ class Limb:
         of a cycle's travel: to the left and ahead, m, and turned, rad."""
         found = self.mean + moves @ self.directions
         vectors = found[:, 3:].reshape(len(moves), -1, 3)
-        turns = quat.mul(self.rotations, quat.exp(vectors))
-        turns[:, 0] = quat.mul(quat.about(UP, gone[:, 2]), turns[:, 0])
+        turns = self.rotations @ quat.to_matrix(quat.exp(vectors))
+        if gone[:, 2].any():
+            turns[:, 0] = quat.to_matrix(quat.about(UP, gone[:, 2])) @ turns[:, 0]
         roots = found[:, :3].copy()
         roots[:, [0, 2]] += gone[:, :2]
-        return _forward(self.bones, vectors, quat.to_matrix(turns), roots)
+        return _forward(self.bones, vectors, turns, roots)
 
     def gradient(self, pose: "Pose", row: int) -> tuple[Floats, Floats]:
         """How the last joint moves with the coefficients of the first mode (3, r1), m, and with the
@@ -64,7 +65,7 @@ def to(joint: int, parents: tuple[int, ...], bones: Floats, reduced: Reduced) ->
         chain.insert(0, parents[chain[0]])
     numbers = [0, 1, 2, *(3 + 3 * link + axis for link in chain for axis in range(3))]
     mean, directions = reduced.mean[numbers], reduced.directions[:, numbers]
-    return Limb(bones[chain], reduced.rotations[chain], mean, directions)
+    return Limb(bones[chain], quat.to_matrix(reduced.rotations[chain]), mean, directions)
 
 
 def _forward(bones: Floats, vectors: Floats, turns: Floats, roots: Floats) -> Pose:

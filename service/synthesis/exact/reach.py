@@ -18,6 +18,8 @@ from service.synthesis.exact.spread import Spread
 
 # Of the covariance: an even share for all values of an aim, so that none is nothing.
 EVEN = 0.1
+# Of an aim's even share: what goes along with that of the same joint a moment later.
+ALONG = 0.99
 # Standard deviations that three coordinates of a target may be off: one captured clip in 300. At 4
 # a tenth of the targets 20 cm too far are not told from others, at 3.25 one captured one in 70 is.
 FAR = 3.7
@@ -111,10 +113,17 @@ def _strays(
 
 
 def _evened(covariance: Floats, whose: tuple[int, ...]) -> Floats:
+    """Covariance with an even share for all values of an aim, which goes along with that of other
+    aims as the whole of it does: else two that contradict each other would seem near."""
     members = np.eye(1 + max(whose))[list(whose)]
+    sizes = members.sum(axis=0).astype(np.int64)
+    place = np.concatenate([np.arange(size) for size in sizes])
+    alike = (place[:, None] == place) & (sizes[list(whose), None] == sizes[list(whose)])
+    shared = members.T @ (alike * covariance) @ members / sizes
     # What never moves has no variance at all.
-    means = np.maximum(_means(members, np.diagonal(covariance)), 1e-12)
-    return (1.0 - EVEN) * covariance + EVEN * np.diag(members @ means)
+    own = np.diag(np.maximum(np.diagonal(shared), 1e-12))
+    shared = ALONG * shared + (1.0 - ALONG) * own
+    return (1.0 - EVEN) * covariance + EVEN * alike * (members @ shared @ members.T)
 
 
 def _means(members: Floats, values: Floats) -> Floats:

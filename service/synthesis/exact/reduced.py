@@ -41,7 +41,10 @@ class Reduced:
 
     def row(self, place: float) -> Floats:
         """Time coefficients (r2,) at a canonical frame, linear between two."""
-        return self.rows(np.array([place]))[0]
+        before = min(int(place), self.frames - 2)
+        share = place - before
+        found: Floats = (1.0 - share) * self.time[before] + share * self.time[before + 1]
+        return found
 
     def rows(self, places: Floats) -> Floats:
         """Time coefficients (S, r2) at canonical frames (S,)."""

@@ -30,11 +30,11 @@ def test_lines_are_held_each_to_its_own(model, tmp_path):
     lines = [
         {**POINT, "targets": [HAND, FOOT]},
         POINT,
-        {**POINT, "exact": "none", "pin_feet": True},
+        {**POINT, "exact": "none", "pin_feet": False},
         {**POINT, "targets": None, "exact": None},
     ]
     path = write_jsonl(tmp_path / "q.jsonl", lines)
-    assert holds(model, path) == [Hold(targets=BOTH), Hold(), Hold("none", (), True), Hold()]
+    assert holds(model, path) == [Hold(targets=BOTH), Hold(), Hold("none"), Hold()]
 
 
 def test_what_a_row_does_not_say_is_as_usual(model, tmp_path):
@@ -60,6 +60,7 @@ def test_targets_of_tables_are_text(model, tmp_path, write, name):
         ({"exact": "turn"}, "exact: 'turn' is not measured on a motion"),
         ({"exact": ["turn"]}, "exact: 'turn' is not measured on a motion"),
         ({"exact": 1}, "exact: 1, expected auto, none or names"),
+        ({"pin_feet": True}, "pin_feet: true, but this model's recipe names no feet"),
         ({"pin_feet": "yes"}, "pin_feet: 'yes', expected true or false"),
     ],
 )
@@ -78,7 +79,7 @@ def test_what_holds_for_all_rows_is_looked_at_first(model, tmp_path):
 
 def test_what_clips_are_held_to_is_part_of_the_job(model, tmp_path):
     path = write_jsonl(tmp_path / "q.jsonl", [POINT])
-    every = [Hold(), Hold("none"), Hold(targets=BOTH), Hold(targets=BOTH[:1]), Hold(pin_feet=True)]
+    every = [Hold(), Hold("none"), Hold(targets=BOTH), Hold(targets=BOTH[:1])]
     digests = [
         source(model, path, Defaults("usdc", ClipQuestion({}, hold=hold))).digest for hold in every
     ]

@@ -1,0 +1,85 @@
+"""What it costs to hold an answer to a target: a clip and a pose, beside those as predicted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import cycle
+
+import numpy as np
+from rows import Row
+
+from model_export.evaluate.table1_family import Family
+from model_export.evaluate.table1_timing import in_turn
+from service.motion.measure import Measure
+from service.synthesis import session
+from service.synthesis.exact import holding
+from service.synthesis.exact.aims import Place
+from service.synthesis.exact.holding import Bench
+from service.synthesis.session import OUTPUTS, Session, State
+
+FRAMES, TARGETS = 100, 64
+# A hand that ends some way from where the model puts it, m; a captured one may.
+OFF = 0.02
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An open model, a question to it, and targets of a hand at the end."""
+
+    opened: Session
+    bench: Bench
+    point: np.ndarray
+    times: np.ndarray
+    targets: tuple[Place, ...]
+
+    def state(self, frames: int) -> State:
+        """What the poses of some frames are made of."""
+        return self.opened.state(self.point, self.times[-frames:])
+
+    def plain(self, frames: int) -> Callable[[], object]:
+        """Poses as predicted."""
+        return lambda: self.opened.run(self.point, self.times[None, -frames:], *OUTPUTS)
+
+    def exact(self, frames: int) -> Callable[[], object]:
+        """Poses held to one target after the other."""
+        target = cycle(self.targets)
+
+        def run() -> object:
+            state = self.state(frames)
+            held = self.bench.held(self.bench.begun(state), [next(target)])
+            return held.poses(state.frames)
+
+        return run
+
+
+def rows(made: Family) -> list[Row]:
+    """A clip and a pose held to a target, beside one another and beside plain ones."""
+    asked = _asked(made)
+    runs = {
+        "plain clip": asked.plain(FRAMES),
+        "exact clip": asked.exact(FRAMES),
+        "plain pose": asked.plain(1),
+        "exact pose": asked.exact(1),
+    }
+    taken = in_turn(runs, rounds=15, repeats=TARGETS)
+    clip, pose = taken["exact clip"], taken["exact pose"]
+    words = "the same as the model predicts it, one call of the graph"
+    return [
+        Row(f"exact clip of {FRAMES} frames, in process", 1e3 * clip, "ms", "", None, 2.5),
+        Row("its cost", clip / taken["plain clip"], "times", words, None, None),
+        Row("its cost", clip / pose, "times", "an exact pose, in process", None, None),
+        Row("cost of an exact pose", pose / taken["plain pose"], "times", words, None, None),
+    ]
+
+
+def _asked(made: Family) -> Asked:
+    opened = session.open_bytes(made.exported.content, "reaching.onnx")
+    bench, point = holding.bench(opened, 0), made.examples[4].controls[None]
+    times = np.linspace(0.0, float(opened.durations(point)[0]), FRAMES)
+    begun = bench.begun(opened.state(point, times))
+    joint, last = opened.card.skeleton.names.index("RightHand"), float(opened.card.frames - 1)
+    hand, _ = begun.scene.place(begun.numbers, joint, last)
+    ways = np.random.Generator(np.random.PCG64(TARGETS)).standard_normal((TARGETS, 3))
+    ways *= OFF / np.linalg.norm(ways, axis=1, keepdims=True)
+    moment = Measure("height", (joint,), "end")
+    targets = (Place(("hand",), moment, (0, 1, 2), hand + way) for way in ways)
+    return Asked(opened, bench, point, times, tuple(targets))

@@ -1,0 +1,47 @@
+"""A motion as a model predicts it, with what corrects it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.motion.conventions import Floats
+from service.motion.measure import Measure
+from service.synthesis.exact import holding
+from service.synthesis.exact.aims import Place
+from service.synthesis.exact.holding import Bench, Held
+from service.synthesis.session import Session
+
+
+@dataclass(frozen=True)
+class Begun:
+    """An open model, the bench of its finest level, and a motion of it."""
+
+    opened: Session
+    bench: Bench
+    held: Held
+
+    def joint(self, name) -> int:
+        return self.opened.card.skeleton.names.index(name)
+
+    def place(self, name, frame, by=(0.0, 0.0, 0.0)) -> Place:
+        """Aim that moves a joint at a frame by so much, m."""
+        joint = self.joint(name)
+        at, _ = self.held.scene.place(self.held.numbers, joint, frame)
+        moment = Measure("height", (joint,), "landmark")
+        return Place((name,), moment, (0, 1, 2), at + np.array(by), frame)
+
+
+def begin(opened: Session, level: int = 0) -> Begun:
+    """A motion in the middle of the controls, of the first performer."""
+    bench = holding.bench(opened, level)
+    point = np.array([[control.default for control in opened.card.controls]])
+    performers = len(opened.card.performers)
+    state = opened.state(point, np.array([0.0, 0.3, 0.61]), np.eye(1, performers), level)
+    return Begun(opened, bench, bench.begun(state))
+
+
+def covariance(begun: Begun) -> Floats:
+    """The metric of corrections in full."""
+    own = begun.bench.spread
+    eye = np.eye(begun.held.scene.numbers)
+    return own.shrunk(eye)

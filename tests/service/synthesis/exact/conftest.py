@@ -1,0 +1,18 @@
+"""Motions that can be corrected: a reach and a walk, as the model predicts them."""
+
+import pytest
+from beginning import Begun, begin
+
+from service.synthesis import session
+
+
+@pytest.fixture(scope="session")
+def reaching(labelled_path) -> Begun:
+    """A reach of a performer."""
+    return begin(session.load(labelled_path))
+
+
+@pytest.fixture(scope="session")
+def walking(walk_path) -> Begun:
+    """A stride."""
+    return begin(session.load(walk_path))

@@ -1,0 +1,140 @@
+"""Corrections: the least ones that meet their aims, and what becomes of those that cannot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from beginning import covariance
+
+from service.motion.measure import Measure
+from service.synthesis.exact import reach
+from service.synthesis.exact.aims import Place
+
+
+def poses(begun, held):
+    return held.poses(np.arange(float(held.scene.reduced.frames)))
+
+
+def roughness(begun, held) -> float:
+    """Mean size of second differences of a hand's path, m."""
+    frames = np.arange(float(held.scene.reduced.frames))
+    path = held.scene.positions(held.numbers, begun.joint("RightHand"), frames)
+    return float(np.linalg.norm(np.diff(path, n=2, axis=0), axis=-1).mean())
+
+
+def test_a_linear_aim_is_met_by_the_mean_of_the_gaussian_that_meets_it(reaching):
+    """Oracle: the least-norm solution by a singular value decomposition, in white coordinates."""
+    begun = reaching.held
+    held = reaching.bench.held(begun, [reaching.place("Hips", 30.0, (0.004, -0.003, 0.005))])
+    _, gradients = begun.scene.place(begun.numbers, reaching.joint("Hips"), 30.0)
+    root = np.linalg.cholesky(covariance(reaching) + 1e-12 * np.eye(len(begun.numbers)))
+
+    def conditioned(metric):
+        shift = np.array([0.004, -0.003, 0.005])
+        return metric @ np.linalg.lstsq(gradients @ metric, shift, rcond=None)[0]
+
+    change = held.numbers - begun.numbers
+    size = np.linalg.norm(change)
+    assert np.linalg.norm(change - conditioned(root)) < 1e-5 * size
+    # Negative control: in another metric the least change is another.
+    assert np.linalg.norm(change - conditioned(np.eye(len(change)))) > 0.1 * size
+    assert held.steps == 1
+
+
+def test_where_nothing_is_missing_nothing_changes(reaching):
+    begun = reaching.held
+    held = reaching.bench.held(begun, [reaching.place("RightHand", 20.0)])
+    assert held.numbers.tobytes() == begun.numbers.tobytes()
+    assert (held.steps, held.distance) == (0, 0.0)
+    # Negative control: a tenth of a millimetre changes something.
+    near = reaching.bench.held(begun, [reaching.place("RightHand", 20.0, (1e-4, 0.0, 0.0))])
+    assert near.numbers.tobytes() != begun.numbers.tobytes()
+
+
+@pytest.mark.parametrize(("name", "end"), [("reaching", "LeftHand"), ("walking", "RightFoot")])
+def test_what_is_near_is_met_in_a_few_steps(name, end, request, rng):
+    begun = request.getfixturevalue(name)
+    for frame in (0.0, 12.5, float(begun.held.scene.reduced.frames - 1)):
+        way = rng.standard_normal(3)
+        unit = begun.place(end, frame, 0.01 * way)
+        far = begun.bench.distance(begun.held, [unit])
+        aim = begun.place(end, frame, 0.02 * way / far)
+        held = begun.bench.held(begun.held, [aim])
+        assert held.met[0].reached and held.met[0].miss < 1e-5
+        assert held.steps <= 5
+        joint = begun.joint(end)
+        assert np.linalg.norm(held.scene.place(held.numbers, joint, frame)[0] - aim.goal) < 1e-5
+
+
+def test_what_is_out_of_reach_is_told_and_approached_as_far_as_motions_go(reaching):
+    """However far off it is, the way that is gone is the same."""
+    begun, bench = reaching.held, reaching.bench
+    last = float(begun.scene.reduced.frames - 1)
+    away = np.array([0.6, 0.0, 0.8])
+
+    def held(metres):
+        return bench.held(begun, [reaching.place("RightHand", last, metres * away)])
+
+    one, ten = held(1.0), held(10.0)
+    assert not one.met[0].reached and not ten.met[0].reached
+    assert one.met[0].miss < 1.0 and ten.met[0].miss < 10.0
+    assert ten.distance == pytest.approx(10.0 * one.distance)
+    assert np.abs(one.numbers - ten.numbers).max() < 1e-6
+    assert roughness(reaching, one) < 1.5 * roughness(reaching, begun)
+    # Negative control: what is met moves less.
+    limit = reach.far(3) / one.distance
+    inside, outside = held(0.99 * limit), held(1.01 * limit)
+    assert inside.met[0].reached
+    assert np.abs(inside.numbers - one.numbers).max() > 1e-6
+    assert np.abs(inside.numbers - outside.numbers).max() < np.abs(one.numbers).max()
+
+
+@pytest.mark.parametrize("apart", [0.0, 1.0])
+def test_contradicting_aims_share_the_miss(reaching, apart, monkeypatch):
+    """One hand in two places at one time, or from one frame to the next."""
+    aims = [
+        reaching.place("RightHand", 20.0, (0.02, 0.0, 0.0)),
+        reaching.place("RightHand", 20.0 + apart, (-0.02, 0.0, 0.0)),
+    ]
+    held = reaching.bench.held(reaching.held, aims)
+    rotations, roots = poses(reaching, held)
+    assert np.isfinite(rotations).all() and np.isfinite(roots).all()
+    misses = [met.miss for met in held.met]
+    assert not any(met.reached for met in held.met)
+    assert 0.005 < min(misses) and max(misses) < 0.03
+    before = roughness(reaching, reaching.held)
+    assert roughness(reaching, held) < 2.0 * before
+    # Negative control: alone each of them is met.
+    alone = [reaching.bench.held(reaching.held, [aim]).met[0].miss for aim in aims]
+    assert max(alone) < 1e-5
+    # And without a limit the hand would jerk from one to the other, where there is time for it.
+    monkeypatch.setattr(reach, "FAR", 100.0)
+    jerked = reaching.bench.held(reaching.held, aims)
+    assert (roughness(reaching, jerked) > 2.5 * before) == (apart > 0.0)
+
+
+def test_the_order_of_aims_says_nothing(reaching):
+    aims = [
+        reaching.place("RightHand", 20.0, (0.01, 0.0, 0.0)),
+        reaching.place("LeftHand", 30.0, (0.0, 0.5, 0.0)),
+    ]
+    one = reaching.bench.held(reaching.held, aims)
+    other = reaching.bench.held(reaching.held, aims[::-1])
+    assert np.abs(one.numbers - other.numbers).max() < 1e-8
+    assert [met.what for met in one.met] == ["RightHand", "LeftHand"]
+    assert [met.miss for met in one.met] == pytest.approx([m.miss for m in other.met[::-1]])
+
+
+def test_only_the_axes_that_are_asked_for_are_held(reaching):
+    joint = reaching.joint("RightHand")
+    now, _ = reaching.held.scene.place(reaching.held.numbers, joint, 20.0)
+    moment = Measure("height", (joint,), "landmark")
+    aim = Place(("height",), moment, (1,), now[1:2] + 0.01, 20.0)
+    held = reaching.bench.held(reaching.held, [aim])
+    then, _ = held.scene.place(held.numbers, joint, 20.0)
+    assert then[1] - now[1] == pytest.approx(0.01, abs=1e-5)
+    assert np.abs(then - now)[[0, 2]].max() > 1e-4
+    whole = replace(aim, axes=(0, 1, 2), goal=now + np.array([0.0, 0.01, 0.0]))
+    held = reaching.bench.held(reaching.held, [whole])
+    then, _ = held.scene.place(held.numbers, joint, 20.0)
+    assert np.abs(then - now)[[0, 2]].max() < 1e-5

@@ -1,0 +1,81 @@
+"""What counts as out of reach, and how much of the way there is gone."""
+
+import numpy as np
+import pytest
+from scipy.spatial import distance as apart
+from scipy.stats import chi
+
+from service.synthesis.exact import aims as looking
+from service.synthesis.exact import reach
+from service.synthesis.exact.reach import Reach
+
+
+def looked_at(begun, aims) -> Reach:
+    scene, numbers = begun.held.scene, begun.held.numbers
+    seen = looking.look(aims, scene, numbers)
+    return reach.of(scene, begun.bench.spread, begun.held.state.sigma, numbers, aims, seen)
+
+
+@pytest.mark.parametrize("values", [1, 2, 3, 6, 12, 30])
+def test_the_limit_is_as_unlikely_whatever_the_number_of_values(values):
+    """Oracle: the chi distribution of SciPy; the formula is an approximation of it."""
+    share = chi.sf(reach.FAR, 3)
+    assert chi.sf(reach.far(values), values) == pytest.approx(share, rel=0.15)
+    # Negative control: that of three is no limit for others.
+    assert values == 3 or abs(chi.sf(reach.FAR, values) / share - 1.0) > 0.15
+
+
+def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
+    """Counted by hand: every captured clip, looked at beside what the others predict for it."""
+    aim = walking.place("LeftFoot", 9.0, (0.02, 0.01, -0.03))
+    found = looked_at(walking, [aim])
+    scene, numbers, spread = walking.held.scene, walking.held.numbers, walking.bench.spread
+    total = np.zeros((3, 3))
+    rest = numbers[spread.captured.shape[1] :]
+    for captured, predicted, sigma in zip(
+        spread.captured, spread.predicted, spread.sigmas, strict=True
+    ):
+        pair = [np.concatenate([motion, rest]) for motion in (captured, predicted)]
+        there, told = (scene.place(own, walking.joint("LeftFoot"), 9.0)[0] for own in pair)
+        total += np.outer(there - told, there - told) / sigma**2
+    _, gradients = aim.look(scene, numbers)
+    beside = gradients[:, spread.captured.shape[1] :]
+    total += beside @ spread.beside @ beside.T
+    own = 0.9 * total + 0.1 * np.trace(total) / 3.0 * np.eye(3)
+    own *= walking.held.state.sigma**2
+    expected = apart.mahalanobis([0.02, 0.01, -0.03], np.zeros(3), np.linalg.inv(own))
+    assert found.distance == pytest.approx(expected, rel=1e-6)
+    assert found.distance == pytest.approx(walking.bench.distance(walking.held, [aim]))
+    # Negative control: the other way round it is another distance.
+    other = apart.mahalanobis([-0.03, 0.02, 0.01], np.zeros(3), np.linalg.inv(own))
+    assert abs(other / expected - 1.0) > 1e-3
+
+
+def test_all_of_the_way_is_gone_within_the_limit():
+    near = Reach(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), (0, 0, 0))
+    assert near.distance < reach.far(3)
+    assert np.array_equal(near.way, near.left)
+    far = Reach(10.0 * near.left, near.covariance, near.whose)
+    assert np.allclose(far.way, reach.far(3) / far.distance * far.left, rtol=1e-6, atol=0)
+    assert not np.array_equal(far.way, far.left)
+
+
+def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
+    left = np.array([0.01, 0.0, 0.02, 3.0, 2.0, 1.0])
+    own = 0.02 * rng.standard_normal((6, 6))
+    found = Reach(left, own @ own.T + 1e-3 * np.eye(6), (0, 0, 0, 1, 1, 1))
+    shares = found.way / np.where(left == 0.0, 1.0, left)
+    length = np.sqrt(found.way @ np.linalg.solve(found.covariance, found.way))
+    assert length <= reach.far(6) * (1.0 + 1e-6)
+    assert np.ptp(shares[[0, 2]]) < 1e-9 and np.ptp(shares[3:]) < 1e-9
+    assert np.all((0.0 <= shares) & (shares <= 1.0))
+    assert shares[5] < 0.5
+
+
+def test_the_worth_of_values_does_not_hang_on_their_units():
+    """Metres and degrees: what is missed counts in its own scatter."""
+    mixed = Reach(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), (0, 1))
+    counted = mixed.worth * np.square(mixed.left)
+    assert counted[0] == pytest.approx(counted[1])
+    alike = Reach(mixed.left, mixed.covariance, (0, 0))
+    assert alike.worth[0] == alike.worth[1]

@@ -1,0 +1,98 @@
+"""What a file lets be known of how captured motions stray is what training had."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model_export import export, train
+from service.motion import field
+from service.synthesis import freeze, session
+from service.synthesis.exact import holding, spread
+
+
+def strays(trained) -> np.ndarray:
+    """What training's leave-one-out misses of each clip's coefficients (n, r3), standardised."""
+    pose, laid, model = trained.pose, trained.laid, trained.model
+    left_out = field.leave_out(pose.hyper, laid.points, laid.groups)
+    sigmas = np.sqrt(model.bank.sill * pose.variances * len(laid.points))
+    return left_out @ model.decoder.reduced.bases[2] / sigmas[:, None]
+
+
+def gap(found, trained) -> float:
+    """How far a spread's covariance lies from training's, as a share of its size."""
+    # Training has degrees of freedom before frames.
+    core = trained.model.decoder.reduced.core.swapaxes(0, 1)
+    rows = strays(trained) @ core.reshape(-1, found[1]).T
+    expected = rows.T @ rows
+    own = found[0].residuals @ found[0].residuals.T
+    return float(np.linalg.norm(own - expected) / np.linalg.norm(expected))
+
+
+def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_exported):
+    """The file holds its samples in an order of its own."""
+    opened = session.open_bytes(labelled_exported.content, "labelled.onnx")
+    weights = freeze.weights(opened.content)
+    samples = opened.weigher.samples
+    found = spread._coefficients(opened.card, weights, samples)
+    bases = labelled.model.decoder.reduced.bases[2]
+    order = spread.order_of(opened.card, weights, samples)
+    assert np.abs(found - bases).max() < 1e-5
+    assert not np.array_equal(order, np.arange(len(order)))
+    # Negative control: in the order of the file they are other clips'.
+    assert np.abs(found[order] - bases).max() > 1e-2
+
+
+def read(content):
+    """Spread of a file's finest level, and its rank of samples."""
+    own = holding.bench(session.open_bytes(content, "x.onnx"), 0)
+    return own.spread, own.reduced.core.shape[2]
+
+
+def test_residuals_have_the_covariance_of_training(labelled, labelled_exported):
+    found = read(labelled_exported.content)
+    assert gap(found, labelled) < 1e-3
+    own = found[0]
+    missed = (own.captured - own.predicted) / own.sigmas[:, None]
+    expected = own.residuals @ own.residuals.T
+    assert np.abs(missed.T @ missed - expected).max() < 1e-6 * np.abs(expected).max()
+    # Negative control: residuals of clips in another order have another.
+    mixed = (own.captured - own.predicted[::-1]) / own.sigmas[:, None]
+    assert np.abs(mixed.T @ mixed - expected).max() > 0.1 * np.abs(expected).max()
+
+
+def test_clips_at_the_same_controls_are_not_confused(labelled_recipe, examples):
+    """Two that differ in nothing but their motion lie in the file in one order or the other."""
+    twice = [*examples[:-1], replace(examples[-1], controls=examples[-2].controls)]
+    twice[-1] = replace(twice[-1], row=replace(twice[-1].row, performer=twice[-2].row.performer))
+    trained = train.train(labelled_recipe, twice, lambda _: None)
+    found = read(export.finest(labelled_recipe, trained))
+    assert gap(found, trained) < 1e-3
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_a_coarser_level_strays_by_what_it_keeps(reaching, level):
+    """Its residuals are those of the finest, in the leading parts that it has."""
+    whole = reaching.bench
+    own = holding.bench(reaching.opened, level)
+    t, d, _ = own.reduced.core.shape
+    r2, r1, _ = whole.reduced.core.shape
+    kept = whole.spread.captured.reshape(-1, r2, r1)[:, :t, :d]
+    gaps = own.spread.captured.reshape(-1, t, d) - kept
+    cut = np.linalg.norm(gaps) / np.linalg.norm(kept)
+    # What is missing is what the coarser rank of samples leaves out.
+    assert cut < 0.3
+    assert own.spread.sigmas == pytest.approx(whole.spread.sigmas)
+
+
+def test_the_metric_is_a_covariance(walking, rng):
+    own, size = walking.bench.spread, walking.held.scene.numbers
+    full = own.shrunk(np.eye(size))
+    assert np.abs(full - full.T).max() < 1e-12 * np.abs(full).max()
+    assert np.linalg.eigvalsh(full).min() > -1e-12 * np.abs(full).max()
+    gradients = rng.standard_normal((2, size))
+    assert np.allclose(own.shrunk(gradients), full @ gradients.T)
+    # Shrinking keeps the size of it all.
+    inner = own.residuals @ own.residuals.T
+    kept = np.trace(full) - np.trace(own.beside)
+    assert kept == pytest.approx(np.trace(inner))
