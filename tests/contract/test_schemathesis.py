@@ -169,7 +169,8 @@ def narrowed(spec, card, digest):
     parts["parameters"]["version"]["schema"] = {"enum": [digest]}
     parts["parameters"]["level"]["schema"] = parts["schemas"]["LevelNumber"] = level
     performers = list(card.performers)
-    parts["parameters"]["performer"]["schema"] = {"enum": performers}
+    for name in ("performer", "whose"):
+        parts["parameters"][name]["schema"] = {"enum": performers}
     parts["schemas"]["Performer"] = {"enum": [*performers, None]}
     for parameter in parts["parameters"].values():
         parameter.pop("example", None)
