@@ -355,7 +355,8 @@ def test_the_page_is_the_same_twice_and_loads_nothing(results):
     for name in methods.DEFINITIONS:
         assert name in text
     assert 'src="' not in text and "@import" not in text
-    assert text.count("<svg") == 3 * len(results[0])
+    # Bars, clips, calibration, and a clip at its event.
+    assert text.count("<svg") == 4 * len(results[0])
 
 
 @pytest.fixture(scope="module")
