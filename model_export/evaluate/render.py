@@ -50,11 +50,19 @@ def _section(result: Result) -> Section:
     )
 
 
+def _clips_shown(count: int) -> str:
+    return f"{count} clip{'s' * (count > 1)} shown"
+
+
 PANELS: dict[str, dict[str, str]] = {
     "leave_one_clip_out": {OURS: "predicted", EXACT: "held to the target"},
     "leave_one_performer_out": {
         OURS: "nothing shown",
-        **{name: f"{count} shown" for name, count in SHOWN.items() if count < max(SHOWN.values())},
+        **{
+            name: _clips_shown(count)
+            for name, count in SHOWN.items()
+            if count < max(SHOWN.values())
+        },
     },
 }
 """What is drawn of a clip, and what is said of it."""
