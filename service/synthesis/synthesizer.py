@@ -17,7 +17,7 @@ from service.motion.roles import Names
 from service.motion.skeleton import Skeleton
 from service.synthesis import course, limits, pace
 from service.synthesis.door import Door, Question
-from service.synthesis.exact import missed, strides
+from service.synthesis.exact import missed, rounding, strides
 from service.synthesis.exact.goals import NOTHING, Goals
 from service.synthesis.exact.holding import Held
 from service.synthesis.exact.keeper import Keeper
@@ -73,7 +73,7 @@ class Synthesizer:
     def fingerprint(self) -> bytes:
         """Digest of the model's file and of what it answers here: machines that round otherwise
         differ in it."""
-        parts = self.identity.encode() + self.session.golden
+        parts = self.identity.encode() + self.session.golden + rounding.mark()
         return blake2b(parts, digest_size=16).digest()
 
     @cached_property

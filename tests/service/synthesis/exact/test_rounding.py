@@ -1,0 +1,19 @@
+"""What tells machines apart that round otherwise."""
+
+import numpy as np
+
+from service.synthesis import session
+from service.synthesis.exact import rounding
+from service.synthesis.synthesizer import Synthesizer
+
+
+def test_a_machine_that_rounds_otherwise_has_other_tags(model_path, monkeypatch):
+    opened = session.load(model_path)
+    here = Synthesizer("reaching", opened).fingerprint
+    assert Synthesizer("reaching", opened).fingerprint == here
+    solve = np.linalg.solve
+    monkeypatch.setattr(np.linalg, "solve", lambda a, b: np.nextafter(solve(a, b), 2.0))
+    rounding.mark.cache_clear()
+    there = Synthesizer("reaching", opened).fingerprint
+    rounding.mark.cache_clear()
+    assert there != here
