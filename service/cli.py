@@ -318,7 +318,7 @@ def suggest(
 ) -> None:
     """Say which clips to capture next: where one more would be worth most, the first first."""
     synthesizer = open_model(model)
-    given = queries.points(candidates, synthesizer) if candidates else ()
+    given = queries.points(candidates, synthesizer) if candidates else None
     found = find_suggestions(synthesizer, SuggestQuestion(count, performer, given))
     typer.echo(as_json(suggestions.plain(found)) if json else suggestions.text(found))
 

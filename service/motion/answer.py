@@ -19,7 +19,8 @@ class Met:
     """What an answer was held to, and how far it stays from it.
 
     what: a control's name, or joint and moment of a target. miss: distance of the answer from what
-    was asked for, in `unit`. reached: whether that lay within what captured motions do.
+    was asked for, in `unit`. reached: whether it is met to a
+    millimetre, or a thousandth of its unit.
     """
 
     what: str

@@ -27,11 +27,12 @@ class SuggestQuestion:
 
     count: int = COUNT
     performer: str | None = None
-    candidates: Sequence[Mapping[str, float]] = ()
+    candidates: Sequence[Mapping[str, float]] | None = None
 
     def __post_init__(self) -> None:
         limits.within("count", self.count, 1, MOST, "points")
-        limits.within("candidates", len(self.candidates), 0, GIVEN, "points")
+        if self.candidates is not None:
+            limits.within("candidates", len(self.candidates), 1, GIVEN, "points")
 
 
 def suggest(model: Synthesizer, asked: SuggestQuestion) -> Suggestions:
@@ -41,7 +42,7 @@ def suggest(model: Synthesizer, asked: SuggestQuestion) -> Suggestions:
     """
     card, own = model.session.card, model.door.support
     door.labels(card.performers, asked.performer)
-    points = _given(model, asked.candidates) if asked.candidates else _drawn(own)
+    points = _drawn(own) if asked.candidates is None else _given(model, asked.candidates)
     captured = _captured(card, asked.performer)
     ranked = worth.rank(own.scaled(points), own.samples[captured], asked.count)
     found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)

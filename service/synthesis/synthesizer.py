@@ -342,7 +342,8 @@ class Synthesizer:
         if not (goals.targets or (goals and strict)):
             return self._duration(question), False
         held = self._meeting(question, goals, asked.extrapolate)
-        misses = not all(met.reached for met in held.met[len(goals.controls) :])
+        targets = held.met[len(held.met) - len(goals.targets) :]
+        misses = asked.extrapolate != "ok" and not all(met.reached for met in targets)
         return self._sensible(held.duration), misses
 
     def _meeting(self, question: Question, goals: Goals, extrapolate: Policy) -> Held:

@@ -35,7 +35,10 @@ async def _answer(
 ) -> Response:
     controls, times, policy = question.controls, question.times, question.extrapolate
     who, level, hold = question.performer, question.level, question.hold
-    asked = model.moments(controls, times, policy, who, level, hold)
+    given = (controls, times, policy, who, level, hold)
+    # Open controls are chosen by what the model makes of every captured clip.
+    found = to_thread.run_sync(model.moments, *given) if hold.targets else None
+    asked = model.moments(*given) if found is None else await found
     by_joint = question.joint_sigma
     goals = model.keeper.goals(asked.question, question.hold)
     if goals:

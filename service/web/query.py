@@ -163,7 +163,7 @@ def _hold_of_pairs(pairs: Pairs, single: dict[str, str]) -> Hold:
     """What an answer is held to: each `target`, and what is said once, which is taken out."""
     targets = tuple(_spelt("target", spelling.target, text) for n, text in pairs if n == "target")
     exact = single.pop("exact", None)
-    pinned = FLAGS[_word(single, "pin_feet", tuple(FLAGS), "false")]
+    pinned = _flag(single, "pin_feet")
     if exact is None and not targets and not pinned:
         return HOLD
     said = "auto" if exact is None else _spelt("exact", spelling.exact, exact)

@@ -1730,7 +1730,7 @@ export interface components {
             /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
-            /** @description The controls that can be measured on a motion, as this one has them, in their units; absent where there are none. */
+            /** @description The controls that can be measured on a motion, as this one has them, in their units; of clips, and of poses that are held to something. */
             measured?: {
                 [key: string]: number;
             };
@@ -3129,7 +3129,7 @@ export interface components {
          *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
          *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
          *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-         *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+         *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -3426,7 +3426,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3543,7 +3543,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3658,7 +3658,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3773,7 +3773,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -3888,7 +3888,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4003,7 +4003,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4124,7 +4124,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4243,7 +4243,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4362,7 +4362,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4481,7 +4481,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4600,7 +4600,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4719,7 +4719,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4838,7 +4838,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -4957,7 +4957,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5076,7 +5076,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -5646,7 +5646,7 @@ export interface operations {
                  *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
                  *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
                  *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, the same answer comes. The names of the other parameters are reserved.
+                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,

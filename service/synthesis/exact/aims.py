@@ -52,6 +52,11 @@ class Place:
     at: float = 0.0
     unit: str = "m"
 
+    def frame(self, last: float) -> float | None:
+        """Canonical frame, of 0 to last, of the moment; None where it has to be looked for."""
+        known = {"start": 0.0, "end": last, "landmark": self.at}
+        return known.get(self.moment.at or "")
+
     def look(self, scene: Scene, numbers: Floats) -> Looked:
         """Values and gradients."""
         joints = self.moment.joints

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from service.motion.card import Control, ModelCard
 from service.motion.errors import InvalidField
-from service.motion.measure import Measure
+from service.motion.measure import AXES, Measure
 from service.synthesis import limits
 from service.synthesis.door import Question
 from service.synthesis.question import Hold, Target
@@ -56,13 +56,13 @@ def of(card: ModelCard, question: Question, hold: Hold, correctable: bool) -> Go
         raise InvalidField("pin_feet", "true, but this model's recipe names no feet")
     targets = tuple(_goal(card, i, target) for i, target in enumerate(hold.targets))
     _refuse_twins(hold.targets, targets)
-    taken = {(goal.moment.joints, goal.moment.at) for goal in targets}
+    taken = {goal.moment for goal in targets if goal.time is None}
     named = hold.exact not in ("auto", "none")
     controls = []
     for control in _exact(card, question, hold):
         own = control.measure
         assert own is not None
-        if own.joints and (own.joints, own.at) in taken:
+        if own.quantity in AXES and Measure("height", own.joints, own.at, own.share) in taken:
             # A target says where the same joint is to be: of controls that were not named it is
             # the nearer word.
             if named:
@@ -127,8 +127,8 @@ def _goal(card: ModelCard, index: int, target: Target) -> Goal:
     when = target.when
     if not isinstance(when, str):
         time = limits.number(f"{field}/time", when)
-        longest = limits.durations(card)[1]
-        limits.within(f"{field}/time", time, 0.0, longest, "s")
+        if time < 0.0:
+            raise InvalidField(f"{field}/time", f"{time:g} s, expected 0 or more")
         moment = Measure("height", (joint,), "landmark")
         return Goal(f"{target.joint} at {time:g} s", moment, (x, y, z), time)
     return Goal(f"{target.joint} at {when}", _moment(card, field, joint, when), (x, y, z), None)

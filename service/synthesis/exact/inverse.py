@@ -17,7 +17,8 @@ from service.synthesis.exact.goals import Goal
 def read_off(
     card: ModelCard, given: Mapping[str, float], goals: tuple[Goal, ...]
 ) -> dict[str, float]:
-    """Values of controls that were not given and that a target is about."""
+    """Values of controls that were not given and that a target is about, within what was sampled:
+    the target itself goes on asking for the rest."""
     found = {}
     for goal in goals:
         for control in card.controls:
@@ -30,7 +31,9 @@ def read_off(
                 goal.moment.share,
             )
             if same and goal.time is None:
-                found[control.name] = float(goal.place[AXES[own.quantity]])
+                value = float(goal.place[AXES[own.quantity]])
+                # What lies beyond is the correction's to approach, not the model's to guess.
+                found[control.name] = min(max(value, control.minimum), control.maximum)
     return found
 
 

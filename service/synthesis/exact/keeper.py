@@ -1,6 +1,7 @@
 """A model's exact answers: what corrections need, and the last of them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from service.motion.answer import PoseAnswer, Trust
 from service.motion.conventions import Floats
+from service.motion.errors import InvalidField
 from service.motion.measure import Measure
 from service.synthesis import limits
 from service.synthesis.door import Question
@@ -24,6 +26,8 @@ from service.synthesis.typical import Chooser
 KEPT = 64
 # A speed that is met changes the duration, and so the frame at a time in seconds.
 ROUNDS, SAME = 8, 1e-6
+# Canonical frames that are one moment.
+TWINS = 1e-3
 
 
 @dataclass(frozen=True)
@@ -153,19 +157,33 @@ class Keeper:
             return begun
         aims = looking.of_controls(asked.goals.controls, bench.reduced.frames)
         pins = bench.pins(begun) if asked.goals.pin_feet else []
+        last = bench.reduced.frames - 1.0
         for _ in range(ROUNDS):
             aimed = self._targets(question, asked.goals.targets, held)
-            found = bench.held(begun, [*aims, *aimed], pins)
+            found = bench.held(begun, [*self._beside(aims, aimed, last), *aimed], pins)
             settled = abs(found.duration / held.duration - 1.0) < SAME
             held = found
             if settled:
                 break
         self._check_times(asked.goals.targets, held)
+        _refuse_twins(self._targets(question, asked.goals.targets, held), last)
         return held
 
-    def _targets(self, question: Question, targets: tuple[Goal, ...], held: Held) -> list[Aim]:
+    def _beside(self, aims: Sequence[Aim], targets: Sequence[Place], last: float) -> list[Aim]:
+        """Aims of controls but those of a joint that a target places at the same frame: it is the
+        nearer word."""
+        return [
+            aim
+            for aim in aims
+            if not (isinstance(aim, Place) and any(_same(aim, own, last) for own in targets))
+        ]
+
+    def _targets(self, question: Question, targets: tuple[Goal, ...], held: Held) -> list[Place]:
         """Aims of targets; the frames of those at a time are a motion's own."""
-        times = np.array([goal.time or 0.0 for goal in targets])
+        # Whether a time is within the clip shows when it is known how long that is; what is within
+        # none might be more than a float32 holds.
+        longest = limits.durations(self._session.card)[1]
+        times = np.array([min(goal.time or 0.0, longest) for goal in targets])
         timed = self._frames(question, held, times) if len(times) else times
         pairs = zip(targets, timed.tolist(), strict=True)
         return [self._aim(goal, held, frame) for goal, frame in pairs]
@@ -180,3 +198,24 @@ class Keeper:
         for index, goal in enumerate(targets):
             if goal.time is not None:
                 limits.within(f"targets/{index}/time", goal.time, 0.0, held.duration, "s")
+
+
+def _same(a: Place, b: Place, last: float) -> bool:
+    """Whether two aims are of the same joints at one frame; moments that have to be looked for are
+    at none."""
+    at, other = a.frame(last), b.frame(last)
+    if a.moment.joints != b.moment.joints or at is None or other is None:
+        return False
+    return abs(at - other) < TWINS
+
+
+def _refuse_twins(targets: Sequence[Place], last: float) -> None:
+    """InvalidField for a second target of a joint at a time that turns out to be the same."""
+    for later, aim in enumerate(targets):
+        for earlier, other in enumerate(targets[:later]):
+            if _same(aim, other, last):
+                raise InvalidField(
+                    f"targets/{later}",
+                    f"{aim.names[0]} has a target already (targets/{earlier}: {other.names[0]}), "
+                    "expected one",
+                )

@@ -21,7 +21,7 @@ def refuse(goals: Goals, met: Sequence[Met]) -> None:
 
 def _fields(goals: Goals, met: Sequence[Met]) -> Iterator[str]:
     """Where each of them was asked for: controls are looked at before targets."""
-    first = len(goals.controls)
+    first = len(met) - len(goals.targets)
     for index, each in enumerate(met):
         yield f"controls/{each.what}" if index < first else f"targets/{index - first}"
 

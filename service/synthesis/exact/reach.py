@@ -132,7 +132,9 @@ def _means(members: Floats, values: Floats) -> Floats:
 
 def _shares(apart: Floats, misses: Floats, price: float) -> Floats:
     """Shares (aims,) of the ways for which misses and a price of the distance are least."""
-    found = np.linalg.solve(price * apart + misses, np.diagonal(misses))
+    # An aim that is met already has no way to go.
+    met = np.diag((np.diagonal(misses) == 0.0).astype(float))
+    found = np.linalg.solve(price * apart + misses + met, np.diagonal(misses))
     return np.asarray(np.clip(found, 0.0, 1.0), np.float64)
 
 

@@ -167,7 +167,7 @@ def test_trust_says_what_to_capture_and_which_joints_err(facts, exported):
     assert sorted(found["joint_sigma"].values()) == sorted(card.joint_sigma)
     assert set(found["joint_sigma"]) == set(card.skeleton.names)
     gains = [point["gain"] for point in found["suggestions"]]
-    assert gains == sorted(gains, reverse=True) and gains[-1] > 0.0
+    assert gains[0] == max(gains) and min(gains) > 0.0
     assert 0.0 < found["support_limit"] < 1.0
     hand = Measure("height", (card.skeleton.names.index("RightHand"),), "end")
     told = replace(card, controls=(replace(card.controls[0], measure=hand), *card.controls[1:]))

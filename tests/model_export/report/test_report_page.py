@@ -92,7 +92,7 @@ def test_every_picture_says_what_it_shows(page):
 
 def test_every_section_can_be_reached_from_the_top(rendered, page):
     sections = re.findall(r'<section id="([a-z]+)">', rendered.html.decode())
-    assert len(sections) == 11 and set(sections) <= set(page.meant)
+    assert len(sections) == 12 and set(sections) <= set(page.meant)
 
 
 def test_what_was_given_is_written_and_not_obeyed(rendered, note):

@@ -219,7 +219,7 @@ def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
 @pytest.fixture
 def small(tmp_path, monkeypatch):
     """A family of two files in a folder that was empty."""
-    monkeypatch.setattr(write, "_files", lambda: {"bvh/a.bvh": b"a", "recipe.toml": b"r"})
+    monkeypatch.setattr(write, "_files", lambda _: {"bvh/a.bvh": b"a", "recipe.toml": b"r"})
     (tmp_path / "small").mkdir()
     return write.family(tmp_path / "small").parent
 

@@ -63,6 +63,7 @@ def test_of_a_performer_little_was_captured(model):
     ("asked", "field"),
     [
         (lambda: SuggestQuestion(0), "count"),
+        (lambda: SuggestQuestion(5, None, ()), "candidates"),
         (lambda: SuggestQuestion(201), "count"),
         (lambda: SuggestQuestion(1, "somebody"), "performer"),
         (lambda: SuggestQuestion(1, None, [{"turn": 1.0}]), "candidates/0/controls/stature"),

@@ -77,3 +77,15 @@ def test_the_chosen_controls_give_the_same_clip(reach):
     whole = reach.clip(ClipQuestion(partial.trust.controls, hold=hold))
     assert np.array_equal(partial.clip.rotations, whole.clip.rotations)
     assert whole.trust.inferred == ()
+
+
+@pytest.mark.parametrize("height", [2.8, 50.0])
+def test_a_target_beyond_reach_breaks_no_pose(reach, height):
+    whole = reach.clip(ClipQuestion({c.name: c.default for c in reach.session.card.controls}))
+    hold = Hold(targets=(Target("RightHand", (-0.2, height, 0.5), "end"),))
+    far = reach.clip(ClipQuestion({}, hold=hold))
+    control = reach.session.card.control("target_height")
+    assert far.trust.controls["target_height"] == control.maximum
+    # As high as hips get that stand; the control itself would have lifted them off the floor.
+    assert far.clip.root_path[:, 1].max() < whole.clip.root_path[:, 1].max() + 0.25
+    assert not far.trust.targets[0].reached and far.trust.targets[0].miss > 0.5

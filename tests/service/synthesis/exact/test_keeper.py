@@ -112,6 +112,47 @@ def test_a_time_after_the_end_is_refused(reach):
     with pytest.raises(InvalidField, match="expected 0 to") as fault:
         reach.clip(ClipQuestion(middle(reach), hold=late))
     assert fault.value.field == "targets/0/time"
+    endless = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), 1e300),))
+    with pytest.raises(InvalidField, match="expected 0 to"):
+        reach.clip(ClipQuestion(middle(reach), hold=endless))
+
+
+@pytest.mark.parametrize("moment", ["start", "end"])
+def test_a_time_that_is_another_targets_moment_is_refused(reach, moment):
+    controls = middle(reach)
+    duration = reach.clip(ClipQuestion(controls, hold=FREE)).trust.duration
+    time = duration if moment == "end" else 0.0
+    twins = Target("LeftHand", (0.3, 1.0, 0.3), moment), Target("LeftHand", (0.3, 1.1, 0.3), time)
+    with pytest.raises(InvalidField, match="has a target already") as fault:
+        reach.clip(ClipQuestion(controls, hold=Hold("none", twins)))
+    assert fault.value.field == "targets/1"
+    apart = twins[0], Target("LeftHand", (0.3, 1.1, 0.3), 0.5 * duration)
+    assert len(reach.clip(ClipQuestion(controls, hold=Hold("none", apart))).trust.targets) == 2
+
+
+def test_a_target_at_the_time_of_a_control_is_the_nearer_word(reach):
+    controls = middle(reach)
+    free = reach.clip(ClipQuestion(controls, fps=200.0, hold=FREE))
+    place = np.add(joint(reach, free, "RightHand")[-1], [0.0, 0.01, 0.0])
+    target = Target("RightHand", tuple(place), free.trust.duration)
+    (met,) = reach.clip(ClipQuestion(controls, hold=Hold(targets=(target,)))).trust.targets
+    assert met.reached and met.what.startswith("RightHand at")
+    earlier = Target("RightHand", tuple(place), 0.5)
+    both = reach.clip(ClipQuestion(controls, hold=Hold(targets=(earlier,)))).trust.targets
+    assert [each.what for each in both] == ["target_height", "RightHand at 0.5 s"]
+
+
+def test_what_is_met_already_does_not_hinder_what_is_out_of_reach(reach):
+    controls = middle(reach)
+    free = reach.pose(controls, [0.5], "warn", None, 0, FREE)
+    stays = Target("Hips", tuple(map(float, free.root_position[0])), 0.5)
+    question = reach.door.question(controls, "warn", None, 0)
+    begun = reach.keeper.held(question, NOTHING)
+    hips = begun.scene.positions(begun.numbers, 0, np.array([0.0]))[0]
+    exactly = Target("Hips", tuple(hips), "start"), Target("LeftHand", (0.3, 2.5, 0.7), "end")
+    for targets in (exactly, (stays, exactly[1])):
+        near, far = reach.clip(ClipQuestion(controls, hold=Hold("none", targets))).trust.targets
+        assert near.miss < 1e-3 < far.miss
 
 
 def test_a_speed_is_met_by_way_and_duration(walk):
