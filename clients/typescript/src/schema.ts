@@ -1351,7 +1351,7 @@ export interface components {
          */
         Loop: boolean;
         /**
-         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer.
+         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer. Files that hold no trust (BVH) do not say it.
          * @default false
          */
         JointSigma: boolean;
