@@ -127,8 +127,12 @@ def _goal(card: ModelCard, index: int, target: Target) -> Goal:
     when = target.when
     if not isinstance(when, str):
         time = limits.number(f"{field}/time", when)
-        if time < 0.0:
-            raise InvalidField(f"{field}/time", f"{time:g} s, expected 0 or more")
+        if not 0.0 <= time <= limits.durations(card)[1]:
+            raise InvalidField(
+                f"{field}/time",
+                f"{time:g} s, expected 0 to the clip's duration; captured clips last at most "
+                f"{card.durations[1]:.3g} s",
+            )
         moment = Measure("height", (joint,), "landmark")
         return Goal(f"{target.joint} at {time:g} s", moment, (x, y, z), time)
     return Goal(f"{target.joint} at {when}", _moment(card, field, joint, when), (x, y, z), None)

@@ -74,7 +74,8 @@ def test_a_control_that_was_not_given_cannot_be_exact(card):
         (Target("LeftHand", (0.0, math.inf, 1.0), "end"), "targets/0/position/1", "inf, expected"),
         (Target("LeftHand", (0.0, 1.0, 1e4), "end"), "targets/0/position/2", "-100 to 100 m"),
         (Target("LeftHand", (0.0, 1.0), "end"), "targets/0/position", "2 numbers, expected three"),
-        (Target("LeftHand", PLACE, -0.1), "targets/0/time", "-0.1 s, expected 0 or more"),
+        (Target("LeftHand", PLACE, -0.1), "targets/0/time", "-0.1 s, expected 0 to"),
+        (Target("LeftHand", PLACE, 1e9), "targets/0/time", "1e.09 s, expected 0 to"),
         (Target("LeftHand", PLACE, math.nan), "targets/0/time", "nan, expected"),
     ],
 )
