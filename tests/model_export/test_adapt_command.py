@@ -172,3 +172,13 @@ def test_clips_that_cannot_be_read_are_named(posefield, measuring, table, tmp_pa
     assert not out.exists()
     # Negative control: those that are there are read.
     assert posefield("adapt", measuring, *clips, "-o", out, *SAID)[0] == 0
+
+
+def test_a_wrong_unit_is_refused_where_all_controls_are_measured(
+    posefield, measuring, table, tmp_path
+):
+    clips, out = [table.with_name(f"{i}.bvh") for i in range(3)], tmp_path / "x.onnx"
+    for unit in ("0.6", "1.6"):
+        words = (measuring, *clips, "-o", out, *SAID[:3], unit, *SAID[4:])
+        assert refused(posefield, "times as long as is usual here", *words) == 4
+    assert not out.exists()
