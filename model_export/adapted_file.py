@@ -43,8 +43,11 @@ def refuse_name(card: ModelCard, performer: str) -> None:
     if performer in card.performers:
         known = ", ".join(card.performers)
         raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
-    if not performer.strip():
-        raise InvalidField("performer", f"{performer!r}, expected a name")
+    if not performer or performer != performer.strip() or not performer.isprintable():
+        raise InvalidField(
+            "performer",
+            f"{performer!r}, expected a name of printable characters, without blanks at its ends",
+        )
 
 
 def make(reopened: Reopened, newcomer: Newcomer) -> Exported:

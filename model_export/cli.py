@@ -196,6 +196,8 @@ def adapt(
         raise InvalidField("clips", "expected either motion files or --table")
     if not (0.0 < unit < float("inf")):
         raise InvalidField("unit", f"{unit}, expected a length in metres")
+    if not licence.strip():
+        raise InvalidField("licence", "blank, expected a text")
     progress = _Progress()
     progress(f"reading {model}")
     known = reopen.load(model)

@@ -117,8 +117,12 @@ def test_questions_that_cannot_be_meant(posefield, base, table, tmp_path):
     assert (
         refused(posefield, "'a' is known already, as are: a, b, d", base, clip, *out, *known) == 2
     )
-    blank = ("--performer", " ", *SAID[2:])
-    assert refused(posefield, "expected a name", base, clip, *out, *blank) == 2
+    for name in ("", " ", "cy ", "\u2003cy", "c\ty", "c\x00y", "c\u200by"):
+        nobody = ("--performer", name, *SAID[2:])
+        assert refused(posefield, "expected a name of printable", base, clip, *out, *nobody) == 2
+    for licence in ("", " \t"):
+        said = (*SAID[:-1], licence)
+        assert refused(posefield, "licence: blank, expected", base, clip, *out, *said) == 2
     assert refused(posefield, "either motion files or --table", base, *out, *SAID) == 2
     both = (clip, "--table", table)
     assert refused(posefield, "either motion files or --table", base, *both, *out, *SAID) == 2
