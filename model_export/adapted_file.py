@@ -184,7 +184,11 @@ def _diagnostics(
     left_out: Sequence[float],
     parity: float,
 ) -> dict[str, Any]:
-    """The old ones, but for what the new clips change."""
+    """The old ones, but for what the new clips change.
+
+    What only the parent's own data say stays the parent's: `explained` and what truncation cost
+    here, `joint_sigma` and `beside` on the card.
+    """
     old, model = reopened.card.diagnostics, adapted.model
     freedoms, frames, samples = old["tensor"]
     shape = freedoms, frames, samples + len(newcomer.examples)
