@@ -43,8 +43,11 @@ def refuse_name(card: ModelCard, performer: str) -> None:
     if performer in card.performers:
         known = ", ".join(card.performers)
         raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
-    if not performer.strip():
-        raise InvalidField("performer", f"{performer!r}, expected a name")
+    if not performer or performer != performer.strip() or not performer.isprintable():
+        raise InvalidField(
+            "performer",
+            f"{performer!r}, expected a name of printable characters, without blanks at its ends",
+        )
 
 
 def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
@@ -181,7 +184,11 @@ def _diagnostics(
     left_out: Sequence[float],
     parity: float,
 ) -> dict[str, Any]:
-    """The old ones, but for what the new clips change."""
+    """The old ones, but for what the new clips change.
+
+    What only the parent's own data say stays the parent's: `explained` and what truncation cost
+    here, `joint_sigma` and `beside` on the card.
+    """
     old, model = reopened.card.diagnostics, adapted.model
     freedoms, frames, samples = old["tensor"]
     shape = freedoms, frames, samples + len(newcomer.examples)

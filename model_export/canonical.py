@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import align, fidelity, flips, phase, threads
+from model_export import align, bones, fidelity, flips, phase, threads
 from model_export import travel as travels
 from model_export.align import FINE, Aligned, Canon
 from model_export.chart import Chart
@@ -145,7 +145,9 @@ def _distances(
 
 
 def refuse_strangers(known: Known, moved: Moved) -> None:
-    """Raise TrainingError for the first clip that lies too far from all that the model expects."""
+    """Raise TrainingError for the first clip of bones of another size, and for the first that lies
+    too far from all that the model expects."""
+    _refuse_sizes(known.model, moved.examples)
     for example, distance, sigma in zip(
         moved.examples, moved.distances, _sigmas(known.model, moved.examples), strict=True
     ):
@@ -155,6 +157,19 @@ def refuse_strangers(known: Known, moved: Moved) -> None:
                 f"somebody never seen, {distance / sigma:.1f} times the {100 * sigma:.1f} cm by "
                 f"which it expects them to differ, expected at most {STRANGE:g} times; is it of "
                 "another action, cut elsewhere, or in another unit?"
+            )
+
+
+def _refuse_sizes(model: Model, examples: Sequence[Example]) -> None:
+    """What a clip's bones say of its unit, which controls that are measured of it may hide."""
+    own = model.proportions.numpy(model.bank.at_samples("offsets"))
+    usual = np.median(np.linalg.norm(own, axis=-1).sum(axis=-1))
+    for example in examples:
+        size = np.linalg.norm(example.offsets, axis=-1).sum() / usual
+        if not 1.0 / bones.SIZE <= size <= bones.SIZE:
+            raise TrainingError(
+                f"{example.row.named}: its bones are {size:.2g} times as long as is usual here, "
+                f"expected at most {bones.SIZE:g} times either way; in another unit?"
             )
 
 

@@ -18,8 +18,11 @@ from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField, TrainingError
 
 if TYPE_CHECKING:
+    from model_export.evaluate.flags import Flags
     from model_export.evaluate.learning import Learning
+    from model_export.evaluate.protocol import Result
     from model_export.export import Exported
+    from model_export.ingest import Example
     from model_export.recipe import Recipe
     from model_export.train import Trained
 
@@ -196,6 +199,8 @@ def adapt(
         raise InvalidField("clips", "expected either motion files or --table")
     if not (0.0 < unit < float("inf")):
         raise InvalidField("unit", f"{unit}, expected a length in metres")
+    if not licence.strip():
+        raise InvalidField("licence", "blank, expected a text")
     progress = _Progress()
     progress(f"reading {model}")
     known = reopen.load(model)
@@ -290,57 +295,113 @@ class _Wanted:
     learning: bool
 
 
-def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
-    from model_export import ingest, recipe
-    from model_export.evaluate import flags, learning, protocol, reach, summary, worth
+@dataclass(frozen=True)
+class _Family:
+    """A recipe and what it was read to."""
 
-    own = recipe.read(recipe_file)
-    examples, _ = ingest.ingest(own, data)
-    can = protocol.protocols(own, examples)
-    for name in wanted.protocols:
-        if name not in can:
-            raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
-    results = []
-    with _jobs(wanted.scheduler, [examples]):
-        for name in wanted.protocols or can:
-            with _bar(name) as progress:
-                results.append(protocol.run(own, examples, name, progress))
-            trust = "\n".join(summary.trust_said(results[-1]))
-            typer.echo(f"{summary.table(results[-1])}\n\n{trust}\n")
-            if results[-1].corrections:
-                typer.echo(f"{reach.table(results[-1])}\n")
-    for said in worth.said(results):
-        typer.echo(said)
+    recipe: "Recipe"
+    examples: "list[Example]"
+
+
+def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
+    from model_export.evaluate import summary
+
+    # What cannot be done is refused before minutes of work.
+    own = _family(recipe_file, data, wanted)
+    other = _joined(own, data, wanted)
+    results = _protocols(own, wanted)
     typer.echo(f"{summary.LEGEND}\n{summary.definitions(results)}")
-    more: dict[str, Any] = {}
-    if wanted.joined:
-        other = recipe.read(wanted.joined)
-        both = flags.joined(own, examples, other, ingest.ingest(other, data)[0])
-        typer.echo(f"\n{own.name} and {other.name} joined, {summary.flags_said(both)}")
-        more = {"joined": {"family": other.name, "support": summary.flags_facts(both)}}
-    if named := worth.facts(results):
-        more["performers"] = named
-    curve = _learning(own, wanted)
-    if curve:
-        more["learning"] = learning.facts(curve)
-        typer.echo(f"\n{learning.table(curve)}")
+    curve = _learning(wanted)
+    more = _beside(own, other, results, curve)
     first, *others = map(summary.facts, results)
     if wanted.json_file:
         files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
     if wanted.report:
         from model_export.evaluate import render
 
-        files.write(render.html(own.description, results, curve), wanted.report)
+        files.write(render.html(own.recipe.description, results, curve), wanted.report)
 
 
-def _learning(own: "Recipe", wanted: _Wanted) -> "Learning | None":
+def _family(recipe_file: Path, data: Path, wanted: _Wanted) -> _Family:
+    """A recipe's family; InvalidField for what it cannot be asked."""
+    from model_export import ingest, recipe
+    from model_export.evaluate import protocol
+
+    own = recipe.read(recipe_file)
+    if wanted.learning and not own.truth:
+        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
+    examples, _ = ingest.ingest(own, data)
+    can = protocol.protocols(own, examples)
+    for name in wanted.protocols:
+        if name not in can:
+            raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
+    return _Family(own, examples)
+
+
+@dataclass(frozen=True)
+class _Joined:
+    """Name of a family joined to the evaluated one, and what is flagged between both."""
+
+    name: str
+    flags: "Flags"
+
+
+def _joined(own: _Family, data: Path, wanted: _Wanted) -> _Joined | None:
+    """None where no other family is named."""
+    from model_export import ingest, recipe
+    from model_export.evaluate import flags
+
+    if not wanted.joined:
+        return None
+    other = recipe.read(wanted.joined)
+    examples, _ = ingest.ingest(other, data)
+    return _Joined(other.name, flags.joined(own.recipe, own.examples, other, examples))
+
+
+def _protocols(own: _Family, wanted: _Wanted) -> "list[Result]":
+    """What the protocols found, each told as soon as it is done."""
+    from model_export.evaluate import protocol, reach, summary, worth
+
+    can = protocol.protocols(own.recipe, own.examples)
+    results = []
+    with _jobs(wanted.scheduler, [own.examples]):
+        for name in wanted.protocols or can:
+            with _bar(name) as progress:
+                results.append(protocol.run(own.recipe, own.examples, name, progress))
+            trust = "\n".join(summary.trust_said(results[-1]))
+            typer.echo(f"{summary.table(results[-1])}\n\n{trust}\n")
+            if results[-1].corrections:
+                typer.echo(f"{reach.table(results[-1])}\n")
+    for said in worth.said(results):
+        typer.echo(said)
+    return results
+
+
+def _beside(
+    own: _Family, other: _Joined | None, results: "list[Result]", curve: "Learning | None"
+) -> dict[str, Any]:
+    """What else was measured: of a joined family, of performers, and of suggested clips."""
+    from model_export.evaluate import learning, summary, worth
+
+    more: dict[str, Any] = {}
+    if other:
+        said = summary.flags_said(other.flags)
+        typer.echo(f"\n{own.recipe.name} and {other.name} joined, {said}")
+        more["joined"] = {"family": other.name, "support": summary.flags_facts(other.flags)}
+    if named := worth.facts(results):
+        more["performers"] = named
+    if curve:
+        more["learning"] = learning.facts(curve)
+        typer.echo(f"\n{learning.table(curve)}")
+    return more
+
+
+def _learning(wanted: _Wanted) -> "Learning | None":
     """What suggested clips are worth; none where nobody asks."""
     from model_export.evaluate import learning
 
     if not wanted.learning:
         return None
-    if not own.truth:
-        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
     with _jobs(wanted.scheduler), _bar("learning") as progress:
         return learning.measure(progress)
 

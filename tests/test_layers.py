@@ -102,6 +102,16 @@ def test_what_is_hidden_cannot_be_imported(module):
     assert "ModuleNotFoundError: hidden" in done.stderr
 
 
+DRAWS = "import sys, {module}\nprint('matplotlib' in sys.modules)"
+
+
+def test_who_wants_no_pictures_waits_for_none():
+    done = python(DRAWS.format(module="model_export.evaluate.protocol"))
+    assert done.stdout == "False\n", done.stderr
+    # Negative control: the page is drawn.
+    assert python(DRAWS.format(module="model_export.evaluate.render")).stdout == "True\n"
+
+
 @pytest.mark.parametrize("module", ["service.synthesis.session", "service.cli", "model_export.cli"])
 def test_telemetry_is_off_before_onnxruntime_is_imported(module):
     done = python(f"{WATCHED}import {module}")

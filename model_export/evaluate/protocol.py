@@ -16,7 +16,7 @@ from model_export.evaluate import (
     methods,
     motion,
     newcomers,
-    shown,
+    stills,
     truth,
 )
 from model_export.evaluate.errors import Errors
@@ -25,7 +25,7 @@ from model_export.evaluate.flags import Flags
 from model_export.evaluate.folds import Fold
 from model_export.evaluate.methods import EXACT, OURS, Asked
 from model_export.evaluate.motion import Event, Motion
-from model_export.evaluate.shown import CAPTURED, Stills
+from model_export.evaluate.stills import CAPTURED, Stills
 from model_export.ingest import Example
 from model_export.recipe import Recipe
 from model_export.sample import truth as truths
@@ -224,13 +224,13 @@ def _compared(
     }
     named = {CAPTURED: held.captured, **{name: motions[name] for name in motions if name in OWN}}
     moment = fidelity.moment(recipe, trained.examples)
-    stills = {
-        name: [shown.still(own, moment.joint) if moment else None for own in made_of]
+    looks = {
+        name: [stills.still(own, moment.joint) if moment else None for own in made_of]
         for name, made_of in named.items()
     }
     parents = trained.skeleton.parents
     trust = found.sigma, found.joint_sigma
-    return _Part(places, compared, *trust, corrections, stills, parents)
+    return _Part(places, compared, *trust, corrections, looks, parents)
 
 
 @dataclass(frozen=True)
@@ -250,7 +250,7 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
     # Where a fold holds the last but one performer out, nobody is told apart in it.
     methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
     gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
-    stills = {
+    looks = {
         name: [s for part in listed for s in part.stills.get(name, [None] * len(part.places))]
         for name in (CAPTURED, *OWN)
         if any(name in part.stills for part in listed)
@@ -264,6 +264,6 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
         np.concatenate([part.joint_sigma for part in listed])[order],
         asked.joints,
         tuple(corrections[i] for i in order if corrections),
-        stills={name: [own[i] for i in order] for name, own in stills.items()},
+        stills={name: [own[i] for i in order] for name, own in looks.items()},
         parents=listed[0].parents,
     )

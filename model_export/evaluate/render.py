@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from model_export.evaluate import reach, shown, summary
+from model_export.evaluate import reach, shown, stills, summary
 from model_export.evaluate.learning import Learning
 from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
 from model_export.evaluate.newcomers import SHOWN
@@ -71,7 +71,7 @@ PANELS: dict[str, dict[str, str]] = {
 def _stills(result: Result) -> list[Picture]:
     """The reach of a clip in the middle of all, at its event."""
     words = PANELS.get(result.protocol, {})
-    place = shown.chosen(result.stills, tuple(words)) if words else None
+    place = stills.chosen(result.stills, tuple(words)) if words else None
     if place is None:
         return []
     clip = result.clips[place]

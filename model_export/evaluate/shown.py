@@ -1,6 +1,6 @@
-"""One clip at its event, as it was captured and as several methods have it."""
+"""Pictures of one clip at its event, as it was captured and as several methods have it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,36 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from model_export.evaluate.motion import Motion
+from model_export.evaluate.stills import CAPTURED, Still, Stills
 from model_export.report import picture
 from model_export.report.picture import Picture
 from service.motion.conventions import UP, Floats
 
-CAPTURED = "captured"
 MARGIN = 0.15
-
-
-@dataclass(frozen=True)
-class Still:
-    """joints (J, 3), m, when an effector is nearest to where its event is, its path (F, 3) and
-    that place (3,)."""
-
-    joints: Floats
-    path: Floats
-    event: Floats
-
-
-Stills = Mapping[str, Sequence[Still | None]]
-"""Of each method, clip by clip; None where it was not asked."""
-
-
-def still(motion: Motion | None, joint: int) -> Still | None:
-    """A motion at its event; None of one that has none."""
-    if motion is None or motion.event is None:
-        return None
-    path = motion.joints[:, joint]
-    nearest = int(np.argmin(np.linalg.norm(path - motion.event, axis=-1)))
-    return Still(motion.joints[nearest], path, motion.event)
 
 
 @dataclass(frozen=True)
@@ -82,19 +58,6 @@ def drawn(name: str, scene: Scene, caption: str) -> Picture:
     return picture.draw(name, 3.6, partial(Scene.paint, scene), alt, caption)
 
 
-def chosen(stills: Stills, methods: Sequence[str]) -> int | None:
-    """The clip in the middle of how far the first method is off at the event, of those that all
-    were asked for."""
-    there = [
-        place
-        for place, truth in enumerate(stills.get(CAPTURED, ()))
-        if truth and all(stills.get(name, [None] * (place + 1))[place] for name in methods)
-    ]
-    if not there:
-        return None
-    return sorted(there, key=lambda place: _off(stills, methods[0], place))[len(there) // 2]
-
-
 def scene(
     stills: Stills, words: Mapping[str, str], clip: str, place: int, parents: tuple[int, ...]
 ) -> Scene:
@@ -102,12 +65,6 @@ def scene(
     found = {CAPTURED: stills[CAPTURED][place]}
     found |= {said: stills[name][place] for name, said in words.items()}
     return Scene(clip, {said: own for said, own in found.items() if own}, parents)
-
-
-def _off(stills: Stills, name: str, place: int) -> float:
-    truth, own = stills[CAPTURED][place], stills[name][place]
-    assert truth and own
-    return float(np.linalg.norm(own.event - truth.event))
 
 
 def _flat(points: Floats, across: Floats) -> Floats:

@@ -222,6 +222,22 @@ def test_a_clip_of_another_action_is_refused_with_the_numbers(trained, known):
         canonical.refuse_strangers(known, canonical.move(known, strange))
 
 
+@pytest.mark.parametrize("size", [0.18, 0.6, 1.6, 5.6])
+def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
+    good = canonical.move(known, examples(trained, "cy", SHOWN))
+    canonical.refuse_strangers(known, good)
+
+    def of_size(size):
+        first, own, last = good.examples
+        scaled = replace(own.clip, translations=size * own.clip.translations)
+        return replace(good, examples=(first, replace(own, clip=scaled), last))
+
+    with pytest.raises(TrainingError, match=r"cy7\.bvh: its bones are .* at most 1\.5 times "):
+        canonical.refuse_strangers(known, of_size(size))
+    # Negative control: a performer of another stature is none.
+    canonical.refuse_strangers(known, of_size(1.1))
+
+
 def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, adapted):
     content = export.export(recipe, trained, []).content
     reopened = reopen.reopen(content, "small.onnx").known

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from model_export import export, ingest, train
+from model_export.recipe import Recipe
 from service.synthesis import session
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
@@ -116,8 +117,12 @@ def test_questions_that_cannot_be_meant(posefield, base, table, tmp_path):
     assert (
         refused(posefield, "'a' is known already, as are: a, b, d", base, clip, *out, *known) == 2
     )
-    blank = ("--performer", " ", *SAID[2:])
-    assert refused(posefield, "expected a name", base, clip, *out, *blank) == 2
+    for name in ("", " ", "cy ", "\u2003cy", "c\ty", "c\x00y", "c\u200by"):
+        nobody = ("--performer", name, *SAID[2:])
+        assert refused(posefield, "expected a name of printable", base, clip, *out, *nobody) == 2
+    for licence in ("", " \t"):
+        said = (*SAID[:-1], licence)
+        assert refused(posefield, "licence: blank, expected", base, clip, *out, *said) == 2
     assert refused(posefield, "either motion files or --table", base, *out, *SAID) == 2
     both = (clip, "--table", table)
     assert refused(posefield, "either motion files or --table", base, *both, *out, *SAID) == 2
@@ -146,3 +151,38 @@ def test_files_that_cannot_be_used(posefield, base, table, tmp_path):
 def test_a_model_that_tells_nobody_apart_is_refused(posefield, model_path, table, tmp_path):
     words = (model_path, "--table", table, "-o", tmp_path / "x.onnx", *SAID)
     assert refused(posefield, "tells no performers apart", *words) == 2
+
+
+@pytest.fixture(scope="module")
+def measuring(folder):
+    """A model whose one control is measured."""
+    height = {"quantity": "height", "joint": "LeftHand", "at": "start"}
+    asked = [{"name": "hand", "description": "hand", "auto": height}]
+    plain = newcomers.recipe().model_dump(exclude_none=True, by_alias=True)
+    recipe = Recipe.model_validate({**plain, "controls": asked})
+    trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
+    path = folder / "measuring.onnx"
+    path.write_bytes(export.export(recipe, trained, []).content)
+    return path
+
+
+def test_clips_that_cannot_be_read_are_named(posefield, measuring, table, tmp_path):
+    clips, out = [table.with_name(f"{i}.bvh") for i in range(3)], tmp_path / "x.onnx"
+    missing = table.with_name("none.bvh")
+    said = f"{missing}: cannot be read: No such file"
+    assert refused(posefield, said, measuring, *clips, missing, "-o", out, *SAID) == 3
+    said = f"{table.parent}: cannot be read: Is a directory"
+    assert refused(posefield, said, measuring, table.parent, "-o", out, *SAID) == 3
+    assert not out.exists()
+    # Negative control: those that are there are read.
+    assert posefield("adapt", measuring, *clips, "-o", out, *SAID)[0] == 0
+
+
+def test_a_wrong_unit_is_refused_where_all_controls_are_measured(
+    posefield, measuring, table, tmp_path
+):
+    clips, out = [table.with_name(f"{i}.bvh") for i in range(3)], tmp_path / "x.onnx"
+    for unit in ("0.6", "1.6"):
+        words = (measuring, *clips, "-o", out, *SAID[:3], unit, *SAID[4:])
+        assert refused(posefield, "times as long as is usual here", *words) == 4
+    assert not out.exists()

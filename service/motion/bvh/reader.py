@@ -27,8 +27,12 @@ class Readable(Protocol):
 
 
 def read(path: Readable) -> BvhFile:
-    """The file at `path`."""
-    return loads(path.read_bytes(), str(path))
+    """The file at `path`; BvhError where it cannot be read, and as `loads`."""
+    try:
+        content = path.read_bytes()
+    except OSError as fault:
+        raise BvhError(str(path), f"cannot be read: {fault.strerror}") from fault
+    return loads(content, str(path))
 
 
 def loads(content: bytes, source: str) -> BvhFile:
