@@ -93,8 +93,9 @@ def _space(
     moves = np.ptp(numbers.reshape(-1, numbers.shape[-1]), axis=0) > CONSTANT
     varies = moves | np.any(decoder.directions != 0.0, axis=0)
     root, inverse = metric.whitening(gram[np.ix_(varies, varies)])
-    directions, turn = np.linalg.qr((decoder.directions[:, varies] @ root).T)
-    return _Space(varies, root, inverse, directions, turn)
+    mixed = (decoder.directions[:, varies] @ root).T
+    directions = hosvd.fix_signs(np.linalg.qr(mixed)[0])
+    return _Space(varies, root, inverse, directions, directions.T @ mixed)
 
 
 def _more(basis: Floats, rows: Floats, budget: float) -> Floats:
@@ -107,7 +108,7 @@ def _more(basis: Floats, rows: Floats, budget: float) -> Floats:
     found = vectors[:, len(values) - kept :]
     # What rounding has left of the old columns in them.
     found, _ = np.linalg.qr(found - basis @ (basis.T @ found))
-    return np.hstack([basis, found])
+    return np.hstack([basis, hosvd.fix_signs(found)])
 
 
 def _tensor(

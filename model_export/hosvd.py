@@ -100,10 +100,11 @@ def _projected(tensor: Floats, bases: tuple[Floats, ...]) -> Multilinear:
 
 def _basis(unfolded: Floats) -> Floats:
     _, vectors = np.linalg.eigh(unfolded @ unfolded.T)
-    return _fix_signs(vectors[:, ::-1])
+    return fix_signs(vectors[:, ::-1])
 
 
-def _fix_signs(columns: Floats) -> Floats:
+def fix_signs(columns: Floats) -> Floats:
+    """Columns (D, r) of either sign, turned so that the largest entry of each is positive."""
     # Rounded, so that two entries of equal size in theory do not change places by an ulp.
     largest = np.argmax(np.round(np.abs(columns), 9), axis=0)
     return columns * np.sign(columns[largest, np.arange(columns.shape[1])])

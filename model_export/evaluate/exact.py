@@ -48,8 +48,9 @@ class Correction:
 
     miss, m, that is left. steps. distance: of the captured place from the predicted one, in
     standard deviations. reached: whether that counts as within reach. beyond: whether the same is
-    said of places BEYOND it. acceleration: after over before. seconds: that one thread worked, the
-    prediction counted in; plain_seconds: for the same clip uncorrected.
+    said of places BEYOND it, none where the event is the root's. acceleration: after over before.
+    seconds: that one thread worked, the prediction counted in; plain_seconds: for the same clip
+    uncorrected. far: likewise none where the event is the root's.
     """
 
     miss: float
@@ -60,7 +61,7 @@ class Correction:
     acceleration: float
     seconds: float
     plain_seconds: float
-    far: "Far"
+    far: "Far | None"
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,9 @@ def _corrected(
     begun = desk.bench.begun(desk.state(controls, labels))
     held = desk.held(begun, wanted.joint)
     before, after = desk.motion(begun), desk.motion(held)
-    beyond = [desk.held(begun, wanted.farther(metres)) for metres in BEYOND]
+    # Nothing is farther from the root than the root is.
+    outward = desk.event.joint != 0
+    beyond = [desk.held(begun, wanted.farther(metres)) for metres in BEYOND if outward]
     correction = Correction(
         held.met[0].miss,
         held.steps,
@@ -145,7 +148,7 @@ def _corrected(
         _rougher(after, before),
         _seconds(lambda: _clip(desk, controls, labels, wanted)),
         _seconds(lambda: _plain(desk, controls, labels)),
-        _far(desk, begun, before, wanted),
+        _far(desk, begun, before, wanted) if outward else None,
     )
     return after, correction
 

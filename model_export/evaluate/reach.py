@@ -8,7 +8,7 @@ import numpy as np
 
 from model_export.evaluate import columns
 from model_export.evaluate.errors import Errors
-from model_export.evaluate.exact import BEYOND, Correction
+from model_export.evaluate.exact import BEYOND, Correction, Far
 from model_export.evaluate.methods import EXACT, OURS
 from model_export.evaluate.protocol import Result
 from model_export.report import plain
@@ -59,7 +59,7 @@ def figures(result: Result) -> list[Figure]:
         Figure("distance", "distance, standard deviations", of(lambda c: c.distance)),
         Figure("out_of_reach", "told to be out of reach", of(lambda c: not c.reached), **SHARE),
         *_beyond(found),
-        *_far(of),
+        *_far([correction.far for correction in found if correction.far]),
     ]
 
 
@@ -93,21 +93,24 @@ def _mean(error: Errors, distance: str) -> float:
 
 
 def _beyond(found: tuple[Correction, ...]) -> Iterator[Figure]:
-    for place, metres in enumerate(BEYOND):
+    for place, metres in enumerate(BEYOND[: len(found[0].beyond)]):
         told = np.array([float(not correction.beyond[place]) for correction in found])
         centimetres = round(100 * metres)
         key, words = f"out_of_reach_{centimetres}cm", f"the same {centimetres} cm beyond"
         yield Figure(key, words, told, **SHARE)
 
 
-def _far(of: Callable[[Callable[[Correction], float]], Floats]) -> list[Figure]:
+def _far(found: list[Far]) -> list[Figure]:
+    if not found:
+        return []
+    told, acceleration, root, steps = np.array(
+        [(not far.reached, far.acceleration, far.root, far.steps) for far in found], np.float64
+    ).T
     return [
-        Figure(
-            "far_out_of_reach", "the same a metre beyond", of(lambda c: not c.far.reached), **SHARE
-        ),
-        Figure("far_acceleration", "there: acceleration", of(lambda c: c.far.acceleration)),
-        Figure("far_root_cm", "there: root moved, cm", 100.0 * of(lambda c: c.far.root)),
-        Figure("far_steps", "there: steps", of(lambda c: c.far.steps), "{:.1f}"),
+        Figure("far_out_of_reach", "the same a metre beyond", told, **SHARE),
+        Figure("far_acceleration", "there: acceleration", acceleration),
+        Figure("far_root_cm", "there: root moved, cm", 100.0 * root),
+        Figure("far_steps", "there: steps", steps, "{:.1f}"),
     ]
 
 

@@ -114,7 +114,7 @@ def _bars(result: Result, found: Sequence[Summary]) -> Picture:
 
 def _paint_bars(found: Sequence[Summary], figure: Figure) -> None:
     names = [one.name.replace("_", " ") for one in found]
-    colours = [picture.ORANGE if one.name == OURS else picture.BLUE for one in found]
+    colours = [picture.ORANGE if one.name.startswith(OURS) else picture.BLUE for one in found]
     columns = {
         "root-relative": [one.mean.relative.mean for one in found],
         "global": [one.mean.absolute.mean for one in found],

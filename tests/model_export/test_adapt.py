@@ -11,6 +11,7 @@ from model_export import (
     canonical,
     export,
     extend,
+    hosvd,
     ingest,
     kriging,
     new_fields,
@@ -151,6 +152,28 @@ def test_a_model_that_was_cut_nowhere_takes_up_no_rounding_errors(known, adapted
     assert np.sqrt(np.mean(np.sum((gaps - said.transpose(2, 1, 0)) ** 2, axis=-1))) < 1e-3
     freedoms = np.count_nonzero(np.ptp(moved.numbers, axis=(0, 1)) > 1e-9)
     assert adapted.extended.ranks[0] < found.ranks[0] <= freedoms
+
+
+def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
+    def extended():
+        numbers = adapted.moved.numbers
+        parents, weights = known.skeleton.parents, known.joint_weights
+        return extend.extend(known.model, parents, weights, numbers, known.truncation).tensor
+
+    own, eigh, qr = extended(), np.linalg.eigh, np.linalg.qr
+
+    def turned_qr(columns):
+        q, r = qr(columns)
+        signs = np.where(np.arange(q.shape[1]) % 2, 1.0, -1.0)
+        return q * signs, signs[:, None] * r
+
+    # A machine whose LAPACK chooses other signs.
+    monkeypatch.setattr(np.linalg, "qr", turned_qr)
+    monkeypatch.setattr(np.linalg, "eigh", lambda rows: (eigh(rows)[0], -eigh(rows)[1]))
+    assert np.allclose(extended().values, own.values, rtol=0, atol=1e-9)
+    # Negative control: as they come, signs differ.
+    monkeypatch.setattr(hosvd, "fix_signs", lambda columns: columns)
+    assert np.abs(extended().values - own.values).max() > 1e-3
 
 
 def test_a_range_that_grows_moves_no_field(trained, known):

@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from model_export import ingest
 from model_export.evaluate import (
     errors,
+    exact,
     folds,
     methods,
     motion,
@@ -23,6 +26,7 @@ from model_export.evaluate import (
 )
 from model_export.evaluate.methods import Asked
 from model_export.recipe import Recipe
+from model_export.report import picture
 from model_export.train import train
 from service import cli
 from service.motion.errors import TrainingError
@@ -182,8 +186,34 @@ def test_places_a_metre_off_are_told_to_be_out_of_reach(results):
     """Arms of the small skeleton are shorter than that."""
     corrections = [c for result in results[0] for c in result.corrections]
     assert not any(c.far.reached for c in corrections)
+    assert all(len(c.beyond) == len(exact.BEYOND) for c in corrections)
     assert any(c.reached for c in corrections)
     assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in corrections)
+
+
+def test_ours_is_drawn_in_orange_however_it_is_asked(results):
+    found, figure = summary.of(results[0][1]), Figure()
+    render._paint_bars(found, figure)
+    orange = {
+        one.name
+        for one, bar in zip(found, figure.axes[0].patches, strict=True)
+        if to_hex(bar.get_facecolor()) == to_hex(picture.ORANGE)
+    }
+    assert orange == {methods.OURS, methods.EXACT, *newcomers.SHOWN} & {one.name for one in found}
+    # Negative control: there are others, who are not.
+    assert {methods.OURS, *newcomers.SHOWN} <= orange < {one.name for one in found}
+
+
+def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
+    event = recipe.event.model_copy(update={"joint": "Hips"})
+    own = recipe.model_copy(update={"event": event})
+    found = protocol.run(own, family, "performer", lambda done, parts: None)
+    assert all(c.beyond == () and c.far is None for c in found.corrections)
+    facts = reach.facts(found)
+    assert all(np.isfinite(value) for value in facts.values())
+    before, after = (summary.facts(found)["methods"][n] for n in (methods.OURS, methods.EXACT))
+    assert after["effector_cm"] < 0.5 * before["effector_cm"]
+    assert not any("far" in name or name.startswith("out_of_reach_") for name in facts)
 
 
 def test_without_an_event_nothing_is_held(recipe, family):

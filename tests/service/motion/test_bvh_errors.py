@@ -471,6 +471,11 @@ def test_utf16_is_refused():
     assert "expected HIERARCHY" in refused(VALID.encode("utf-16")).message
 
 
-def test_a_missing_file_is_the_callers_fault(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        bvh.read(tmp_path / "none.bvh")
+@pytest.mark.parametrize("name", ["none.bvh", "."])
+def test_what_cannot_be_read_is_named(tmp_path, name):
+    with pytest.raises(BvhError, match="cannot be read: ") as caught:
+        bvh.read(tmp_path / name)
+    assert caught.value.path == str(tmp_path / name)
+    # Negative control: what is there is read.
+    (tmp_path / "valid.bvh").write_text(VALID)
+    assert len(bvh.read(tmp_path / "valid.bvh").values) == 3
