@@ -68,7 +68,8 @@ for (const model of ["reaching", "cmu_walk"]) {
           const question = { controls, times, level, performer };
           const [own, theirs] = [
             await ask<Numbers>("pose", question),
-            await service.pose(model, question),
+            // Answers are held to nothing in the browser.
+            await service.pose(model, { ...question, exact: "none" }),
           ];
           assert.ok(gap(card, own, theirs) < NEAR, `level ${level}, point ${i}`);
         }
@@ -95,7 +96,7 @@ for (const model of ["reaching", "cmu_walk"]) {
           const question = { controls: controls!, fps: 25, root, loop, level: 1 };
           const [own, theirs] = [
             await ask<Numbers>("clip", question),
-            await service.clip(model, question),
+            await service.clip(model, { ...question, exact: "none" }),
           ];
           assert.equal(own.rotations.length, theirs.rotations.length);
           assert.ok(gap(card, own, theirs) < NEAR, JSON.stringify(question));

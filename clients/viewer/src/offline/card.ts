@@ -15,7 +15,8 @@ export function card(model: Uint8Array, identity: string): ModelCard {
     own.map(([key, text]) => [key.slice(PREFIX.length), JSON.parse(text) as unknown]),
   );
   if (!("format" in plain)) throw new BadModel("no model of posefield: it says nothing of itself");
-  const { format, ...rest } = plain;
+  // What adapting a model takes is of no use to anybody who asks it.
+  const { format, making: _, ...rest } = plain;
   if (format !== FORMAT) throw new BadModel(`model format ${String(format)}, expected ${FORMAT}`);
   return { ...USUAL, ...rest, identity } as unknown as ModelCard;
 }
