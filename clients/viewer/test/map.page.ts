@@ -79,8 +79,15 @@ describe("the map", () => {
     const grid = await client.sigma("reaching", question);
     const inside = grid.sigma.flatMap((row, i) => row.filter((_, j) => grid.inside[i]![j]));
     const [least, most] = [100 * Math.min(...inside), 100 * Math.max(...inside)];
-    const words = await page.locator(".map-words").innerText();
-    const [low, high] = [...words.matchAll(/([\d.]+) cm/g)].map(([, text]) => Number(text));
+    const said = async () => {
+      const words = await page.locator(".map-words").innerText();
+      return [...words.matchAll(/([\d.]+) cm/g)].map(([, text]) => Number(text));
+    };
+    // On a busy machine it may still say what its first axes had.
+    for (let i = 0; i < 100 && !(Math.abs((await said())[0]! - least) < 0.006 * least); i++) {
+      await page.waitForTimeout(100);
+    }
+    const [low, high] = await said();
     assert.ok(Math.abs(low! - least) < 0.006 * least, `${low} for ${least}`);
     assert.ok(Math.abs(high! - most) < 0.006 * most, `${high} for ${most}`);
     assert.ok(Math.abs(most - least) > 0.006 * most);
