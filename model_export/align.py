@@ -13,7 +13,7 @@ import numpy as np
 from model_export import dtw
 from model_export.ingest import Example, heading
 from model_export.warp import DENSE, WarpBasis
-from service.motion import quat, skeleton
+from service.motion import blend, quat, skeleton
 from service.motion.clip import Clip
 from service.motion.conventions import UP, Floats
 
@@ -125,10 +125,7 @@ def trace(clip: Clip, weights: Floats) -> Floats:
 
 def at(values: Floats, u: Floats) -> Floats:
     """Rows (S, features) of values (F, features) at fractions u (S,) of the way through."""
-    place = u * (len(values) - 1)
-    before = np.minimum(place.astype(np.int64), len(values) - 2)
-    share = (place - before)[:, None]
-    return (1.0 - share) * values[before] + share * values[before + 1]
+    return blend.between(values, u * (len(values) - 1))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from model_export.hosvd import Multilinear
 from model_export.ladder import Numbers
 from model_export.net import Net
-from service.motion import quat
+from service.motion import blend, quat
 from service.motion.conventions import Floats, Indices
 
 # Added to squared half angles, so that the sine over the angle has a value at zero.
@@ -73,9 +73,7 @@ class Decoder:
     def reduced_poses(self, coefficients: Floats, place: Floats) -> Floats:
         """Coefficients (B, S, r1) of the first mode."""
         table = self.reduced.bases[1]
-        before = np.minimum(place.astype(np.int64), len(table) - 2)
-        share = (place - before)[..., None]
-        time = (1.0 - share) * table[before] + share * table[before + 1]
+        time = blend.between(table, place)
         # The core first, as a product of matrices: 17 times as fast as one sum at full rank.
         motion = np.tensordot(coefficients, self.reduced.core, axes=(1, 2))
         return time @ motion.swapaxes(1, 2)

@@ -77,13 +77,18 @@ def proportions(offsets: Floats) -> tuple[Proportions, Floats]:
     rank = 1
     while rank < len(values) and _worst(centred, left, values, right, rank) > SAME_BONE:
         rank += 1
-    largest = np.argmax(np.round(np.abs(right[:rank]), 9), axis=1)
-    # A direction of no length has no sign either.
-    signs = np.where(right[np.arange(rank), largest] < 0, -1.0, 1.0)
-    directions = (signs[:, None] * right[:rank]).reshape(rank, -1, 3)
+    turned = signs(right[:rank])
+    directions = (turned[:, None] * right[:rank]).reshape(rank, -1, 3)
     # The root has no bone; the decomposition leaves a rounding error where it was.
     directions[:, 0] = 0.0
-    return Proportions(mean, directions), left[:, :rank] * values[:rank] * signs
+    return Proportions(mean, directions), left[:, :rank] * values[:rank] * turned
+
+
+def signs(rows: Floats) -> Floats:
+    """Sign (r,) of the largest entry of each row, so that none hangs on the machine; of a row of no
+    length, one."""
+    largest = np.argmax(np.round(np.abs(rows), 9), axis=1)
+    return np.where(rows[np.arange(len(rows)), largest] < 0, -1.0, 1.0)
 
 
 def _worst(centred: Floats, left: Floats, values: Floats, right: Floats, rank: int) -> float:

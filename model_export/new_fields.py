@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model_export import kriging, samples
+from model_export import fields, kriging, samples
 from model_export.decoder import Proportions
 from model_export.field_bank import Constant, Field, FieldBank
 from model_export.fields import SAME_BONE
@@ -96,10 +96,10 @@ def _spanned(
     rank = 0
     while rank < len(values) and _worst(left, values, right, rank) > SAME_BONE:
         rank += 1
-    more = right[:rank] * _signs(right[:rank])[:, None]
+    more = right[:rank] * fields.signs(right[:rank])[:, None]
     directions = np.vstack([flat, more]).reshape(-1, *proportions.mean.shape)
     directions[:, 0] = 0.0
-    beyond = left[:, :rank] * values[:rank] * _signs(right[:rank])
+    beyond = left[:, :rank] * values[:rank] * fields.signs(right[:rank])
     return (
         np.pad(known, ((0, 0), (0, rank))),
         np.hstack([own, beyond]),
@@ -110,9 +110,3 @@ def _spanned(
 def _worst(left: Floats, values: Floats, right: Floats, rank: int) -> float:
     """Largest number that the first parts of a decomposition leave out."""
     return float(np.abs((left[:, rank:] * values[rank:]) @ right[rank:]).max())
-
-
-def _signs(rows: Floats) -> Floats:
-    """Sign (r,) of the largest entry of each row, so that none hangs on the machine."""
-    largest = np.argmax(np.round(np.abs(rows), 9), axis=1)
-    return np.where(rows[np.arange(len(rows)), largest] < 0, -1.0, 1.0)

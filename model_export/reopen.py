@@ -123,9 +123,7 @@ def _bank(file: _File) -> FieldBank:
     card = file.card
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
     points = field.half_ranges(np.array(card.examples), low, high)
-    who = np.array(card.moved_by or [0] * len(points))
-    labels = np.eye(max(len(card.performers), 1), len(card.performers))[who]
-    points = np.hstack([points, labels])
+    points = np.hstack([points, card.labels])
     order = _order(file, points)
     others = {name: _other(file, name, points, order) for name in _widths(file)}
     assert card.kriging is not None

@@ -7,9 +7,10 @@ import numpy as np
 
 from model_export.ingest import Example
 from model_export.recipe import Recipe
+from service.motion import field
 from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
-from service.motion.field import drift, half_ranges
+from service.motion.field import half_ranges
 
 EMPTY = np.zeros(0, dtype=np.int64)
 
@@ -116,8 +117,4 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
 
 def _needed(groups: Indices, points: Floats, degree: int) -> int | None:
     """First group without which points (N, d) do not determine a drift."""
-    functions = drift(points, points.shape[1], degree)
-    for group in np.unique(groups):
-        if np.linalg.matrix_rank(functions[groups != group]) < functions.shape[1]:
-            return int(group)
-    return None
+    return field.needed(groups, field.drift(points, points.shape[1], degree))

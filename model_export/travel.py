@@ -12,7 +12,7 @@ import numpy as np
 from model_export import measured
 from model_export.align import Aligned
 from model_export.net import Net
-from service.motion import quat
+from service.motion import quat, travelling
 from service.motion.conventions import UP, Floats
 
 # A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.
@@ -41,11 +41,7 @@ def put_back(
 
     share (..., S): how much of the way each frame has behind it.
     """
-    gone = share[..., None] * travel[:, None]
-    moved = root_path + gone[..., :2] @ np.eye(3)[[0, 2]]
-    turned = rotations.copy()
-    turned[:, :, 0] = quat.mul(quat.about(UP, gone[..., 2]), rotations[:, :, 0])
-    return turned, moved
+    return travelling.put_back(rotations, root_path, share[..., None] * travel[:, None])
 
 
 def spread(residuals: Floats) -> Floats:

@@ -1,12 +1,22 @@
-"""From one pose to another of nearly the same: what a switch of level of detail goes through."""
+"""Between rows of a table, and from one pose to another of nearly the same: what a switch of level
+of detail goes through."""
 
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from service.motion.conventions import Floats
+
 Numbers = npt.NDArray[Any]
 """Of any precision, which stays what it is."""
+
+
+def between(rows: Floats, places: Floats) -> Floats:
+    """Values (..., k) of rows (F, k) at places (...) among them, 0 to F - 1, linear between two."""
+    before = np.minimum(places.astype(np.int64), len(rows) - 2)
+    share = (places - before)[..., None]
+    return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
 def straight(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from service.motion import measure, roles
+from service.motion.conventions import Floats
 from service.motion.detail import Level
 from service.motion.field import Hyper
 from service.motion.measure import Measure
@@ -114,6 +115,13 @@ class ModelCard:
     beside: tuple[tuple[float, ...], ...] = ()
     joint_sigma: tuple[float, ...] = ()
     making: Making | None = None
+
+    @property
+    def labels(self) -> Floats:
+        """Labels (N, p) of who moved in each captured clip; of width zero where nobody is told
+        apart."""
+        moved = np.array(self.moved_by or [0] * len(self.examples))
+        return np.eye(max(len(self.performers), 1), len(self.performers))[moved]
 
     def control(self, name: str) -> Control | None:
         """The control of that name, if there is one."""

@@ -78,6 +78,15 @@ def drift(points: Floats, controls: int, degree: int) -> Floats:
     return np.hstack([one, points[:, :controls]]) if degree else one
 
 
+def needed(groups: Indices, functions: Floats) -> int | None:
+    """First group of samples (n,) without which the others' drift functions (n, k) do not determine
+    a drift; None where any may be left out."""
+    for group in np.unique(groups):
+        if np.linalg.matrix_rank(functions[groups != group]) < functions.shape[1]:
+            return int(group)
+    return None
+
+
 def basis(hyper: Hyper, points: Floats, samples: Floats) -> Floats:
     """Covariances with all samples and drift functions (B, n + k) at points (B, d + p)."""
     near = covariances(hyper, points, samples)

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from service.motion import skeleton
+from service.motion import blend, skeleton
 from service.motion.conventions import Floats
 
 Quantity = Literal[
@@ -92,7 +92,8 @@ def value(measure: Measure, seen: Seen) -> float:
             return float(np.abs(_stride_out(measure, seen.positions)).max())
         case _:
             at = moment(measure, seen.positions, seen.landmark)
-            return float(_at(_middle(measure, seen.positions), at)[AXES[measure.quantity]])
+            place = blend.between(_middle(measure, seen.positions), np.array(at))
+            return float(place[AXES[measure.quantity]])
 
 
 def travelled(quantity: str, travel: Floats, duration: float) -> float:
@@ -132,12 +133,6 @@ def _stride_out(measure: Measure, positions: Floats) -> Floats:
     """How far ahead the first foot is of the second (F,), m."""
     first, second = measure.joints
     return positions[:, first, 2] - positions[:, second, 2]
-
-
-def _at(rows: Floats, place: float) -> Floats:
-    before = min(int(place), len(rows) - 2)
-    share = place - before
-    return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
 def _stature(seen: Seen) -> float:

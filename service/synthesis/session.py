@@ -150,14 +150,7 @@ class Session:
         assert own.kriging is not None
         low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
         points = field.half_ranges(np.array(own.examples), low, high)
-        return Weigher(own.kriging, np.hstack([points, self.who]))
-
-    @cached_property
-    def who(self) -> Floats:
-        """Labels (n, p) of who moved in each captured clip."""
-        own = self.card
-        moved = np.array(own.moved_by or [0] * len(own.examples))
-        return np.eye(max(len(own.performers), 1), len(own.performers))[moved]
+        return Weigher(own.kriging, np.hstack([points, own.labels]))
 
     @property
     def memory(self) -> int:

@@ -59,9 +59,7 @@ class Chooser:
 
     def __init__(self, card: ModelCard) -> None:
         self._controls = card.controls
-        labels = np.eye(len(card.performers))[list(card.moved_by)] if card.moved_by else None
-        points = np.array(card.examples)
-        self._samples = points if labels is None else np.hstack([points, labels])
+        self._samples = np.hstack([np.array(card.examples), card.labels])
         self._typical = fit(self._samples)
 
     def fill_seen(

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.motion import measure
+from service.motion import measure, travelling
 from service.motion.answer import Met
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.measure import Seen
 from service.synthesis import freeze
 from service.synthesis.exact import aims as looking
-from service.synthesis.exact import feet, meet, reduced, spread, travelling
+from service.synthesis.exact import feet, meet, reduced, spread
 from service.synthesis.exact.aims import Aim, Place
 from service.synthesis.exact.reduced import Reduced
 from service.synthesis.exact.scene import Scene

@@ -131,7 +131,7 @@ class Keeper:
         session, bench = self._session, self._bench(0)
         goal = Goal("", moment, (0.0, 0.0, 0.0), time)
         found = []
-        for sample, labels in zip(session.card.examples, session.who, strict=True):
+        for sample, labels in zip(session.card.examples, session.card.labels, strict=True):
             point = np.array([sample])
             begun = bench.begun(session.state(point, np.array([time or 0.0]), labels[None]))
             aim = self._aim(goal, begun, begun.state.frames[0])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.motion import quat
+from service.motion import blend, quat
 from service.motion.conventions import Floats
 from service.motion.detail import Level
 
@@ -48,9 +48,7 @@ class Reduced:
 
     def rows(self, places: Floats) -> Floats:
         """Time coefficients (S, r2) at canonical frames (S,)."""
-        before = np.minimum(places.astype(np.int64), self.frames - 2)
-        share = (places - before)[:, None]
-        return (1.0 - share) * self.time[before] + share * self.time[before + 1]
+        return blend.between(self.time, places)
 
     def poses(self, motion: Floats, places: Floats) -> tuple[Floats, Floats]:
         """Rotations (S, J, 4) and root positions (S, 3) of a reduced motion (r2, r1)."""

@@ -111,7 +111,6 @@ def groups(card: ModelCard, samples: Floats) -> Indices:
     files = [source.partition(", frames ")[0] for source in card.sources]
     takes = np.unique(files, return_inverse=True)[1]
     functions = field.drift(samples, len(card.controls), max(hyper.drifts))
-    for take in np.unique(takes):
-        if np.linalg.matrix_rank(functions[takes != take]) < functions.shape[1]:
-            return np.arange(len(samples))
+    if field.needed(takes, functions) is not None:
+        return np.arange(len(samples))
     return np.asarray(takes, dtype=np.int64)

@@ -7,9 +7,9 @@ from service.motion.conventions import UP, Floats
 
 
 def put_back(rotations: Floats, roots: Floats, gone: Floats) -> tuple[Floats, Floats]:
-    """Rotations (S, J, 4) and root positions (S, 3), m, that have gone (S, 3): to the left and
-    ahead, m, and turned, rad."""
-    moved = roots + gone[:, :2] @ np.eye(3)[[0, 2]]
+    """Rotations (..., J, 4) and root positions (..., 3), m, that have gone (..., 3): to the left
+    and ahead, m, and turned, rad."""
+    moved = roots + gone[..., :2] @ np.eye(3)[[0, 2]]
     turned = rotations.copy()
-    turned[:, 0] = quat.mul(quat.about(UP, gone[:, 2]), rotations[:, 0])
+    turned[..., 0, :] = quat.mul(quat.about(UP, gone[..., 2]), rotations[..., 0, :])
     return turned, moved
