@@ -27,7 +27,7 @@ export function clip(
   return source.clip(model, question, signal);
 }
 
-/** Beyond this share of the last clip known, the next may well have ended: it is asked as a whole. */
+/** Beyond this share of a clip the next one may well have ended: it is asked as a whole. */
 const LATE = 0.9;
 
 /** The pose at that time, or the last one where the clip has become shorter than that.
@@ -43,7 +43,8 @@ export async function pose(
   signal: AbortSignal,
 ): Promise<Poses> {
   const whole = async () => at(await clip(source, card, state, signal), time);
-  if (time > LATE * duration) return whole();
+  // A refusal would be mended too, but browsers write each into their console.
+  if (time > LATE * Math.min(duration, card.durations[0]!)) return whole();
   try {
     return state.root === card.root
       ? await travelling(source, state, time, signal)

@@ -228,6 +228,16 @@ test("a control with few sampled values snaps to them", () =>
     assert.notEqual(await typed(page, "hip_height").inputValue(), "0.900");
   }));
 
+test("a clip that has become shorter than the time shown is asked for as one that has", () =>
+  on(
+    "/#reaching?stature=1.75&hip_height=0.7&turn=50&target_height=1.7&~playing=no&~time=1.4",
+    async (page) => {
+      await typed(page, "target_height").fill("0.75");
+      await typed(page, "target_height").press("Enter");
+      await until(async () => (await time(page)) < 1.2, "the transport goes to the clip's end");
+    },
+  ));
+
 test("a captured clip near by is named, and a click goes there", () =>
   on(REACH, async (page) => {
     const before = await sigma(page);
