@@ -21,12 +21,12 @@ from service.export import chunks
 from service.export.chunks import Stop, Stopped, Task
 from service.export.job import Work
 from service.export.ledger import Part
+from service.motion.cores import ALONE
 from service.motion.errors import MotionError, WorkerDied
 
 PATIENCE = 0.1
 """Seconds until one who waits looks whether to stop."""
 LOST = "a process of the export has died; what is done stays, and the same command goes on"
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ def _for_children() -> Iterator[None]:
     """
     # Else begun with the first child, and then it lets Ctrl-C through again.
     resource_tracker.ensure_running()
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    before = {name: os.environ.get(name) for name in ALONE}
+    os.environ.update(ALONE)
     heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -20,6 +20,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from service.motion.cores import ALONE
 from service.motion.errors import WorkerDied
 from service.web import draining, listening
 from service.web.settings import Settings
@@ -156,7 +157,8 @@ class Keeper:
         worker.process = subprocess.Popen(
             words,
             stdin=subprocess.DEVNULL,
-            env={**os.environ, **self.hooks.environ(worker.number)},
+            # What the operator says of threads counts more than what is usual.
+            env={**ALONE, **os.environ, **self.hooks.environ(worker.number)},
             pass_fds=descriptors,
             # Ctrl-C reaches them through this process alone.
             process_group=0,

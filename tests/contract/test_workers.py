@@ -139,12 +139,15 @@ def test_they_end_when_whoever_keeps_them_is_killed(models):
 
 def test_each_has_an_environment_of_its_own_and_its_end_is_told(models):
     command = [sys.executable, "-c", HOOKED, str(models)]
-    with started(command, POSEFIELD_WORKERS="2") as child:
+    with started(command, POSEFIELD_WORKERS="2", OMP_NUM_THREADS="3") as child:
         address(child)
         first, second = children(child.pid)
         environs = [Path(f"/proc/{pid}/environ").read_bytes() for pid in (first, second)]
         for number, environ in enumerate(environs):
             assert f"OF_ITS_OWN=number {number}".encode() in environ.split(b"\0")
+            # Other workers have the other cores, and who wants it otherwise may say so.
+            assert b"OPENBLAS_NUM_THREADS=1" in environ.split(b"\0")
+            assert b"OMP_NUM_THREADS=3" in environ.split(b"\0")
         os.kill(first, signal.SIGKILL)
         assert child.stdout.readline().decode() == f"gone {first}\n"
         assert within(20, lambda: len(children(child.pid)) == 2)
