@@ -45,6 +45,7 @@ def adapt(
     """Add a performer to a model by a few clips, without the data that it was trained from."""
     from model_export import adapted_file, new_clips, reopen
     from model_export.adapted_file import Newcomer
+    from model_export.recipe import Source
 
     outputs.expect_onnx(output)
     if bool(clips) == bool(table):
@@ -57,7 +58,7 @@ def adapt(
     progress(f"reading {model}")
     known = reopen.load(model)
     adapted_file.refuse_name(known.card, performer)
-    source = new_clips.Source(unit, up, root_offset)
+    source = Source(metres_per_unit=unit, up=up, root_offset=root_offset)
     progress("reading clips")
     if table:
         examples, notes = new_clips.of_table(known, table, source, performer)
