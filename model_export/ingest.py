@@ -9,7 +9,7 @@ import numpy as np
 
 from model_export import flips, measured, table
 from model_export.flips import Finding
-from model_export.recipe import Recipe
+from model_export.recipe import Recipe, Source
 from model_export.table import Row
 from service.motion import bvh, quat
 from service.motion.clip import Clip
@@ -74,14 +74,7 @@ def offset_notes(file: bvh.BvhFile, row: Row) -> list[str]:
 
 
 def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> Example:
-    source = recipe.source
-    whole = bvh.to_clip(
-        file,
-        metres_per_unit=source.metres_per_unit,
-        up=source.up,
-        root_offset=source.root_offset or "replace",
-    )
-    own, last = cut(whole, row)
+    own, last = cut(whole(file, recipe.source), row)
     clip = _without(own, recipe, row)
     in_place = recipe.motion.root == "in_place"
     clip, jumps, said = canonical(clip, row, recipe.motion.cyclic, in_place)
@@ -90,19 +83,29 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
     return Example(row, clip, measured.controls(recipe, row, clip, marks), marks, jumps)
 
 
-def cut(whole: Clip, row: Row) -> tuple[Clip, int]:
+def whole(file: bvh.BvhFile, source: Source) -> Clip:
+    """Clip of all frames of a file; a root's OFFSET of which nothing is said is replaced."""
+    return bvh.to_clip(
+        file,
+        metres_per_unit=source.metres_per_unit,
+        up=source.up,
+        root_offset=source.root_offset or "replace",
+    )
+
+
+def cut(clip: Clip, row: Row) -> tuple[Clip, int]:
     """Frames of a file that a row names, and the last of them.
 
     Raises RecipeError for a frame that the file does not have, and a single one.
     """
-    last = len(whole) - 1 if row.last_frame is None else row.last_frame
-    if last >= len(whole):
-        raise row.fault(f"frame {last}, but {row.place} has frames 0 to {len(whole) - 1}")
+    last = len(clip) - 1 if row.last_frame is None else row.last_frame
+    if last >= len(clip):
+        raise row.fault(f"frame {last}, but {row.place} has frames 0 to {len(clip) - 1}")
     if last <= row.first_frame:
         raise row.fault(f"{row.place} has frames 0 to {last}, expected two or more")
     kept = slice(row.first_frame, last + 1)
-    rotations, translations = whole.rotations[kept], whole.translations[kept]
-    return replace(whole, rotations=rotations, translations=translations), last
+    rotations, translations = clip.rotations[kept], clip.translations[kept]
+    return replace(clip, rotations=rotations, translations=translations), last
 
 
 def canonical(

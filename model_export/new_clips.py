@@ -5,14 +5,14 @@ from; all others stand in a table.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from model_export import data, ingest, measured, table
 from model_export.ingest import Example
+from model_export.recipe import Source
 from model_export.reopen import Reopened
 from model_export.table import Row, Table
 from service.motion import bvh, measure
@@ -21,15 +21,6 @@ from service.motion.clip import Clip
 from service.motion.conventions import Floats
 from service.motion.errors import RecipeError
 from service.motion.skeleton import Skeleton
-
-
-@dataclass(frozen=True)
-class Source:
-    """What the motion files leave unsaid, as in a recipe."""
-
-    metres_per_unit: float
-    up: Literal["y", "z"]
-    root_offset: Literal["replace", "add"] | None = None
 
 
 def of_files(
@@ -117,13 +108,7 @@ def _example(
     reopened: Reopened, row: Row, source: Source, file: bvh.BvhFile
 ) -> tuple[Example, list[str]]:
     own = reopened.card
-    whole = bvh.to_clip(
-        file,
-        metres_per_unit=source.metres_per_unit,
-        up=source.up,
-        root_offset=source.root_offset or "replace",
-    )
-    cut, last = ingest.cut(whole, row)
+    cut, last = ingest.cut(ingest.whole(file, source), row)
     clip, notes = _of_skeleton(cut, own.skeleton, row)
     if source.root_offset is None:
         notes += ingest.offset_notes(file, row)

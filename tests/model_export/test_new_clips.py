@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from model_export import export, ingest, new_clips, reopen, train
+from model_export.recipe import Source
 from service.motion import bvh
 from service.motion.errors import RecipeError
 from service.motion.measure import Measure
 
-METRES = new_clips.Source(1.0, "y")
+METRES = Source(metres_per_unit=1.0, up="y")
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,8 @@ def test_frames_and_units_are_followed(reopened, table):
     table.write_text("file,speed,first_frame,last_frame\n0.bvh,2,3,20\n")
     (cut,), _ = new_clips.of_table(reopened, table, METRES, "cy")
     assert len(cut.clip) == 18 and cut.row.source == "0.bvh, frames 3 to 20"
-    (small,), _ = new_clips.of_table(reopened, table, new_clips.Source(0.01, "y"), "cy")
+    centimetres = Source(metres_per_unit=0.01, up="y")
+    (small,), _ = new_clips.of_table(reopened, table, centimetres, "cy")
     assert small.offsets == pytest.approx(0.01 * cut.offsets)
 
 
@@ -164,7 +166,7 @@ def test_a_root_offset_that_nobody_explained_is_noted(reopened, table):
     path.write_text(text)
     _, notes = new_clips.of_table(reopened, table, METRES, "cy")
     assert len(notes) == 1 and "taken to replace it" in notes[0]
-    said = replace(METRES, root_offset="add")
+    said = Source(metres_per_unit=1.0, up="y", root_offset="add")
     moved, notes = new_clips.of_table(reopened, table, said, "cy")
     assert notes == []
     plain, _ = new_clips.of_table(reopened, table, METRES, "cy")

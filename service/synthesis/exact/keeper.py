@@ -19,7 +19,7 @@ from service.synthesis.exact.aims import Aim, Place
 from service.synthesis.exact.goals import NOTHING, Goal, Goals
 from service.synthesis.exact.holding import Bench, Held
 from service.synthesis.question import HOLD, Hold
-from service.synthesis.session import Session
+from service.synthesis.session import Session, State
 from service.synthesis.typical import Chooser
 
 # Somebody who plays a clip pose by pose, or looks at a few.
@@ -128,15 +128,25 @@ class Keeper:
 
     def _places(self, moment: Measure, time: float | None) -> Floats:
         """Where the model puts a joint (n, 3), m, at a moment of each captured clip."""
-        session, bench = self._session, self._bench(0)
         goal = Goal("", moment, (0.0, 0.0, 0.0), time)
         found = []
-        for sample, labels in zip(session.card.examples, session.card.labels, strict=True):
-            point = np.array([sample])
-            begun = bench.begun(session.state(point, np.array([time or 0.0]), labels[None]))
-            aim = self._aim(goal, begun, begun.state.frames[0])
-            found.append(aim.look(begun.scene, begun.numbers)[0])
+        for state in self._captured if time is None else self._predicted(time):
+            begun = self._bench(0).begun(state)
+            aim, motion = self._aim(goal, begun, state.frames[0]), begun.scene.motion(begun.numbers)
+            # Its value alone: nobody asks here how that changes.
+            found.append(aim.among(begun.scene, begun.numbers, motion[None])[0])
         return np.array(found)
+
+    @cached_property
+    def _captured(self) -> list[State]:
+        """What the model predicts of each captured clip, whichever moment is looked at."""
+        return self._predicted(0.0)
+
+    def _predicted(self, time: float) -> list[State]:
+        """What the model predicts of each captured clip, and at which frame it is at a time, s."""
+        card, when = self._session.card, np.array([time])
+        pairs = zip(card.examples, card.labels, strict=True)
+        return [self._session.state(np.array([own]), when, labels[None]) for own, labels in pairs]
 
     def _bench(self, level: int) -> Bench:
         if level not in self._benches:

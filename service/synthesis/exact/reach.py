@@ -29,12 +29,12 @@ FAR = 3.7
 class Reach:
     """The way (k,) from a motion to its aims, and how values like these stray.
 
-    covariance (k, k). whose (k,): the aim of each value.
+    covariance (k, k). members (k, aims): which values are of which aim, ones and zeros.
     """
 
     left: Floats
     covariance: Floats
-    whose: tuple[int, ...]
+    members: Floats
 
     @cached_property
     def distance(self) -> float:
@@ -45,7 +45,7 @@ class Reach:
     def worth(self) -> Floats:
         """Weight (k,) of each value in what is to become less: one over the mean variance of its
         aim, so that metres and degrees compare."""
-        return 1.0 / (self._members @ _means(self._members, np.diagonal(self.covariance)))
+        return 1.0 / (self.members @ _means(self.members, np.diagonal(self.covariance)))
 
     @property
     def way(self) -> Floats:
@@ -54,7 +54,7 @@ class Reach:
         limit = far(len(self.left))
         if self.distance <= limit:
             return self.left
-        each = self._members * self.left[:, None]
+        each = self.members * self.left[:, None]
         apart = each.T @ np.linalg.solve(self.covariance, each)
         misses = np.diag(each.T**2 @ self.worth)
         low, high = 0.0, 1.0
@@ -65,11 +65,6 @@ class Reach:
             outside = _length(apart, _shares(apart, misses, middle)) > limit
             low, high = (middle, high) if outside else (low, middle)
         return np.asarray(each @ _shares(apart, misses, high), np.float64)
-
-    @cached_property
-    def _members(self) -> Floats:
-        """Which values are of which aim (k, aims): ones and zeros."""
-        return np.eye(1 + max(self.whose))[list(self.whose)]
 
 
 def of(
@@ -84,10 +79,10 @@ def of(
 
     looked: what was seen of it, of the aims first.
     """
-    whose = tuple(place for place, aim in enumerate(aims) for _ in aim.goal)
-    values, gradients = (seen[: len(whose)] for seen in looked)
-    covariance = sigma**2 * _evened(_strays(scene, spread, numbers, aims, gradients), whose)
-    return Reach(np.concatenate([aim.goal for aim in aims]) - values, covariance, whose)
+    members = np.repeat(np.eye(len(aims)), [len(aim.goal) for aim in aims], axis=0)
+    values, gradients = (seen[: len(members)] for seen in looked)
+    covariance = sigma**2 * _evened(_strays(scene, spread, numbers, aims, gradients), members)
+    return Reach(np.concatenate([aim.goal for aim in aims]) - values, covariance, members)
 
 
 def far(values: int) -> float:
@@ -112,13 +107,13 @@ def _strays(
     return np.asarray(strays.T @ strays + beside @ spread.beside @ beside.T, np.float64)
 
 
-def _evened(covariance: Floats, whose: tuple[int, ...]) -> Floats:
+def _evened(covariance: Floats, members: Floats) -> Floats:
     """Covariance with an even share for all values of an aim, which goes along with that of other
     aims as the whole of it does: else two that contradict each other would seem near."""
-    members = np.eye(1 + max(whose))[list(whose)]
-    sizes = members.sum(axis=0).astype(np.int64)
+    sizes = members.sum(axis=0)
     place = np.concatenate([np.arange(size) for size in sizes])
-    alike = (place[:, None] == place) & (sizes[list(whose), None] == sizes[list(whose)])
+    beside = members @ sizes
+    alike = (place[:, None] == place) & (beside[:, None] == beside)
     shared = members.T @ (alike * covariance) @ members / sizes
     # What never moves has no variance at all.
     own = np.diag(np.maximum(np.diagonal(shared), 1e-12))

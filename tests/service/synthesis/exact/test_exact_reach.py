@@ -52,10 +52,10 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
 
 
 def test_all_of_the_way_is_gone_within_the_limit():
-    near = Reach(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), (0, 0, 0))
+    near = Reach(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
     assert near.distance < reach.far(3)
     assert np.array_equal(near.way, near.left)
-    far = Reach(10.0 * near.left, near.covariance, near.whose)
+    far = Reach(10.0 * near.left, near.covariance, near.members)
     assert np.allclose(far.way, reach.far(3) / far.distance * far.left, rtol=1e-6, atol=0)
     assert not np.array_equal(far.way, far.left)
 
@@ -63,7 +63,7 @@ def test_all_of_the_way_is_gone_within_the_limit():
 def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
     left = np.array([0.01, 0.0, 0.02, 3.0, 2.0, 1.0])
     own = 0.02 * rng.standard_normal((6, 6))
-    found = Reach(left, own @ own.T + 1e-3 * np.eye(6), (0, 0, 0, 1, 1, 1))
+    found = Reach(left, own @ own.T + 1e-3 * np.eye(6), np.repeat(np.eye(2), 3, axis=0))
     shares = found.way / np.where(left == 0.0, 1.0, left)
     length = np.sqrt(found.way @ np.linalg.solve(found.covariance, found.way))
     assert length <= reach.far(6) * (1.0 + 1e-6)
@@ -74,8 +74,8 @@ def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
 
 def test_the_worth_of_values_does_not_hang_on_their_units():
     """Metres and degrees: what is missed counts in its own scatter."""
-    mixed = Reach(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), (0, 1))
+    mixed = Reach(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), np.eye(2))
     counted = mixed.worth * np.square(mixed.left)
     assert counted[0] == pytest.approx(counted[1])
-    alike = Reach(mixed.left, mixed.covariance, (0, 0))
+    alike = Reach(mixed.left, mixed.covariance, np.ones((2, 1)))
     assert alike.worth[0] == alike.worth[1]

@@ -1,0 +1,55 @@
+"""The model files and reports that commands write: how they are named, and what is told of them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.cli.answers import as_json
+from service.motion.errors import InvalidField
+
+if TYPE_CHECKING:
+    from model_export.export import Exported
+
+
+def expect_onnx(output: Path) -> None:
+    """InvalidField for a model file of another ending."""
+    if output.suffix != ".onnx":
+        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
+
+
+def expect_html(report: Path | None) -> None:
+    """InvalidField for a report of another ending."""
+    if report and report.suffix != ".html":
+        raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
+
+
+def wrote(exported: "Exported", output: Path, json: bool) -> str:
+    """What to tell of a model that was written."""
+    return as_json(facts(exported, output)) if json else summary(exported, output)
+
+
+def facts(exported: "Exported", output: Path) -> dict[str, Any]:
+    """What a model that was written is, as plain values."""
+    card = exported.card
+    return {
+        "file": str(output),
+        "bytes": len(exported.content),
+        "clips": card.samples,
+        "ranks": list(card.levels[0].ranks),
+        **card.diagnostics,
+    }
+
+
+def summary(exported: "Exported", output: Path) -> str:
+    """A model that was written in words."""
+    found = facts(exported, output)
+    notes = [f"note: {note}" for note in found["notes"]]
+    return "\n".join(
+        [
+            *notes,
+            f"{output}: {found['bytes'] / 1000:.1f} kB from {found['clips']} clips, "
+            f"ranks {found['ranks']} of {found['tensor']}",
+            f"truncation costs {100 * found['truncation_rms_m']:.2f} cm, a clip left out lies "
+            f"{100 * found['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+            f"onnxruntime differs from the reference by at most {100 * found['parity_m']:.5f} cm",
+        ]
+    )

@@ -1,0 +1,40 @@
+"""`posefield sample`: motions that a formula makes."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.cli.answers import as_json, wrote
+from service.cli.arguments import Controls, Json, encoder, numbers
+from service.motion import files
+from service.motion.answer import ClipAnswer, Trust
+from service.motion.errors import InvalidField
+
+
+def sample(
+    family: Annotated[str, typer.Argument(help="reaching")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder, or with --truth a file")],
+    truth: Annotated[bool, typer.Option(help="write the noise-free motion of --control")] = False,
+    control: Controls = None,
+    fps: Annotated[float, typer.Option(help="frames a second, with --truth")] = 120.0,
+    json: Json = False,
+) -> None:
+    """Write a procedural family of motions, or the truth behind it at any control point."""
+    from model_export.sample import truth as truths
+    from model_export.sample import write
+
+    if family != "reaching":
+        raise InvalidField("family", f"{family!r}, expected reaching")
+    if not truth:
+        path = write.family(output)
+        typer.echo(
+            as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
+        )
+        return
+    encode = encoder(output).encode
+    controls = numbers(control or [])
+    clip = truths.clip(controls, fps)
+    answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
+    files.write(encode(answer), output)
+    typer.echo(wrote(output, answer, json))

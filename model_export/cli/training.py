@@ -1,0 +1,107 @@
+"""`posefield train`: a recipe to a model, or several."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from model_export.cli import outputs, places
+from model_export.cli.places import Place, Scheduler
+from model_export.cli.progress import Progress
+from service.cli.answers import as_json
+from service.cli.arguments import Json
+from service.motion import files
+from service.motion.errors import InvalidField, TrainingError
+
+if TYPE_CHECKING:
+    from model_export.export import Exported
+    from model_export.recipe import Recipe
+    from model_export.train import Trained
+
+
+def train_command(
+    recipe_files: Annotated[list[Path], typer.Argument(help="TOML files", metavar="RECIPE...")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="the .onnx file to write; of several recipes a folder"),
+    ],
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="the .html file to write on the training, with a .json beside it"),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(help="of several recipes: processes")] = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+) -> None:
+    """Train a recipe's model and write it as one .onnx file; several recipes at once."""
+    outputs.expect_html(report)
+    if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):
+        _train(recipe_files[0], data, output, report, json)
+    elif report:
+        raise InvalidField("report", "of several recipes or on a cluster, expected none")
+    else:
+        _sweep(recipe_files, data, output, Place(jobs, scheduler), json)
+
+
+def _train(
+    recipe_file: Path, data: Path | None, output: Path, report: Path | None, json: bool
+) -> None:
+    # SciPy and onnx take a second to import, which every other command would wait for.
+    from model_export import export, ingest, recipe, train
+
+    outputs.expect_onnx(output)
+    progress = Progress()
+    progress(f"reading {recipe_file}")
+    own = recipe.read(recipe_file)
+    examples, notes = ingest.ingest(own, data or recipe_file.parent)
+    trained = train.train(own, examples, progress)
+    progress("writing the graph and comparing it with the reference")
+    exported = export.export(own, trained, notes)
+    files.write(exported.content, output)
+    if report:
+        _write_report(own, trained, exported, progress, report)
+    progress("done")
+    typer.echo(outputs.wrote(exported, output, json))
+
+
+def _write_report(
+    recipe: "Recipe", trained: "Trained", exported: "Exported", progress: Progress, path: Path
+) -> None:
+    # Nobody who wants no pictures waits for matplotlib, or needs it.
+    from model_export.report import detail, render
+    from model_export.report.about import Step
+
+    progress("measuring levels of detail")
+    ladder = detail.of(recipe, trained, exported)
+    progress("drawing the report")
+    steps = [Step(name, seconds) for name, seconds in progress.finished]
+    rendered = render.render(trained, exported, ladder, steps)
+    files.write(rendered.html, path)
+    files.write(rendered.json, path.with_suffix(".json"))
+
+
+def _sweep(
+    recipe_files: list[Path], data: Path | None, folder: Path, place: Place, json: bool
+) -> None:
+    from model_export import sweep
+
+    if folder.suffix == ".onnx":
+        raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
+    found, failed = [], []
+    with places.jobs(place.scheduler):
+        for made in sweep.models(recipe_files, data, place.jobs):
+            if isinstance(made.found, TrainingError):
+                failed.append(made.name)
+                typer.echo(f"{made.name}: {made.found}", err=True)
+                continue
+            path = folder / f"{made.name}.onnx"
+            files.write(made.found.content, path)
+            found.append(outputs.facts(made.found, path))
+            typer.echo(outputs.summary(made.found, path), err=json)
+    if json:
+        typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
+    if failed:
+        raise TrainingError(f"{', '.join(sorted(failed))} of {len(recipe_files)} made no model")

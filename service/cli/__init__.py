@@ -1,0 +1,79 @@
+"""The `posefield` command: what ships with the service; the training job adds its own commands.
+
+Exit codes: 0 done; 1 `check` found defects; 2 a question or an argument that cannot be answered;
+3 a file that cannot be used; 4 samples from which no model can be made; 5 a process of an export
+that died; 128 and a signal's number where that ended an export.
+"""
+
+import sys
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from typing import Annotated
+
+import typer
+
+from service import __version__, exports, page
+from service.cli import about, captured, checks, crowd, motions, serving
+from service.motion.errors import FileError, MotionError, TrainingError, WorkerDied
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+INTERRUPTED = 130
+"""What a shell expects of a command that was told to stop."""
+
+# Whose extra a missing module is; everything else that can be missing is training's.
+EXTRAS = {
+    **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate"),
+    "distributed": "dask",
+    "obstore": "store",
+    **dict.fromkeys(("jwt", "cryptography"), "jwt"),
+}
+
+
+def main() -> None:
+    """Run the command line; faults that have a name end as one line and an exit code."""
+    for plugin in entry_points(group="posefield.commands"):
+        # The image holds the service alone.
+        if find_spec(plugin.module.partition(".")[0]):
+            plugin.load()(app)
+    try:
+        app()
+    except ModuleNotFoundError as fault:
+        extra = EXTRAS.get(fault.name or "", "train")
+        typer.echo(f"posefield: needs {fault.name}: install posefield[{extra}]", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    except MotionError as fault:
+        typer.echo(f"posefield: {fault}", err=True)
+        sys.exit(_code(fault))
+
+
+def _code(fault: MotionError) -> int:
+    if isinstance(fault, FileError):
+        return 3
+    if isinstance(fault, TrainingError):
+        return 4
+    return 5 if isinstance(fault, WorkerDied) else 2
+
+
+@app.callback(invoke_without_command=True)
+def _version(
+    version: Annotated[bool, typer.Option("--version", help="say the version")] = False,
+) -> None:
+    if version:
+        typer.echo(f"posefield {__version__}")
+        raise typer.Exit
+
+
+app.command()(about.inspect)
+app.command()(motions.pose)
+app.command()(motions.clip)
+app.command()(crowd.crowd)
+app.command()(captured.why)
+app.command()(captured.suggest)
+app.command()(exports.export)
+app.command()(page.page)
+app.command()(serving.serve)
+app.command()(serving.key)
+app.command()(checks.check)

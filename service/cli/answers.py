@@ -1,0 +1,36 @@
+"""What commands tell: answers as JSON, and in words."""
+
+from pathlib import Path
+from typing import Any
+
+import orjson
+import typer
+
+from service.motion.answer import ClipAnswer, Reasons, Trust
+
+
+def as_json(value: Any) -> str:
+    """Plain values as JSON to read."""
+    return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
+
+
+def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
+    """What to tell of a clip that was written."""
+    frames = len(answer.clip)
+    if json:
+        return as_json(
+            {"file": str(path), "frames": frames, "rate": answer.clip.rate, **answer.trust.facts()}
+        )
+    return (
+        f"{path}: {frames} frames at {answer.clip.rate:g} a second, {answer.trust.duration:.2f} s, "
+        f"give or take {100 * answer.trust.sigma:.1f} cm"
+    )
+
+
+def tell(found: Trust | Reasons) -> None:
+    """Say on standard error what was chosen for whoever asked, and what to beware of."""
+    if found.inferred:
+        chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)
+        typer.echo(f"inferred: {chosen}, most typical for what was given", err=True)
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}", err=True)

@@ -1,0 +1,27 @@
+"""`posefield check`: what is wrong with a USD character."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.cli.answers import as_json
+from service.cli.arguments import Json
+
+
+def check(
+    file: Annotated[Path, typer.Argument(help="a usda, usdc, usd or usdz file")],
+    json: Json = False,
+) -> None:
+    """Find what makes a USD character fail in some reader though validators pass it."""
+    from service.check import check as find
+
+    findings = find(file)
+    if json:
+        typer.echo(as_json([vars(finding) for finding in findings]))
+    else:
+        for finding in findings:
+            typer.echo(f"{finding.severity}: {finding.prim}: {finding.message} [{finding.code}]")
+        typer.echo(f"{file}: {len(findings)} findings")
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(1)

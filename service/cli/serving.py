@@ -1,0 +1,44 @@
+"""`posefield serve` and `posefield key`: the service, and keys to it."""
+
+from typing import Annotated
+
+import typer
+
+from service.cli.answers import as_json
+from service.cli.arguments import Json
+
+
+def serve(
+    places: Annotated[
+        list[str],
+        typer.Argument(help="model files, folders of them, or URLs of object stores"),
+    ],
+    host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
+    port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
+) -> None:
+    """Answer over HTTP for the models given, until interrupted."""
+    from service.web import server, settings
+
+    server.serve(places, settings.read(host=host, port=port))
+
+
+def key(
+    name: Annotated[str, typer.Argument(help="whose key it is, as the log will name it")],
+    model: Annotated[
+        list[str] | None, typer.Option(help="a model that it may read; all if none is named")
+    ] = None,
+    metrics: Annotated[bool, typer.Option("--metrics", help="let it read /metrics too")] = False,
+    json: Json = False,
+) -> None:
+    """Make an API key: the line for POSEFIELD_KEYS_FILE on standard output, and, once, the key
+    itself on standard error."""
+    from service.web.access import keys
+
+    scopes = [f"read:{one}" for one in model or ["*"]] + ["metrics"] * metrics
+    secret = keys.make()
+    line = keys.line(name, scopes, secret)
+    if json:
+        typer.echo(as_json({"key": secret, "line": line}))
+        return
+    typer.echo(line)
+    typer.echo(f"the key of {name}, which is kept nowhere: {secret}", err=True)
