@@ -7,7 +7,6 @@ that died; 128 and a signal's number where that ended an export.
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +17,7 @@ import orjson
 import typer
 
 from service import __version__, exports, page
-from service.encode import ENCODERS, Encoder, poses, reasons, suggestions
+from service.encode import ENCODERS, POSE_ENCODERS, Encoder, reasons, suggestions
 from service.encode.convention import Unit, Up
 from service.export import queries
 from service.motion import card as cards
@@ -34,8 +33,8 @@ from service.motion.errors import (
     WorkerDied,
 )
 from service.motion.roles import Names
-from service.synthesis import library, pace, session, spelling
-from service.synthesis.question import ClipQuestion, Policy, Root
+from service.synthesis import clips, library, pace, poses, session, spelling
+from service.synthesis.question import ClipQuestion, Policy, PoseQuestion, Root
 from service.synthesis.suggest import COUNT, SuggestQuestion
 from service.synthesis.suggest import suggest as find_suggestions
 from service.synthesis.synthesizer import Synthesizer
@@ -168,12 +167,12 @@ def pose(
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
-    asked, times = numbers(control or []), time or [0.0]
+    controls, times = numbers(control or []), time or [0.0]
     held = spelling.hold(exact, target or (), pin_feet)
-    answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
+    asked = PoseQuestion(controls, times, extrapolate, performer, level, joint_sigma, held)
+    answer = poses.pose(synthesizer, asked)
     _tell(answer.trust)
-    trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
-    typer.echo(poses.json(replace(answer, trust=trust)).decode())
+    typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
 
 
 @app.command()
@@ -209,7 +208,7 @@ def clip(
         joint_sigma=joint_sigma,
         hold=held,
     )
-    answer = synthesizer.clip(asked)
+    answer = clips.clip(synthesizer, asked)
     files.write(found.encode(answer, convention), output)
     _tell(answer.trust)
     typer.echo(wrote(output, answer, json))
