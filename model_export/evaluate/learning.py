@@ -1,12 +1,14 @@
 """What suggested clips are worth: the procedural family from 40 samples to 92.
 
 Samples are added as they are suggested, by controls that the body can do, or as chance has it, each
-with the noise of the family; what is trained from them is compared with the truth.
+with the noise of the family; what is trained from them is compared with the truth. One such trial
+says little, for each way takes its turn in being lucky: it is the mean of several that counts.
 """
 
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -26,17 +28,30 @@ from service.motion.conventions import Floats, Indices
 
 START, END = 40, family.COUNT
 SIZES = (START, 53, 66, 79, END)
-CANDIDATES, ASKED, SEED = 600, 150, 31
+CANDIDATES, ASKED = 600, 150
+SEEDS = (31, 32, 33, 34, 35, 36, 37, 38)
+"""Of the trials: each begins with samples of its own, and has noise and chance of its own."""
 SUGGESTED, CHANCE = "suggested", "at random"
 
 
 @dataclass(frozen=True)
 class Learning:
-    """Mean global and root-relative distance to the truth, m, at so many samples, by how they were
-    added (2, S)."""
+    """Mean global and root-relative distance to the truth, m, at so many samples, of each trial, by
+    how they were added (trials, 2, S)."""
 
     sizes: tuple[int, ...]
-    errors: dict[str, Floats]
+    trials: dict[str, Floats]
+
+    @cached_property
+    def errors(self) -> dict[str, Floats]:
+        """Mean over the trials (2, S)."""
+        return {way: own.mean(axis=0) for way, own in self.trials.items()}
+
+    @cached_property
+    def doubts(self) -> dict[str, Floats]:
+        """Standard error of that mean (2, S)."""
+        shares = {way: own.std(axis=0, ddof=1) for way, own in self.trials.items()}
+        return {way: own / np.sqrt(len(self.trials[way])) for way, own in shares.items()}
 
     @property
     def reached(self) -> float:
@@ -55,19 +70,22 @@ class Learning:
         return (self.sizes[-1] - self.sizes[0]) / (self.reached - self.sizes[0])
 
 
-def measure(report: Report, sizes: Sequence[int] = SIZES) -> Learning:
-    """Learning at some sizes, the smallest first; the same at every call."""
-    trials = _trials()
+def measure(report: Report, sizes: Sequence[int] = SIZES, seeds: Sequence[int] = SEEDS) -> Learning:
+    """Learning at some sizes, the smallest first, in a trial of each seed; the same at every
+    call."""
     # Both ways begin with the same samples, which are trained from once.
-    parts = [(SUGGESTED, size) for size in sizes] + [(CHANCE, size) for size in sizes[1:]]
-    with tempfile.TemporaryDirectory() as scratch:
-        folders = [Path(scratch) / f"{way.split()[-1]}_{size}" for way, size in parts]
-        for (way, size), folder in zip(parts, folders, strict=True):
-            write.some(folder, trials[way][:size])
-        found = dict(zip(parts, _done([delayed(_error)(f) for f in folders], report), strict=True))
-    found[CHANCE, sizes[0]] = found[SUGGESTED, sizes[0]]
-    ways = (SUGGESTED, CHANCE)
-    return Learning(tuple(sizes), {w: np.array([found[w, size] for size in sizes]).T for w in ways})
+    steps = [(SUGGESTED, size) for size in sizes] + [(CHANCE, size) for size in sizes[1:]]
+    parts = [(seed, way, size) for seed in seeds for way, size in steps]
+    trials = {seed: _trial(seed) for seed in seeds}
+    jobs = [delayed(_error)(trials[seed][way][:size]) for seed, way, size in parts]
+    found = dict(zip(parts, _done(jobs, report), strict=True))
+    for seed in seeds:
+        found[seed, CHANCE, sizes[0]] = found[seed, SUGGESTED, sizes[0]]
+    rows = {
+        way: [np.array([found[seed, way, size] for size in sizes]).T for seed in seeds]
+        for way in (SUGGESTED, CHANCE)
+    }
+    return Learning(tuple(sizes), {way: np.stack(own) for way, own in rows.items()})
 
 
 def _done(jobs: Sequence[object], report: Report) -> list[tuple[float, float]]:
@@ -79,9 +97,9 @@ def _done(jobs: Sequence[object], report: Report) -> list[tuple[float, float]]:
     return found
 
 
-def _trials() -> dict[str, list[Sample]]:
+def _trial(seed: int) -> dict[str, list[Sample]]:
     """Samples by how they were added: the same at first, and then 52 of each kind."""
-    rng = np.random.Generator(np.random.PCG64(SEED))
+    rng = np.random.Generator(np.random.PCG64(seed))
     known = list(family.samples())
     first = [known[i] for i in sorted(rng.choice(len(known), START, replace=False).tolist())]
     # Not those at which the truth is asked.
@@ -111,10 +129,12 @@ def _sample(point: list[float], rng: np.random.Generator) -> Sample:
     return Sample("somebody", rounded, family.trial(rounded, rng))
 
 
-def _error(folder: Path) -> tuple[float, float]:
-    """Global and root-relative distance of what a family is trained to, m."""
-    own = recipe.read(folder / "recipe.toml")
-    examples, _ = ingest.ingest(own, folder)
+def _error(samples: Sequence[Sample]) -> tuple[float, float]:
+    """Global and root-relative distance of what is trained from some samples, m."""
+    with tempfile.TemporaryDirectory() as scratch:
+        file = write.some(Path(scratch) / "family", samples)
+        own = recipe.read(file)
+        examples, _ = ingest.ingest(own, file.parent)
     with threads.one():
         trained = train(own, examples, lambda _: None)
         points = truth.points(ASKED)
@@ -129,16 +149,22 @@ def facts(found: Learning) -> dict[str, object]:
     """Figures as JSON holds them."""
     return {
         "samples": list(found.sizes),
+        "trials": len(found.trials[CHANCE]),
         **{
             way.replace(" ", "_"): {
-                "global_cm": [round(100 * e, 3) for e in own[0].tolist()],
-                "relative_cm": [round(100 * e, 3) for e in own[1].tolist()],
+                "global_cm": _centimetres(own[0]),
+                "relative_cm": _centimetres(own[1]),
+                "global_standard_error_cm": _centimetres(found.doubts[way][0]),
             }
             for way, own in found.errors.items()
         },
         "reached": round(found.reached, 1),
         "faster": round(found.faster, 2),
     }
+
+
+def _centimetres(values: Floats) -> list[float]:
+    return [round(100 * value, 3) for value in values.tolist()]
 
 
 def table(found: Learning) -> str:
@@ -150,10 +176,12 @@ def _lines(found: Learning) -> Iterator[str]:
     yield "| samples | " + " | ".join(map(str, found.sizes)) + " |"
     yield "|---" * (1 + len(found.sizes)) + "|"
     for way, own in found.errors.items():
-        for name, row in zip(("global", "relative"), own, strict=True):
-            yield f"| {way}, {name} | " + " | ".join(f"{100 * e:.2f}" for e in row) + " |"
+        for name, row, off in zip(("global", "relative"), own, found.doubts[way], strict=True):
+            cells = (f"{100 * e:.2f} ± {100 * o:.2f}" for e, o in zip(row, off, strict=True))
+            yield f"| {way}, {name} | " + " | ".join(cells) + " |"
     yield ""
     yield (
-        f"Centimetres from the truth. Suggested samples are at {found.reached:.0f} where random "
+        f"Centimetres from the truth, mean of {len(found.trials[CHANCE])} trials and its standard "
+        f"error. Suggested samples are at {found.reached:.0f} where random "
         f"ones are at {found.sizes[-1]}: {found.faster:.1f} times as fast."
     )

@@ -211,7 +211,8 @@ def _learning(curve: Learning) -> Section:
         3.2,
         partial(_paint_learning, curve),
         "Distance to the truth against the number of samples, suggested and at random.",
-        "Each point is a model trained anew; both ways begin with the same samples.",
+        "Each point is the mean of models trained anew in several trials, and its standard error; "
+        "both ways begin with the same samples.",
     )
     words = (
         f"From {curve.sizes[0]} samples to {curve.sizes[-1]}, added as `posefield suggest` ranks "
@@ -227,7 +228,8 @@ def _paint_learning(curve: Learning, figure: Figure) -> None:
         for (way, own), colour in zip(
             curve.errors.items(), (picture.ORANGE, picture.BLUE), strict=True
         ):
-            ax.plot(curve.sizes, 100 * own[row], "o-", color=colour, label=way)
+            off = 100 * curve.doubts[way][row]
+            ax.errorbar(curve.sizes, 100 * own[row], off, fmt="o-", color=colour, label=way)
         ax.set(xlabel="samples", ylabel="cm", title=title, ylim=(0, None))
     axes[0].legend()
 

@@ -14,12 +14,13 @@ from service.motion.answer import SigmaGrid
 
 
 def table(grid: SigmaGrid) -> Table:
-    """The values of both axes, and sigma and inside (rows, columns)."""
+    """The values of both axes, and sigma, inside and supported (rows, columns)."""
     arrays = {
         "across_values": grid.across.values,
         "along_values": grid.along.values,
         "sigma": tables.single(grid.sigma),
         "inside": grid.inside,
+        "supported": grid.supported,
     }
     return Table({}, _facts(grid), arrays)
 
@@ -32,6 +33,7 @@ def points(grid: SigmaGrid) -> Table:
         "along_values": along.ravel(),
         "sigma": tables.single(grid.sigma).ravel(),
         "inside": grid.inside.ravel(),
+        "supported": grid.supported.ravel(),
     }
     return Table(columns, _facts(grid))
 

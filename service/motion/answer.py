@@ -115,8 +115,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class SigmaGrid:
-    """Sigma (R, C), m, of the finest level, and whether all controls lie inside what was sampled,
-    inside (R, C), for the columns of one axis and the rows of another.
+    """Sigma (R, C), m, of the finest level, whether all controls lie inside what was sampled,
+    inside (R, C), and whether anything like them was captured, supported (R, C), for the columns
+    of one axis and the rows of another.
 
     model: name@contenthash. controls: the values of those that are no axes.
     """
@@ -128,6 +129,7 @@ class SigmaGrid:
     performer: str | None
     sigma: Singles
     inside: Truths
+    supported: Truths
 
 
 @dataclass(frozen=True)

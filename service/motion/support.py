@@ -50,7 +50,8 @@ class Support:
 
     def holds(self, points: Floats) -> Truths:
         """Whether something like each of the points (B, d) was captured."""
-        inside = (self.beyond(points) <= BEYOND).all(axis=1)
+        low, high = np.transpose(self._box)
+        inside = ((low <= points) & (points <= high)).all(axis=1)
         found = np.zeros(len(points), dtype=bool)
         own = points[inside]
         room = self.limit - self._roughly(own)

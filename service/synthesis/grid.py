@@ -1,4 +1,4 @@
-"""How far answers may be trusted over two controls: sigma on a grid of them."""
+"""How far answers may be trusted over two controls: sigma and support on a grid of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -62,9 +62,16 @@ def grid(model: Synthesizer, asked: GridQuestion) -> SigmaGrid:
         [model.session.sigmas(points[i : i + BATCH], labels) for i in range(0, len(points), BATCH)]
     )
     shape = asked.rows, asked.columns
-    inside = _inside(card, points).reshape(shape)
-    who = asked.performer
-    return SigmaGrid(model.identity, across, along, fixed, who, sigma.reshape(shape), inside)
+    return SigmaGrid(
+        model.identity,
+        across,
+        along,
+        fixed,
+        asked.performer,
+        sigma.reshape(shape),
+        _inside(card, points).reshape(shape),
+        model.door.support.holds(points).reshape(shape),
+    )
 
 
 def _axis(card: ModelCard, field: str, name: str, count: int, asked: GridQuestion) -> Axis:

@@ -32,8 +32,10 @@ def test_every_format_holds_the_same_grid(ask):
     assert np.array_equal(np.frombuffer(raw["data"], raw["dtype"]).reshape(raw["shape"]), sigma)
     assert np.array_equal(archive["sigma"], sigma)
     assert np.array_equal(np.asarray(batch.column("sigma")).reshape(3, 5), sigma)
-    assert archive["inside"].tolist() == plain["inside"]
-    assert batch.column("inside").to_pylist() == np.ravel(plain["inside"]).tolist()
+    for name in ("inside", "supported"):
+        assert archive[name].tolist() == plain[name]
+        assert batch.column(name).to_pylist() == np.ravel(plain[name]).tolist()
+        assert 0 < np.sum(plain[name]) < 15
     assert batch.column("across_values").to_pylist() == plain["across_values"] * 3
     assert batch.column("along_values").to_pylist()[::5] == plain["along_values"]
     assert archive["across_values"].tolist() == plain["across_values"]
@@ -44,6 +46,23 @@ def test_every_format_holds_the_same_grid(ask):
         "turn",
         plain["controls"],
     )
+
+
+def test_support_is_what_poses_at_the_same_points_say(ask):
+    found = ask("GET", f"{SIGMA}?{ASKED}").json()
+    told = [
+        [supported(ask, found, across, along) for across in found["across_values"]]
+        for along in found["along_values"]
+    ]
+    assert found["supported"] == told
+    # Negative control: the outermost lie half a range beyond, the innermost among clips.
+    assert not told[0][0] and told[1][2]
+
+
+def supported(ask, found, across, along):
+    controls = {**found["controls"], "turn": across, "target_height": along}
+    body = {"controls": controls, "times": [0]}
+    return ask("POST", "/v1/models/reach/pose", json=body).json()["trust"]["supported"]
 
 
 REFUSED = [

@@ -40,6 +40,8 @@ def panel():
     facts["drawn after"] = drawn()
     slide(stature=2.5)
     facts["drawn outside"] = drawn()
+    bpy.ops.posefield.import_clip()
+    facts["drawn from far outside"] = drawn()
     rows = []
     part("preferences").PosefieldPreferences.draw(
         SimpleNamespace(

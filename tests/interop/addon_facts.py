@@ -67,11 +67,17 @@ FACTS: dict[str, Any] = {
     "another action: unchanged": _is(True),
     "drawn before": lambda rows: "Model" in rows and "Import clip" not in rows,
     "drawn after": lambda rows: (
-        _holds("'stature (m)'", "A captured clip would lie")(rows) and "Outside" not in str(rows)
+        _holds("'stature (m)'", "A captured clip would lie", "'Captured near here'")(rows)
+        and "Outside" not in str(rows)
     ),
     "drawn outside": lambda rows: (
-        _holds("Outside: stature is 2.5, sampled: ")(rows) and "would lie" not in str(rows)
+        _holds("Outside: stature is 2.5, sampled: ")(rows)
+        and "would lie" not in str(rows)
+        and "aptured" not in str(rows)
     ),
+    "drawn from far outside": lambda rows: _holds(
+        "Outside: stature is 2.5", "A captured clip would lie", "'Nothing like it was captured'"
+    )(rows),
     "by hash": _is(""),
     "drawn preferences": _holds("plain text", "Without https"),
     "slider": lambda found: found[2] < found[0] < found[1] < found[3],

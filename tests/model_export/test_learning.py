@@ -12,8 +12,11 @@ SIZES = (40, 60, 80, 100)
 
 
 def curve(suggested, chance):
-    rows = {SUGGESTED: suggested, CHANCE: chance}
-    return Learning(SIZES, {way: np.array([row, row]) / 100.0 for way, row in rows.items()})
+    """Two trials with such a mean, a millimetre off on either side."""
+    rows = {SUGGESTED: np.array([suggested] * 2), CHANCE: np.array([chance] * 2)}
+    return Learning(
+        SIZES, {way: np.stack([row - 0.1, row + 0.1]) / 100 for way, row in rows.items()}
+    )
 
 
 def test_it_is_as_fast_as_it_comes_to_where_chance_ends():
@@ -31,10 +34,16 @@ def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
 
 def test_it_is_told_as_a_table_and_as_figures():
     found = curve([4.0, 2.0, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
-    assert "| suggested, global | 4.00 | 2.00 | 1.50 | 1.00 |" in learning.table(found)
+    row = "| suggested, global | 4.00 ± 0.10 | 2.00 ± 0.10 | 1.50 ± 0.10 | 1.00 ± 0.10 |"
+    assert row in learning.table(found)
     assert "3.0 times as fast" in learning.table(found)
     facts = learning.facts(found)
-    assert facts["at_random"] == {"global_cm": [4, 3, 2.5, 2], "relative_cm": [4, 3, 2.5, 2]}
+    assert facts["at_random"] == {
+        "global_cm": [4, 3, 2.5, 2],
+        "relative_cm": [4, 3, 2.5, 2],
+        "global_standard_error_cm": [0.1] * 4,
+    }
+    assert facts["trials"] == 2
     assert facts["samples"] == list(SIZES)
 
 

@@ -5,7 +5,7 @@ import textwrap
 import bpy
 
 from . import preferences, questions, session, sliders
-from .without_blender import faults
+from .without_blender import faults, marks
 
 WIDTH = 44
 """Letters that a row holds at the sidebar's usual width."""
@@ -85,12 +85,21 @@ def draw_import(layout, context) -> None:
 def draw_trust(layout, scene, card) -> None:
     """What the clip is worth, and where it leaves what was sampled."""
     clip, now = session.current.clip, sliders.values(scene, card)
-    # The number belongs to one point: it is not shown beside sliders that stand elsewhere.
-    if clip is not None and (clip.trust["model"], clip.trust["controls"]) == (card.identity, now):
+    who = scene.posefield.performer_name or None
+    # It belongs to one point: it is not shown beside sliders that stand elsewhere.
+    if clip is not None and clip.answers(card.identity, now, who):
         far = f"{100 * clip.sigma:.1f} cm"
         draw_text(layout, f"A captured clip would lie about {far} from this", "INFO")
+        draw_mark(layout, marks.support(clip.trust), "CHECKMARK", "ERROR")
+        draw_mark(layout, marks.performer(clip.trust), "USER", "GHOST_DISABLED")
     for warning in card.warnings(now):
         draw_text(layout, f"Outside: {warning}", "ERROR")
+
+
+def draw_mark(layout, mark, good: str, other: str) -> None:
+    """Words under a sign of their own; nothing where the service does not say."""
+    if mark is not None:
+        draw_text(layout, mark.words, good if mark.held else other)
 
 
 def draw_said(layout) -> None:

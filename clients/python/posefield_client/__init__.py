@@ -30,7 +30,7 @@ from posefield_client.generated import (
 )
 from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
 from posefield_client.retry import NEVER, Retry
-from posefield_client.saving import Progress, Saved
+from posefield_client.saving import Missed, Progress, Saved
 
 __all__ = [
     "CONTRACT",
@@ -53,6 +53,7 @@ __all__ = [
     "ManifestEntry",
     "Memory",
     "Met",
+    "Missed",
     "Model",
     "ModelCard",
     "NamedClipQuestion",

@@ -49,7 +49,8 @@ class ClipNumbers(Struct, frozen=True, eq=False):
 class SigmaGrid(Struct, frozen=True, eq=False):
     """Sigma over two controls: sigma and inside [rows, columns], m and whether all was sampled.
 
-    across_values [columns], along_values [rows]; controls: values of the others.
+    across_values [columns], along_values [rows]; controls: values of the others. supported [rows,
+    columns], whether anything like it was captured, from services that say so.
     """
 
     model: str
@@ -62,6 +63,7 @@ class SigmaGrid(Struct, frozen=True, eq=False):
     along_values: Array
     sigma: Array
     inside: Array
+    supported: Array | None = None
 
 
 class CrowdPoses(Struct, frozen=True, eq=False):
@@ -107,7 +109,13 @@ SHAPES: dict[Any, dict[str, str]] = {
         "root_position": "F3",
         "bone_offsets": "J3",
     },
-    SigmaGrid: {"across_values": "C", "along_values": "R", "sigma": "RC", "inside": "RC"},
+    SigmaGrid: {
+        "across_values": "C",
+        "along_values": "R",
+        "sigma": "RC",
+        "inside": "RC",
+        "supported": "RC",
+    },
     CrowdPoses: {
         "names": "J",
         "parents": "J",

@@ -2,14 +2,14 @@
 
 import io
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from errno import EISDIR
 from pathlib import Path
 from stat import S_IMODE
 from types import TracebackType
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 import msgspec
 
@@ -31,15 +31,27 @@ class Progress:
     count: int | None = None
 
 
+Line = TypeVar("Line")
+
 Watch = Callable[[Progress], object]
 """Told how far it is. What it raises ends the download, and no file is left."""
+
+
+@dataclass(frozen=True)
+class Missed:
+    """By how much a clip misses something that it was held to, in that unit."""
+
+    what: str
+    miss: float
+    unit: str
 
 
 @dataclass(frozen=True)
 class Saved:
     """A file that was written, and what the service said of it.
 
-    model: name@hash; sigma, m, duration, s, and whether anything like it was captured: of a clip;
+    model: name@hash; sigma, m, duration, s, whether anything like it was captured, the values that
+    were chosen for controls that were left out, and what it was held to and misses: of a clip;
     entries: of an archive, one a clip.
     """
 
@@ -51,6 +63,8 @@ class Saved:
     warnings: tuple[str, ...]
     entries: tuple[ManifestEntry, ...]
     supported: bool | None = None
+    inferred: Mapping[str, float] = field(default_factory=dict)
+    missed: tuple[Missed, ...] = ()
 
 
 class Part:
@@ -156,17 +170,23 @@ def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEn
 def _saved(path: Path, reply: Reply, entries: tuple[ManifestEntry, ...]) -> Saved:
     """What the headers say of a file; ValueError where they cannot be read."""
     headers = reply.headers
-    lines = f"[{headers.get('posefield-warning', '')}]".encode()
     return Saved(
         path,
         0,
         headers.get("posefield-model"),
         _number(headers.get("posefield-sigma")),
         _number(headers.get("posefield-duration")),
-        msgspec.json.decode(lines, type=tuple[str, ...]),
+        _lines(headers.get("posefield-warning", ""), str),
         entries,
         _truth(headers.get("posefield-supported")),
+        msgspec.json.decode(headers.get("posefield-inferred", "{}"), type=dict[str, float]),
+        _lines(headers.get("posefield-missed", ""), Missed),
     )
+
+
+def _lines(joined: str, each: type[Line]) -> tuple[Line, ...]:
+    """What the lines of one header, each of them JSON, are joined to by commas."""
+    return msgspec.json.decode(f"[{joined}]", type=tuple[each, ...])  # type: ignore[valid-type]
 
 
 def _truth(text: str | None) -> bool | None:

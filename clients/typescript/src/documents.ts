@@ -33,7 +33,7 @@ export function checked<Of extends Name>(of: Of, value: unknown): Document<Of> {
   return value as Document<Of>;
 }
 
-function isMap(value: unknown): value is Readonly<Record<string, unknown>> {
+export function isMap(value: unknown): value is Readonly<Record<string, unknown>> {
   return typeof value === "object" && value !== null;
 }
 

@@ -24,6 +24,7 @@ export type {
   Download,
   ManifestEntry,
   Met,
+  Missed,
   ModelCard,
   ModelSummary,
   Motion,

@@ -818,13 +818,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail. As JSON, or in the format that `Accept` prefers.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured. As JSON, or in the format that `Accept` prefers.
          */
         get: operations["getSigma"];
         put?: never;
         /**
          * Query sigma over two controls
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail. As JSON, or in the format that `Accept` prefers.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured. As JSON, or in the format that `Accept` prefers.
          */
         post: operations["querySigma"];
         delete?: never;
@@ -848,13 +848,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls as JSON
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         get: operations["getSigmaJson"];
         put?: never;
         /**
          * Query sigma over two controls as JSON
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         post: operations["querySigmaJson"];
         delete?: never;
@@ -878,13 +878,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls as MessagePack
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         get: operations["getSigmaMsgpack"];
         put?: never;
         /**
          * Query sigma over two controls as MessagePack
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         post: operations["querySigmaMsgpack"];
         delete?: never;
@@ -908,13 +908,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls as NumPy arrays
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         get: operations["getSigmaNpz"];
         put?: never;
         /**
          * Query sigma over two controls as NumPy arrays
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         post: operations["querySigmaNpz"];
         delete?: never;
@@ -938,13 +938,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls as an Arrow stream
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         get: operations["getSigmaArrow"];
         put?: never;
         /**
          * Query sigma over two controls as an Arrow stream
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail.
+         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
         post: operations["querySigmaArrow"];
         delete?: never;
@@ -1613,7 +1613,7 @@ export interface components {
             controls?: components["schemas"]["FixedControls"];
             performer?: components["schemas"]["Performer"];
         };
-        /** @description Sigma over all values of two controls. */
+        /** @description Sigma and support over all values of two controls. */
         SigmaGrid: {
             model: components["schemas"]["Identity"];
             across: components["schemas"]["ControlName"];
@@ -1635,6 +1635,8 @@ export interface components {
             sigma: number[][];
             /** @description For each row and column whether every control lies in its sampled range. */
             inside: boolean[][];
+            /** @description For each row and column `supported` as in Trust; always there since 2.2.0. */
+            supported?: boolean[][];
         };
         /** @description Many clips in one format. All are looked at before the answer begins; one without an answer refuses all. */
         ClipsQuestion: {
@@ -2652,7 +2654,7 @@ export interface components {
                 "application/x-npz": string;
             };
         };
-        /** @description An Arrow IPC stream of one record batch, one row a point: `across_values` and `along_values` are float64, `sigma` is float32, `inside` a truth. The metadata of the schema hold JSON texts under `posefield.model`, `.across`, `.along`, `.controls`, `.performer` and `.units`. */
+        /** @description An Arrow IPC stream of one record batch, one row a point: `across_values` and `along_values` are float64, `sigma` is float32, `inside` and `supported` truths. The metadata of the schema hold JSON texts under `posefield.model`, `.across`, `.along`, `.controls`, `.performer` and `.units`. */
         SigmaArrow: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];

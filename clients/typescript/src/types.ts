@@ -95,8 +95,15 @@ export interface Named {
   readonly duration: number | null;
   /** As in Trust; of a single clip. */
   readonly supported: boolean | null;
+  /** Values that the service chose, by the controls that were left out; of a single clip. */
+  readonly inferred: Readonly<Record<string, number>>;
+  /** What the clip was to meet and does not; of a single clip. */
+  readonly missed: readonly Missed[];
   readonly warnings: readonly string[];
 }
+
+/** By how much a clip misses something that it was held to. */
+export type Missed = Pick<Met, "what" | "miss" | "unit">;
 
 /** A file, whole. */
 export interface Download extends Named {

@@ -3,7 +3,15 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 
-import { Client, CONTRACT, type PoseQuestion, Problem, type Target } from "../src/index.ts";
+import {
+  Client,
+  CONTRACT,
+  type PoseQuestion,
+  Problem,
+  type Target,
+  Unexpected,
+} from "../src/index.ts";
+import { named } from "../src/named.ts";
 import { defaults, observed, URL_OF_SERVICE } from "./service.ts";
 
 const client = new Client(URL_OF_SERVICE);
@@ -106,6 +114,37 @@ test("a file says how far it may be trusted", async () => {
   assert.equal(found.warnings.length, 1);
   assert.ok(Math.abs(found.sigma! - trust.sigma) < 1e-6);
   assert.ok(Math.abs(found.duration! - trust.duration) < 1e-6);
+});
+
+test("a file says what was chosen for it, and what it misses", async () => {
+  const { hip_height: _, ...controls } = question.controls;
+  const far: Target = { joint: "RightHand", position: [0, 1, 9], at: "end" };
+  const high: Target = { joint: "Head", position: [0, 9, 0], at: "start" };
+  const asked = { controls, targets: [far, high] };
+  const found = await client.file("reach", "bvh", asked);
+  const { trust } = await client.pose("reach", { ...asked, times: [0] });
+  assert.deepEqual(found.inferred, { hip_height: trust.controls["hip_height"] });
+  const told = trust.targets!.map(({ what, unit }) => ({ what, unit }));
+  assert.deepEqual(
+    found.missed.map(({ what, unit }) => ({ what, unit })),
+    told,
+  );
+  found.missed.forEach(({ miss }, i) => {
+    assert.ok(Math.abs(miss - trust.targets![i]!.miss) < 1e-6);
+  });
+  const plain = await client.file("reach", "bvh", { controls: question.controls });
+  assert.deepEqual([plain.inferred, plain.missed], [{}, []]);
+});
+
+test("heads that cannot be read are no answer", () => {
+  const heads = [
+    ["Posefield-Inferred", '{"turn": "left"}'],
+    ["Posefield-Inferred", "7"],
+    ["Posefield-Missed", '{"what": "hand"}'],
+    ["Posefield-Missed", "hand"],
+  ] as const;
+  for (const [name, text] of heads)
+    assert.throws(() => named(new Headers([[name, text]]), "clip"), Unexpected);
 });
 
 test("a link gives the same file", async () => {

@@ -48,7 +48,7 @@ export async function pose(
   try {
     return state.root === card.root
       ? await travelling(source, state, time, signal)
-      : await inPlace(source, state, time, signal);
+      : await inPlace(source, card, state, time, signal);
   } catch (fault) {
     if (!(fault instanceof PosefieldError && /^times?\b/.test(detail(fault)))) throw fault;
     return whole();
@@ -68,6 +68,7 @@ function travelling(source: Source, state: State, time: number, signal: AbortSig
 /** A crowd of one: crowds alone may be asked for poses that stay where they are. */
 async function inPlace(
   source: Source,
+  card: ModelCard,
   state: State,
   time: number,
   signal: AbortSignal,
@@ -75,10 +76,14 @@ async function inPlace(
   const { controls, performer, level, model } = state;
   const question = { controls, performer, level, time: [time], root: "in_place" as const };
   const answer = await source.crowd(model, question, signal);
-  return { ...answer, times: Float64Array.of(time), trust: trust(answer, state) };
+  return { ...answer, times: Float64Array.of(time), trust: trust(answer, card, state) };
 }
 
-function trust(answer: CrowdPoses, { controls, performer, level }: State): Poses["trust"] {
+function trust(answer: CrowdPoses, card: ModelCard, state: State): Poses["trust"] {
+  const { controls, performer, level } = state;
+  const supported = answer.supported?.[0];
+  // Services older than 2.2.0 say neither.
+  const told = supported === undefined ? {} : { supported, ...seen(card, performer) };
   return {
     model: answer.model,
     controls: { ...controls },
@@ -86,10 +91,14 @@ function trust(answer: CrowdPoses, { controls, performer, level }: State): Poses
     level,
     duration: answer.duration[0]!,
     sigma: answer.sigma[0]!,
-    // Services older than 2.2.0 warn of what lies outside, and say no more.
-    supported: answer.supported?.[0] ?? answer.warnings.length === 0,
     warnings: [...answer.warnings],
+    ...told,
   };
+}
+
+/** What trust says of who moves, which crowds leave out. */
+function seen({ performers }: ModelCard, performer: string | null) {
+  return performers.length ? { performer_seen: performer !== null } : {};
 }
 
 function at(found: Motion, time: number): Poses {

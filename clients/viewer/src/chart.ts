@@ -3,7 +3,9 @@
 import type { ModelCard, SigmaGrid } from "@posefield/client";
 
 import { viridis } from "./colours.ts";
+import * as hatch from "./hatch.ts";
 import * as theme from "./theme.ts";
+import type { Veil } from "./veil.ts";
 import { figure } from "./written.ts";
 
 export type Control = ModelCard["controls"][number];
@@ -77,12 +79,18 @@ export function rounded(value: number, range: number): number {
   return Number((Math.round(value / step) * step).toPrecision(10));
 }
 
-/** Least and greatest sigma, m, within what was sampled; beyond, colours are the last one. */
+/** For each row and column whether anything like it was captured; whether all was sampled, where
+ * an older service says that alone. */
+export function captured(grid: SigmaGrid): readonly (readonly boolean[])[] {
+  return grid.supported ?? grid.inside;
+}
+
+/** Least and greatest sigma, m, within what was captured; beyond, colours are the last one. */
 export function extent(grid: SigmaGrid): [number, number] {
   const all = grid.sigma.flat();
-  const inside = grid.inside.flat();
-  const sampled = all.filter((_, i) => inside[i]);
-  const counted = sampled.length ? sampled : all;
+  const near = captured(grid).flat();
+  const known = all.filter((_, i) => near[i]);
+  const counted = known.length ? known : all;
   return [Math.min(...counted), Math.max(...counted)];
 }
 
@@ -109,6 +117,8 @@ export interface Drawing {
   readonly frame: Frame;
   readonly controls: readonly [Control, Control];
   readonly picture: HTMLCanvasElement | null;
+  /** Where nothing like it was captured; null where the service does not say. */
+  readonly veil: Veil | null;
   /** Whether the controls that are no axes lie inside what was sampled. */
   readonly inside: boolean;
   readonly dots: readonly Dot[];
@@ -125,7 +135,8 @@ export function draw(pen: CanvasRenderingContext2D, it: Drawing): void {
   pen.fill();
   pen.clip();
   if (it.picture) stretch(pen, it.picture, frame);
-  hatch(pen, it);
+  if (it.veil) hatch.unsupported(pen, frame, it.veil);
+  else hatch.unsampled(pen, frame, it.inside);
   for (const dot of it.dots) mark(pen, frame, dot, dot.index === it.chosen);
   cross(pen, frame, it.point);
   pen.restore();
@@ -139,30 +150,6 @@ function stretch(pen: CanvasRenderingContext2D, picture: HTMLCanvasElement, fram
   pen.imageSmoothingQuality = "high";
   const size = [frame.width + w, frame.height + h] as const;
   pen.drawImage(picture, frame.left - w / 2, frame.top - h / 2, ...size);
-}
-
-/** Grey with stripes over all that was never sampled, and a border around what was. */
-function hatch(pen: CanvasRenderingContext2D, { frame, inside }: Drawing): void {
-  pen.save();
-  const range = frame.range;
-  pen.beginPath();
-  pen.rect(frame.left, frame.top, frame.width, frame.height);
-  if (inside) pen.rect(...range);
-  pen.clip("evenodd");
-  pen.fillStyle = "rgb(110 116 128 / 62%)";
-  pen.fillRect(frame.left, frame.top, frame.width, frame.height);
-  pen.strokeStyle = "rgb(255 255 255 / 34%)";
-  pen.lineWidth = 1;
-  pen.beginPath();
-  for (let x = frame.left - frame.height; x < frame.left + frame.width; x += 7) {
-    pen.moveTo(x, frame.top + frame.height);
-    pen.lineTo(x + frame.height, frame.top);
-  }
-  pen.stroke();
-  pen.restore();
-  pen.strokeStyle = "#fffc";
-  pen.lineWidth = 1;
-  pen.strokeRect(...range);
 }
 
 function mark(pen: CanvasRenderingContext2D, frame: Frame, dot: Dot, chosen: boolean): void {

@@ -2,7 +2,7 @@
 
 import type { ModelCard, SigmaGrid } from "@posefield/client";
 
-import { type Control, extent } from "./chart.ts";
+import { type Control, captured, extent } from "./chart.ts";
 import { viridis } from "./colours.ts";
 import { el } from "./dom.ts";
 import { figure, precise } from "./written.ts";
@@ -12,7 +12,7 @@ interface Legend {
   show(grid: SigmaGrid, card: ModelCard): void;
 }
 
-/** The scale of colours in centimetres, and what a ring means. */
+/** The scale of colours in centimetres, and what a ring and stripes mean. */
 export function legend(): Legend {
   const bar = el("canvas", { width: 256, height: 1, class: "map-scale" });
   bar.setAttribute("aria-hidden", "true");
@@ -24,12 +24,21 @@ export function legend(): Legend {
   }
   pen.putImageData(image, 0, 0);
   const numbers = el("div", { class: "map-numbers" });
+  const stripes = el("div", { class: "map-stripes" });
   const rings = el("div", { class: "map-rings" });
-  const host = el("div", { class: "map-legend" }, bar, numbers, rings);
-  return { host, show: (grid, card) => fill(numbers, rings, grid, card) };
+  const host = el("div", { class: "map-legend" }, bar, numbers, stripes, rings);
+  const show = (grid: SigmaGrid, card: ModelCard) => {
+    scale(numbers, grid);
+    stripes.textContent = grid.supported ? STRIPES : "Hatched: never sampled.";
+    rings.textContent = dots(card);
+  };
+  return { host, show };
 }
 
-function fill(numbers: HTMLElement, rings: HTMLElement, grid: SigmaGrid, card: ModelCard): void {
+const STRIPES =
+  "Hatched: nothing like it was captured. Dashed: the ranges that were sampled, which may hold gaps.";
+
+function scale(numbers: HTMLElement, grid: SigmaGrid): void {
   const [low, high] = extent(grid);
   const [least, middle, most] = [low, (low + high) / 2, high].map((value) => figure(100 * value));
   numbers.replaceChildren(
@@ -37,15 +46,19 @@ function fill(numbers: HTMLElement, rings: HTMLElement, grid: SigmaGrid, card: M
     el("span", {}, `sigma ${middle}`),
     el("span", {}, `${most} cm and more`),
   );
-  const worst = Math.max(0, ...(card.left_out ?? []));
-  const ring = worst ? `, a ring as wide as its error when left out, up to ${precise(worst)}` : "";
-  rings.textContent = `A dot is a captured clip${ring}; faint where other controls differ. Hatched: never sampled.`;
 }
 
-/** A sentence on where sigma is least and greatest within what was sampled. */
+function dots(card: ModelCard): string {
+  const worst = Math.max(0, ...(card.left_out ?? []));
+  const ring = worst ? `, a ring as wide as its error when left out, up to ${precise(worst)}` : "";
+  return `A dot is a captured clip${ring}; faint where other controls differ.`;
+}
+
+/** A sentence on where sigma is least and greatest within what was captured, and how much of the map
+ * that is. */
 export function said(grid: SigmaGrid, [across, along]: readonly [Control, Control]): string {
-  const found = [...cells(grid)].filter(({ inside }) => inside);
-  if (!found.length) return "All of this map lies outside what was sampled: another control does.";
+  const found = [...cells(grid)].filter(({ near }) => near);
+  if (!found.length) return grid.supported ? NOWHERE : BEYOND;
   const [first] = found;
   let [least, most] = [first!, first!];
   for (const cell of found) {
@@ -54,31 +67,41 @@ export function said(grid: SigmaGrid, [across, along]: readonly [Control, Contro
   }
   const at = ({ x, y }: Cell) =>
     `at ${across.name} ${figure(x)} ${across.unit}, ${along.name} ${figure(y)} ${along.unit}`;
+  const of = grid.supported ? `captured, ${percent(found.length, grid)} of this map,` : "sampled";
   return (
-    `Within what was sampled sigma is least, ${precise(least.sigma)}, ${at(least)}, ` +
+    `Within what was ${of} sigma is least, ${precise(least.sigma)}, ${at(least)}, ` +
     `and greatest, ${precise(most.sigma)}, ${at(most)}.`
   );
+}
+
+const NOWHERE = "Nothing like any of this map was captured: another control lies too far off.";
+const BEYOND = "All of this map lies outside what was sampled: another control does.";
+
+function percent(count: number, grid: SigmaGrid): string {
+  return `${figure(Math.round((100 * count) / grid.sigma.flat().length))} %`;
 }
 
 interface Cell {
   readonly x: number;
   readonly y: number;
   readonly sigma: number;
-  readonly inside: boolean;
+  /** Whether anything like it was captured. */
+  readonly near: boolean;
 }
 
 function* cells(grid: SigmaGrid): Generator<Cell> {
+  const known = captured(grid);
   for (const [row, y] of grid.along_values.entries()) {
     for (const [column, x] of grid.across_values.entries()) {
-      const [sigma, inside] = [grid.sigma[row]![column]!, grid.inside[row]![column]!];
-      yield { x, y, sigma, inside };
+      yield { x, y, sigma: grid.sigma[row]![column]!, near: known[row]![column]! };
     }
   }
 }
 
 const STEPS = 6;
 
-/** Some of the grid's rows and columns: sigma in centimetres, a star outside what was sampled. */
+/** Some of the grid's rows and columns: sigma in centimetres, a star where nothing like it was
+ * captured. */
 export function table(
   grid: SigmaGrid,
   [across, along]: readonly [Control, Control],
@@ -88,7 +111,9 @@ export function table(
   const columns = pick(grid.across_values.length);
   const rows = pick(grid.along_values.length).reverse();
   const heading = (value: number, scope: string) => el("th", { scope }, figure(value));
-  const title = `Sigma in cm; * lies outside what was sampled. Columns: ${across.name}, rows: ${along.name}.`;
+  const known = captured(grid);
+  const star = grid.supported ? "nothing like it was captured" : "lies outside what was sampled";
+  const title = `Sigma in cm; * ${star}. Columns: ${across.name}, rows: ${along.name}.`;
   const head = el(
     "tr",
     {},
@@ -101,8 +126,8 @@ export function table(
       {},
       heading(grid.along_values[row]!, "row"),
       ...columns.map((column) => {
-        const star = grid.inside[row]![column] ? "" : " *";
-        return el("td", {}, figure(100 * grid.sigma[row]![column]!) + star);
+        const text = figure(100 * grid.sigma[row]![column]!);
+        return el("td", {}, known[row]![column] ? text : `${text} *`);
       }),
     ),
   );

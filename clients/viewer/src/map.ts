@@ -11,6 +11,7 @@ import { legend, said, table } from "./map-words.ts";
 import type { Mount, Page } from "./page.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
+import { type Veil, veil } from "./veil.ts";
 import { figure, precise } from "./written.ts";
 
 const [COLUMNS, ROWS] = [48, 36];
@@ -45,6 +46,7 @@ class Map2 {
   readonly #asking: Latest<string>;
   #grid: SigmaGrid | null = null;
   #picture: HTMLCanvasElement | null = null;
+  #veil: Veil | null = null;
   #chosen: number | null = null;
   #asked = "";
   #waiting = 0;
@@ -199,6 +201,7 @@ class Map2 {
   #show(grid: SigmaGrid): void {
     this.#grid = grid;
     this.#picture = heat(grid);
+    this.#veil = grid.supported ? veil(grid.supported) : null;
     this.#legend.show(grid, this.#page.card);
     this.#words.textContent = said(grid, this.#pair);
     this.#table.replaceChildren(...table(grid, this.#pair));
@@ -226,6 +229,7 @@ class Map2 {
       frame: this.#frame,
       controls: pair,
       picture: fits ? this.#picture : null,
+      veil: fits ? this.#veil : null,
       inside: this.#inside(),
       dots: this.#dots,
       point: this.#point,

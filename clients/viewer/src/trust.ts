@@ -1,9 +1,11 @@
-/** What the answer is worth: sigma, what lies outside, and the captured clips that it is made of. */
+/** What the answer is worth: sigma, whether anything like it was captured, what lies outside, and the
+ * captured clips that it is made of. */
 
 import type { ModelCard, Reasons, Trust } from "@posefield/client";
 
 import { el } from "./dom.ts";
 import { Latest } from "./latest.ts";
+import { items, marks } from "./marks.ts";
 import { served } from "./page.ts";
 import type { Session } from "./session.ts";
 import { title } from "./slider.ts";
@@ -19,6 +21,7 @@ type Captured = Reasons["nearest"][number];
 export function mount(host: HTMLElement, session: Session): void {
   const { card, player, signal, source, store } = session;
   const sigma = el("strong", { "data-sigma": "" }, "…");
+  const known = el("ul", { class: "marks", "aria-label": "What was captured" });
   const sentence = el("p", { class: "sentence" });
   const warnings = el("ul", { class: "warnings" });
   const list = el("ol", { class: "nearest" });
@@ -33,6 +36,7 @@ export function mount(host: HTMLElement, session: Session): void {
       el("span", { class: "sigma" }, "σ ", sigma),
     ),
     meter,
+    known,
     sentence,
     warnings,
     aloud,
@@ -52,20 +56,23 @@ export function mount(host: HTMLElement, session: Session): void {
     const usual = worst(card);
     sigma.textContent = written.centimetres(trust.sigma);
     meter.value = Math.min(1, trust.sigma / (3 * usual));
+    known.replaceChildren(...items(trust));
     sentence.textContent = says(trust, usual);
     warnings.replaceChildren(...trust.warnings.map((text) => el("li", {}, text)));
     host.toggleAttribute("data-outside", trust.warnings.length > 0);
     clearTimeout(timer);
     timer = setTimeout(() => {
       if (served(source)) why.ask(null);
-      aloud.textContent = [says(trust, usual), ...trust.warnings].join(" ");
+      const told = marks(trust).map(({ words }) => `${words}.`);
+      aloud.textContent = [says(trust, usual), ...told, ...trust.warnings].join(" ");
     }, CALM);
   });
 }
 
 function says(trust: Trust, usual: number): string {
   const found = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
-  if (trust.warnings.length) return `${found} That is a guess: nothing was captured out here.`;
+  // Services older than 2.2.0 warn of what lies outside, and say no more.
+  if (!(trust.supported ?? !trust.warnings.length)) return `${found} That is a guess.`;
   if (trust.sigma > 1.5 * usual)
     return `${found} That is far more than usual: the examples are sparse here.`;
   return found;

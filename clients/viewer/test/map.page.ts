@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, describe, it } from "node:test";
 
-import { Client, type ModelCard } from "@posefield/client";
+import { Client, type ModelCard, type SigmaGrid } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
 import { extent, Frame, MARGIN } from "../src/chart.ts";
@@ -50,13 +50,16 @@ describe("the map", () => {
       rest.map((each) => [each.name, Number(hash.get(each.name) ?? each.default)]),
     );
   };
-  const colour = (spot: readonly [number, number]): Promise<number[]> =>
-    page.locator(".map-canvas").evaluate((canvas, [x, y]) => {
+  const colours = (spots: readonly (readonly [number, number])[]): Promise<number[][]> =>
+    page.locator(".map-canvas").evaluate((canvas, places) => {
       const own = canvas as HTMLCanvasElement;
       const ratio = own.width / own.clientWidth;
-      const pen = own.getContext("2d")!;
-      return [...pen.getImageData(x! * ratio, y! * ratio, 1, 1).data.slice(0, 3)];
-    }, spot);
+      const whole = own.getContext("2d")!.getImageData(0, 0, own.width, own.height);
+      return places.map(([x, y]) => {
+        const from = 4 * (Math.floor(y * ratio) * own.width + Math.floor(x * ratio));
+        return [...whole.data.slice(from, from + 3)];
+      });
+    }, spots);
   const gap = (one: readonly number[], other: readonly number[]) =>
     Math.max(...one.map((value, i) => Math.abs(value - other[i]!)));
   const frame = async () => {
@@ -77,8 +80,8 @@ describe("the map", () => {
       margin: MARGIN,
     };
     const grid = await client.sigma("reaching", question);
-    const inside = grid.sigma.flatMap((row, i) => row.filter((_, j) => grid.inside[i]![j]));
-    const [least, most] = [100 * Math.min(...inside), 100 * Math.max(...inside)];
+    const near = grid.sigma.flatMap((row, i) => row.filter((_, j) => grid.supported![i]![j]));
+    const [least, most] = [100 * Math.min(...near), 100 * Math.max(...near)];
     const said = async () => {
       const words = await page.locator(".map-words").innerText();
       return [...words.matchAll(/([\d.]+) cm/g)].map(([, text]) => Number(text));
@@ -160,8 +163,15 @@ describe("the map", () => {
     await page.mouse.move(5, 5);
   });
 
-  /** What of the map is not of its sigma's colour; the address and the map may still be on their way. */
-  const miscoloured = async (): Promise<string> => {
+  interface Bare {
+    readonly at: readonly [number, number];
+    readonly sigma: number;
+    readonly supported: boolean;
+    readonly inside: boolean;
+  }
+
+  /** Points of the map where no dot, no ring, no line of the cross, no frame and no outline lies. */
+  const bare = async (): Promise<{ grid: SigmaGrid; points: Bare[] }> => {
     const grid = await client.sigma("reaching", {
       across: "turn",
       along: "target_height",
@@ -178,29 +188,51 @@ describe("the map", () => {
     const dots = card.examples.map(
       (values) => [place.x(values[x!]!), place.y(values[y!]!)] as const,
     );
-    const cells = grid.along_values.flatMap((up, row) =>
-      grid.across_values.map((right, column) => ({
-        at: [place.x(right), place.y(up)] as const,
-        sigma: grid.sigma[row]![column]!,
-        inside: grid.inside[row]![column]!,
-      })),
+    const [edgeX, edgeY, wide, tall] = place.range;
+    const lines = [
+      [crossX, edgeX, edgeX + wide],
+      [crossY, edgeY, edgeY + tall],
+    ];
+    const alone = (row: number, column: number): boolean =>
+      [-1, 0, 1].every((up) =>
+        [-1, 0, 1].every((right) => {
+          const beside = grid.supported![row + up]?.[column + right];
+          return beside === grid.supported![row]![column];
+        }),
+      );
+    const points = grid.along_values.flatMap((up, row) =>
+      grid.across_values.flatMap((right, column) => {
+        const at = [place.x(right), place.y(up)] as const;
+        const far = dots.every((dot) => Math.hypot(dot[0] - at[0], dot[1] - at[1]) > 11);
+        const [cross, ...frame] = [0, 1, 2].map((line) =>
+          Math.min(...lines.map((each, axis) => Math.abs(each[line]! - at[axis]!))),
+        );
+        const free = far && cross! > 10 && Math.min(...frame) > 3 && alone(row, column);
+        const [supported, inside] = [grid.supported, grid.inside].map((all) => all![row]![column]!);
+        const sigma = grid.sigma[row]![column]!;
+        return free ? [{ at, sigma, supported: supported!, inside: inside! }] : [];
+      }),
     );
-    // Where no dot, no ring and no line of the cross lies.
-    const bare = cells
-      .filter(({ inside, at: [left, top] }) => {
-        const far = dots.every((dot) => Math.hypot(dot[0] - left, dot[1] - top) > 11);
-        return inside && far && Math.abs(left - crossX) > 10 && Math.abs(top - crossY) > 10;
-      })
-      .sort((a, b) => a.sigma - b.sigma);
-    assert.ok(bare.length > 1, `${bare.length} bare places`);
+    return { grid, points };
+  };
+
+  /** What of the map is not of its sigma's colour; the address and the map may still be on their way. */
+  const miscoloured = async (): Promise<string> => {
+    const { grid, points } = await bare();
+    const near = points
+      .filter(({ supported }) => supported)
+      .sort((one, other) => one.sigma - other.sigma);
+    assert.ok(near.length > 1, `${near.length} bare places`);
     const [low, high] = extent(grid);
-    const seen = [bare[0]!, bare.at(-1)!].map(async ({ at: spot, sigma }) => {
+    const ends = [near[0]!, near.at(-1)!];
+    const found = await colours(ends.map(({ at: spot }) => spot));
+    const seen = ends.map(({ sigma }, i) => {
       const wanted = [0, 0, 0];
       viridis((sigma - low) / (high - low), wanted);
-      return { wanted, found: await colour(spot) };
+      return { wanted, found: found[i]! };
     });
-    const [least, most] = await Promise.all(seen);
-    const wrong = [least!, most!].filter(({ wanted, found }) => gap(wanted, found) >= 24);
+    const [least, most] = seen;
+    const wrong = seen.filter(({ wanted, found }) => gap(wanted, found) >= 24);
     if (gap(least!.wanted, most!.wanted) <= 48) return "all colours alike";
     return wrong.map(({ wanted, found }) => `${found} for ${wanted}`).join("; ");
   };
@@ -212,6 +244,54 @@ describe("the map", () => {
       said = await miscoloured();
     }
     assert.equal(said, "");
+  });
+
+  /** Of each place whether it has the colour of its sigma, with nothing over it. */
+  const plain = async (grid: SigmaGrid, places: readonly Bare[]): Promise<boolean[]> => {
+    const [low, high] = extent(grid);
+    const found = await colours(places.map(({ at: spot }) => spot));
+    return places.map(({ sigma }, i) => {
+      const wanted = [0, 0, 0];
+      viridis((sigma - low) / (high - low), wanted);
+      return gap(wanted, found[i]!) < 24;
+    });
+  };
+
+  it("hatches what nothing like was captured, in gaps too, in light and in dark", async () => {
+    const { grid, points } = await bare();
+    const gaps = points.filter(({ supported, inside }) => inside && !supported);
+    const beyond = points.filter(({ supported, inside }) => supported && !inside);
+    assert.ok(gaps.length > 2 && beyond.length > 2, `${gaps.length} and ${beyond.length}`);
+    for (const scheme of ["light", "dark"] as const) {
+      await page.emulateMedia({ colorScheme: scheme });
+      await page.waitForTimeout(300);
+      const bare = await plain(grid, points);
+      const wrong = points.filter(({ supported }, i) => bare[i] !== supported);
+      assert.deepEqual(wrong, [], scheme);
+    }
+    await page.emulateMedia({ colorScheme: null });
+    const said = await page.locator(".map-legend").innerText();
+    assert.match(said, /Hatched: nothing like it was captured/);
+    const share = grid.supported!.flat().filter(Boolean).length / grid.supported!.flat().length;
+    const words = await page.locator(".map-words").innerText();
+    assert.equal(Number(words.match(/captured, (\d+) % of this map/)![1]), Math.round(100 * share));
+  });
+
+  it("shows what was sampled where an older service says no more", async () => {
+    const other = await opened(from, `/${new URL(page.url()).hash}`);
+    await other.page.route(/sigma/, async (route) => {
+      const answer = await route.fetch();
+      const { supported, ...rest } = (await answer.json()) as SigmaGrid;
+      assert.ok(supported);
+      await route.fulfill({ response: answer, json: rest });
+    });
+    await other.page.reload();
+    const words = other.page.locator(".map-words", { hasText: "Within what was sampled" });
+    await words.waitFor();
+    assert.match(await other.page.locator(".map-legend").innerText(), /Hatched: never sampled/);
+    assert.match((await other.page.locator(".map caption").textContent())!, /outside what was/);
+    assert.deepEqual(other.faults, []);
+    await other.page.close();
   });
 
   it("keeps the focus where its axes are chosen by keys", async () => {
@@ -292,6 +372,21 @@ describe("the map", () => {
   it("has a table for who does not see it, and exchanges its axes", async () => {
     await page.getByText("Sigma as a table").click();
     assert.equal(await page.locator(".map tbody tr").count(), 6);
+    assert.match(await page.locator(".map caption").innerText(), /\* nothing like it was captured/);
+    const stars = await page.locator(".map tbody td", { hasText: "*" }).count();
+    const grid = await client.sigma("reaching", {
+      across: "turn",
+      along: "target_height",
+      columns: 48,
+      rows: 36,
+      margin: MARGIN,
+      controls: await others(),
+    });
+    const pick = (count: number) =>
+      [0, 1, 2, 3, 4, 5].map((i) => Math.round((i * (count - 1)) / 5));
+    const lacking = pick(36).flatMap((row) => pick(48).filter((i) => !grid.supported![row]![i]));
+    assert.equal(stars, lacking.length);
+    assert.ok(stars > 0 && stars < 36, `${stars}`);
     await page.locator(".map").getByLabel("across", { exact: true }).selectOption("target_height");
     await settled(page, "target_height");
     assert.equal(await page.locator(".map").getByLabel("up", { exact: true }).inputValue(), "turn");

@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 
-import { Client, type ModelCard } from "@posefield/client";
+import { Client, type ModelCard, type SigmaGrid } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
 import { place, placed } from "../src/skeleton.ts";
@@ -130,18 +130,17 @@ for (const model of ["reaching", "cmu_walk"]) {
 
     it("maps sigma", async () => {
       const [across, along] = card.controls.map(({ name }) => name);
-      const question = { across: across!, along: along!, columns: 9, rows: 7, margin: 0.25 };
+      const question = { across: across!, along: along!, columns: 25, rows: 21, margin: 0.3 };
       const [own, theirs] = [
-        await ask<{ sigma: number[][]; inside: boolean[][]; across_values: number[] }>(
-          "sigma",
-          question,
-        ),
+        await ask<SigmaGrid>("sigma", question),
         await service.sigma(model, question),
       ];
       assert.ok(most(own.sigma.flat(), theirs.sigma.flat()) < NEAR);
       assert.ok(most(own.sigma.flat(), theirs.sigma.flat().reverse()) > NEAR);
       assert.ok(most(own.across_values, theirs.across_values) < 1e-9);
       assert.deepEqual(own.inside, theirs.inside);
+      assert.deepEqual(own.supported, theirs.supported);
+      assert.notDeepEqual(own.supported, own.inside);
     });
 
     it("shows its page, which says what needs a service", async () => {

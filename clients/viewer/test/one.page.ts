@@ -218,6 +218,39 @@ test("outside of what was sampled is marked, and inside is not", () =>
     await until(async () => (await warnings.count()) === 0, "the warning goes");
   }));
 
+test("whether anything like it was captured has a mark beside sigma, and who moves another", () =>
+  on(WALK, async (page) => {
+    const [support, who] = ["support", "performer"].map((of) => page.locator(`[data-mark=${of}]`));
+    await support!.getByText("Captured near here").waitFor();
+    await who!.getByText("Moves as somebody never captured").waitFor();
+    const sign = () => support!.locator("path").getAttribute("d");
+    const before = await sign();
+    // Within the range of each control, and nobody walked so.
+    await typed(page, "speed").fill("1.7");
+    await typed(page, "speed").press("Enter");
+    await typed(page, "stride_length").fill("1");
+    await typed(page, "stride_length").press("Enter");
+    await support!.getByText("Nothing like it was captured").waitFor();
+    assert.notEqual(await sign(), before);
+    await until(
+      async () =>
+        /Nothing like it/.test(
+          (await page.locator("[data-part=trust] [aria-live]").textContent())!,
+        ),
+      "it is said aloud",
+    );
+    await page.getByLabel("Performer").selectOption("cmu_35");
+    await who!.getByText("cmu_35 was captured").waitFor();
+    await page.getByRole("button", { name: "Reset all controls (R)" }).click();
+    await support!.getByText("Captured near here").waitFor();
+  }));
+
+test("a body that stays in place has the same marks", () =>
+  on(`${WALK}&~root=in_place`, async (page) => {
+    await page.locator("[data-mark=support]", { hasText: "Captured near here" }).waitFor();
+    await page.locator("[data-mark=performer]", { hasText: "never captured" }).waitFor();
+  }));
+
 test("a control with few sampled values snaps to them", () =>
   on(REACH, async (page) => {
     await slider(page, "stature").fill("700");

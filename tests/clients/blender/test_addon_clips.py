@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from without_blender import cards, clips, faults
+from without_blender import cards, clips, faults, marks
 from without_blender.cards import Control
 
 UNITS = {"length": "metre", "up": "Y"}
@@ -40,6 +40,38 @@ def test_y_up_becomes_z_up():
     assert (len(clip), clip.sigma) == (3, 0.017)
 
 
+def told(**said):
+    clip = clips.decode(packed(plain(trust=np.array(json.dumps(TRUST | said)))))
+    return [mark and (mark.held, mark.words) for mark in (f(clip.trust) for f in FLAGS)]
+
+
+FLAGS = (marks.support, marks.performer)
+
+
+def test_whether_anything_like_it_was_captured_is_said_in_words():
+    assert told(supported=True)[0] == (True, "Captured near here")
+    assert told(supported=False)[0] == (False, "Nothing like it was captured")
+
+
+def test_whether_who_moves_was_captured_is_said_where_performers_are_told_apart():
+    nobody = told(supported=True, performer=None, performer_seen=False)
+    assert nobody[1] == (False, "Moves as somebody never captured")
+    assert told(performer="kim", performer_seen=True)[1] == (True, "kim was captured")
+    assert told(supported=True, performer=None)[1] is None
+
+
+def test_of_what_an_older_service_does_not_say_nothing_is_said():
+    assert told() == [None, None]
+
+
+def test_a_clip_is_no_answer_to_another_question():
+    clip = clips.decode(packed(plain(trust=np.array(json.dumps(TRUST | {"performer": "kim"})))))
+    assert clip.answers("reach@0123", {"turn": 20.0}, "kim")
+    assert not clip.answers("reach@4567", {"turn": 20.0}, "kim")
+    assert not clip.answers("reach@0123", {"turn": 20.5}, "kim")
+    assert not clip.answers("reach@0123", {"turn": 20.0}, None)
+
+
 def test_neighbouring_quaternions_lie_close():
     turned = plain()["rotations"].copy()
     turned[1] *= -1
@@ -66,6 +98,8 @@ def test_neighbouring_quaternions_lie_close():
         ),
         ({"trust": np.array(json.dumps(TRUST | {"sigma": np.inf}))}, "finite sigma"),
         ({"trust": np.array(json.dumps(TRUST | {"controls": None}))}, "its controls"),
+        ({"trust": np.array(json.dumps(TRUST | {"supported": "no"}))}, "supported is 'no'"),
+        ({"trust": np.array(json.dumps(TRUST | {"performer_seen": 2}))}, "performer_seen is 2"),
         ({"trust": np.array("[]")}, "cannot be read"),
         ({"names": np.array([object(), 1], dtype=object)}, "allow_pickle"),
     ],

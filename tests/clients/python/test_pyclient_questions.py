@@ -215,6 +215,27 @@ def test_an_array_that_is_none_is_refused(packed):
         numbers.grid(Reply(200, {}, whole))
 
 
+GRID = {
+    **dict.fromkeys(("model", "across", "along"), "x"),
+    "controls": {},
+    "units": {},
+    "performer": None,
+    "across_values": np.zeros(2),
+    "along_values": np.zeros(3),
+    "sigma": np.zeros((3, 2), "f4"),
+    "inside": np.ones((3, 2), bool),
+}
+
+
+def test_an_older_service_does_not_say_whether_a_grid_is_supported():
+    assert numbers.grid(packed(GRID)).supported is None
+    newer = numbers.grid(packed(GRID | {"supported": np.eye(3, 2) > 0}))
+    assert newer.supported.tolist() == [[True, False], [False, True], [False, False]]
+    for wrong in (np.ones((2, 3), bool), np.ones((3, 2), "f4")):
+        with pytest.raises(ValueError, match=r"has the shape|is of float32"):
+            numbers.grid(packed(GRID | {"supported": wrong}))
+
+
 POSE = {
     "trust": {
         "model": "m",

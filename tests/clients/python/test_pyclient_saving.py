@@ -167,6 +167,23 @@ def test_warnings_come_with_the_file(address, controls, tmp_path):
     assert len(told) == 2
 
 
+def test_what_was_chosen_and_what_is_missed_come_with_the_file(address, controls, tmp_path):
+    given = {name: value for name, value in controls.items() if name != "hip_height"}
+    far = {"joint": "RightHand", "position": (0, 1, 9), "at": "end"}
+    high = {"joint": "Head", "position": (0, 9, 0), "at": "start"}
+    held = {**given, "targets": [far, high]}
+    saved = by_waiting(address, tmp_path / "clip.bvh", lambda model: model.clip(**held))
+    with Client(address) as client:
+        trust = client.model("reach").pose(0, **held).trust
+    assert saved.inferred == {"hip_height": trust.controls["hip_height"]}
+    assert [(each.what, each.unit) for each in saved.missed] == [
+        (met.what, met.unit) for met in trust.targets
+    ]
+    assert [each.miss for each in saved.missed] == pytest.approx([m.miss for m in trust.targets])
+    plain = by_waiting(address, tmp_path / "plain.bvh", lambda model: model.clip(**controls))
+    assert (plain.inferred, plain.missed) == ({}, ())
+
+
 def test_a_file_may_be_read_by_those_whom_the_process_lets(address, controls, tmp_path):
     other = tmp_path / "other"
     other.touch()

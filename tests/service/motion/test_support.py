@@ -71,6 +71,20 @@ def test_one_is_told_as_many_are(own, rng):
     assert set(many) == {True, False}
 
 
+def test_on_the_edge_of_what_is_held_one_is_told_as_many_are(own, controls):
+    """Even grids meet it, 0.1 of a range beyond."""
+    sample, room = controls[own.variance(controls).argmin()], 0.3 * (own.high - own.low)
+    even = np.linspace(own.low - room, own.high + room, 25)
+    points = np.tile(sample, (3, 25, 1))
+    for control in range(3):
+        points[control, :, control] = even[:, control]
+    points = points.reshape(-1, 3)
+    many = own.holds(points)
+    assert many.tolist() == [own.held(point) for point in points.tolist()]
+    # Negative control: told by shares, which are rounded otherwise, they would not be.
+    assert (many & (own.beyond(points) > support.BEYOND).any(axis=1)).any()
+
+
 def test_what_lies_farther_beyond_a_control_than_a_tenth_of_its_range_is_not_held(own, controls):
     for control, width in enumerate(np.ptp(controls, axis=0)):
         for end, outward in ((own.high, 1.0), (own.low, -1.0)):

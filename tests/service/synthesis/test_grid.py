@@ -27,10 +27,33 @@ def test_each_point_is_the_sigma_of_an_answer(model):
             trust = poses.pose(model, PoseQuestion(controls, [0.0], performer="tall")).trust
             # One row of a product is summed in another order than many.
             assert abs(found.sigma[row, column] - trust.sigma) < 1e-6
-            assert found.inside[row, column] == (not trust.warnings)
+            assert found.supported[row, column] == trust.supported
+            quiet = found.inside[row, column] and found.supported[row, column]
+            assert quiet == (not trust.warnings)
     # Negative control: neighbours differ by more.
     assert np.abs(np.diff(found.sigma, axis=0)).min() > 2e-6
     assert found.inside.any() and not found.inside.all()
+
+
+@pytest.mark.parametrize("stature", [1.62, 1.75])
+def test_support_is_what_an_answer_says_of_itself(model, stature):
+    asked = dataclasses.replace(ASKED, columns=25, rows=21, controls={"stature": stature})
+    found = grid(model, asked)
+    told = [
+        [supported(model, found, across, along) for across in found.across.values]
+        for along in found.along.values
+    ]
+    assert found.supported.tolist() == told
+    # Negative control: gaps inside, and a little beyond, where the box alone would say otherwise;
+    # and with another stature it would not be.
+    assert (found.inside & ~found.supported).any() and (found.supported & ~found.inside).any()
+    other = grid(model, dataclasses.replace(asked, controls={"stature": 1.88}))
+    assert other.supported.tolist() != told
+
+
+def supported(model, found, across, along):
+    controls = {**found.controls, "turn": across, "target_height": along}
+    return model.pose(controls, [0.0], "ok").trust.supported
 
 
 def test_the_whole_graph_says_the_same(model):

@@ -76,6 +76,11 @@ class Clip:
         """How far a captured clip would lie from this one, m."""
         return float(self.trust["sigma"])
 
+    def answers(self, model: str, controls: dict[str, float], performer: str | None) -> bool:
+        """Whether it is what that model answers there."""
+        said = self.trust["model"], self.trust["controls"], self.trust.get("performer")
+        return said == (model, controls, performer)
+
     def __len__(self) -> int:
         return len(self.path)
 
@@ -135,3 +140,7 @@ def _check_said(rate: float, trust: dict[str, Any]) -> None:
     known = isinstance(trust["model"], str) and isinstance(trust["controls"], dict)
     if not (known and math.isfinite(trust["sigma"])):
         raise ValueError(f"trust is {trust}, expected a model, its controls and a finite sigma")
+    # Services older than 2.2.0 say neither.
+    for flag in ("supported", "performer_seen"):
+        if trust.get(flag) not in (None, True, False):
+            raise ValueError(f"{flag} is {trust[flag]!r}, expected true or false")

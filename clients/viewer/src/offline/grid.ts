@@ -1,9 +1,10 @@
-/** Sigma over two controls, by the model in the browser. */
+/** Sigma and support over two controls, by the model in the browser. */
 
 import type { ModelCard, SigmaGrid, SigmaQuestion } from "@posefield/client";
 
 import * as door from "./door.ts";
 import type { Graph } from "./graph.ts";
+import * as support from "./support.ts";
 
 const STEPS = 32;
 type Control = ModelCard["controls"][number];
@@ -42,6 +43,7 @@ export async function sigma(
     along_values: up,
     sigma: split([...found.sigma]),
     inside: split(points.map(within)),
+    supported: split(points.map((values) => support.of(card).holds(values))),
   };
 }
 

@@ -10,36 +10,43 @@ const QUANTILE = 0.95;
 const NUGGET = 0.05;
 
 export class Support {
+  readonly #box: readonly (readonly [low: number, high: number])[];
   readonly #scaled: (values: readonly number[]) => number[];
   readonly #samples: readonly number[][];
-  readonly #inverse: readonly number[][];
+  readonly #inverse: readonly Float64Array[];
   readonly #limit: number;
 
   constructor(card: ModelCard) {
     const columns = card.controls.map((_, i) => card.examples.map((example) => example[i]!));
     const low = columns.map((column) => Math.min(...column));
     const high = columns.map((column) => Math.max(...column));
+    const room = columns.map((_, i) => BEYOND * (high[i]! - low[i]!));
+    this.#box = room.map((wide, i) => [low[i]! - wide, high[i]! + wide]);
     this.#scaled = (values) =>
       values.map((value, i) => (2 * value - low[i]! - high[i]!) / (high[i]! - low[i]!));
     this.#samples = card.examples.map((example) => this.#scaled(example));
     const system = this.#samples.map((a, i) =>
       this.#samples.map((b, j) => covariance(a, b) + (i === j ? NUGGET : 0)),
     );
-    this.#inverse = inverted(system);
+    this.#inverse = inverted(system).map((row) => Float64Array.from(row));
     const leftOut = this.#inverse.map((row, i) => 1 / row[i]! - NUGGET);
     this.#limit = quantile(leftOut, QUANTILE);
   }
 
   holds(values: readonly number[]): boolean {
-    const point = this.#scaled(values);
-    if (point.some((value) => Math.abs(value) > 1 + 2 * BEYOND)) return false;
-    return this.#variance(point) <= this.#limit;
+    const near = this.#box.every(([low, high], i) => values[i]! >= low && values[i]! <= high);
+    return near && this.#variance(this.#scaled(values)) <= this.#limit;
   }
 
   #variance(point: readonly number[]): number {
-    const near = this.#samples.map((sample) => covariance(sample, point));
-    const explained = this.#inverse.map((row, i) => near[i]! * dot(row, near));
-    return 1 - explained.reduce((sum, part) => sum + part, 0);
+    const near = Float64Array.from(this.#samples, (sample) => covariance(sample, point));
+    return (
+      1 -
+      dot(
+        near,
+        Float64Array.from(this.#inverse, (row) => dot(row, near)),
+      )
+    );
   }
 }
 
@@ -56,8 +63,11 @@ function covariance(a: readonly number[], b: readonly number[]): number {
   return Math.exp(-0.5 * a.reduce((sum, value, i) => sum + (value - b[i]!) ** 2, 0));
 }
 
-function dot(a: readonly number[], b: readonly number[]): number {
-  return a.reduce((sum, value, i) => sum + value * b[i]!, 0);
+// A map asks for it a hundred thousand times: in a loop, ten times as fast.
+function dot(a: Float64Array, b: Float64Array): number {
+  let sum = 0;
+  for (let i = 0; i < a.length; i++) sum += a[i]! * b[i]!;
+  return sum;
 }
 
 function quantile(values: readonly number[], share: number): number {
