@@ -53,7 +53,7 @@ def test_support_is_what_an_answer_says_of_itself(model, stature):
 
 def supported(model, found, across, along):
     controls = {**found.controls, "turn": across, "target_height": along}
-    return model.pose(controls, [0.0], "ok").trust.supported
+    return poses.pose(model, PoseQuestion(controls, [0.0], "ok")).trust.supported
 
 
 def test_the_whole_graph_says_the_same(model):
