@@ -12,7 +12,7 @@ from rows import Row
 from model_export.evaluate.table1_family import Family
 from model_export.evaluate.table1_timing import in_turn
 from service.synthesis.crowd import BATCH
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer
 
 Profile = dict[str, Part]

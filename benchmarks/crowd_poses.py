@@ -10,7 +10,7 @@ from rows import Row
 
 from model_export.evaluate.table1_timing import in_turn
 from service.synthesis.crowd import BATCH
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer
 
 MANY = 10_000

@@ -23,7 +23,7 @@ from model_export.evaluate.table1_family import Family
 from model_export.evaluate.table1_timing import in_turn
 from service.motion.conventions import Indices, Singles
 from service.synthesis.crowd import BATCH
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer
 
 MANY, FEW, CHECKED = 10_000, 1_000, 200

@@ -17,7 +17,7 @@ from service.motion import skeleton
 from service.motion.conventions import Floats, Indices, Singles
 from service.synthesis import view
 from service.synthesis.crowd import BATCH
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 from service.synthesis.walk import company, plane, stride

@@ -14,7 +14,8 @@ from service.synthesis import session
 from service.synthesis.exact import holding
 from service.synthesis.exact.aims import Place
 from service.synthesis.exact.holding import Bench
-from service.synthesis.session import OUTPUTS, Session, State
+from service.synthesis.ports import OUTPUTS
+from service.synthesis.session import Session, State
 
 FRAMES, TARGETS = 100, 64
 # A hand that ends some way from where the model puts it, m; a captured one may.

@@ -32,6 +32,7 @@ from service.export.query import Source
 from service.export.reading import Defaults
 from service.export.target import open_target
 from service.synthesis import intake
+from service.synthesis.clips import clip
 
 ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
 LONGER = 8
@@ -162,7 +163,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
     name = bench.work.job.model.partition("@")[0]
     opened = intake.opened(name, name, bench.work.model)
     encoder = ENCODERS[form]
-    answers = [opened.clip(query.question) for query in asked]
+    answers = [clip(opened, query.question) for query in asked]
     files = encoder.write(answers, encoder.usual)
     entries = partial(_entries, asked, answers, files)
     with tempfile.TemporaryDirectory() as folder:
@@ -170,7 +171,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
         target.prepare()
         named = [(f"{index}.{form}", content) for index, content in enumerate(files)]
         stages: dict[str, Callable[[], object]] = {
-            "synthesis": lambda: [opened.clip(query.question) for query in asked],
+            "synthesis": lambda: [clip(opened, query.question) for query in asked],
             "encoding": lambda: encoder.write(answers, encoder.usual),
             "checksum and line of the manifest": entries,
             "file system": lambda: target.write(named),

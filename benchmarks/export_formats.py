@@ -13,8 +13,8 @@ from model_export.evaluate.table1_family import Family
 from model_export.evaluate.table1_timing import in_turn
 from service.encode import ENCODERS
 from service.motion.answer import ClipAnswer
-from service.synthesis import session
-from service.synthesis.question import ClipQuestion
+from service.synthesis import clips, poses, session
+from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 FRAMES, BATCH = 100, 16
@@ -26,7 +26,7 @@ def rows(made: Family) -> list[Row]:
     """What a clip of 100 frames takes to synthesise, and what to write in each format."""
     model = Synthesizer("reaching", session.open_bytes(made.exported.content, "reaching"))
     question = _question(model)
-    answers = [model.clip(question)] * BATCH
+    answers = [clips.clip(model, question)] * BATCH
     taken = in_turn(
         {"synthesis": partial(_synthesised, model, question), **_writers(answers)},
         rounds=9,
@@ -39,12 +39,12 @@ def rows(made: Family) -> list[Row]:
 def _question(model: Synthesizer) -> ClipQuestion:
     """A clip in the middle of the controls, at the rate at which it has so many frames."""
     middle = {control.name: control.default for control in model.session.card.controls}
-    duration = model.pose(middle, [0.0], "refuse").trust.duration
+    duration = poses.pose(model, PoseQuestion(middle, [0.0], "refuse")).trust.duration
     return ClipQuestion(middle, (FRAMES - 1) / duration)
 
 
 def _synthesised(model: Synthesizer, question: ClipQuestion) -> list[ClipAnswer]:
-    return [model.clip(question) for _ in range(BATCH)]
+    return [clips.clip(model, question) for _ in range(BATCH)]
 
 
 def _writers(answers: list[ClipAnswer]) -> dict[str, Callable[[], list[bytes]]]:

@@ -16,7 +16,7 @@ import orjson
 import uvicorn
 
 from service.synthesis import session
-from service.synthesis.synthesizer import ANSWERED
+from service.synthesis.poses import ANSWERED
 
 
 def main(model: Path, port: int) -> None:

@@ -26,7 +26,8 @@ from service.motion.detail import Level
 from service.motion.errors import ExportRefused
 from service.motion.field import Hyper
 from service.synthesis import session
-from service.synthesis.session import OUTPUTS, Session
+from service.synthesis.ports import OUTPUTS
+from service.synthesis.session import Session
 
 POINTS, BATCH = 10_000, 1_000
 # No joint of the graph's answer may lie farther from the reference's, m.

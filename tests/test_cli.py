@@ -16,8 +16,8 @@ from service import __version__
 from service.encode import ENCODERS
 from service.encode.convention import Convention
 from service.motion import bvh
-from service.synthesis import library
-from service.synthesis.question import ClipQuestion
+from service.synthesis import clips, library, poses
+from service.synthesis.question import ClipQuestion, PoseQuestion
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
@@ -355,7 +355,8 @@ def test_pose_answers_as_json(posefield, model_path):
     assert np.shape(said["root_position"]) == (2, 3)
     assert np.shape(said["bone_offsets"]) == (33, 3)
     assert said["trust"]["controls"] == POINT and said["trust"]["warnings"] == []
-    expected = library.load([model_path]).models["reaching"].pose(POINT, [0.25, 0.5], "warn")
+    model = library.load([model_path]).models["reaching"]
+    expected = poses.pose(model, PoseQuestion(POINT, [0.25, 0.5]))
     assert np.abs(said["rotations"] - expected.rotations).max() < 1e-6
 
 
@@ -461,7 +462,8 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
     path = tmp_path / "new" / f"clip.{ending}"
     code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
     assert (code, err) == (0, "")
-    answer = library.load([model_path]).models["reaching"].clip(ClipQuestion(POINT, 30.0, "warn"))
+    model = library.load([model_path]).models["reaching"]
+    answer = clips.clip(model, ClipQuestion(POINT, 30.0, "warn"))
     said = json.loads(out)
     assert said == {
         "file": str(path),
@@ -504,7 +506,7 @@ def test_clip_names_joints_and_measures_as_asked_for(posefield, model_path, tmp_
     assert found["names"][9:12] == ["Spine", "Spine1", "Spine2"]
     assert (found["units"]["length"], found["units"]["up"]) == ("centimetre", "Z")
     asked = ClipQuestion(POINT, names="humanik", root="in_place")
-    answer = library.load([model_path]).models["reaching"].clip(asked)
+    answer = clips.clip(library.load([model_path]).models["reaching"], asked)
     assert path.read_bytes() == ENCODERS["json"].encode(answer, Convention(0.01, "z"))
 
 

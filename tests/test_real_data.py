@@ -10,8 +10,8 @@ import pytest
 from model_export import align, data, export, ingest, recipe, samples, train
 from service.motion import ground, quat
 from service.motion.conventions import UP
-from service.synthesis import session
-from service.synthesis.question import ClipQuestion
+from service.synthesis import clips, poses, session
+from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import company, detail, gait, march, skating
 
@@ -147,7 +147,7 @@ def test_performers_are_told_apart(made):
 
 
 def test_a_clip_at_the_middle_begins_at_the_origin_and_faces_ahead(made, model):
-    answer = model.clip(ClipQuestion(middle(model), 30.0, "refuse"))
+    answer = clips.clip(model, ClipQuestion(middle(model), 30.0, "refuse"))
     first = answer.clip.root_path[0]
     assert np.abs(first * (1.0 - UP)).max() < 0.02
     assert 0.7 < first[1] < 1.1
@@ -160,7 +160,7 @@ def test_a_clip_at_the_middle_begins_at_the_origin_and_faces_ahead(made, model):
 
 
 def test_a_clip_moves_as_a_body_does(model):
-    clip = model.clip(ClipQuestion(middle(model), 120.0, "refuse")).clip
+    clip = clips.clip(model, ClipQuestion(middle(model), 120.0, "refuse")).clip
     places = clip.positions()
     # Nothing is faster than 8 m/s, below the floor or farther than two metres from the hips.
     assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() * 120.0 < 8.0
@@ -215,8 +215,8 @@ def test_known_flips_are_found_cleaned_and_told(made):
 @pytest.mark.parametrize("made", ["cmu_walk"], indirect=True)
 def test_a_walk_closes_its_loop(made, model):
     assert made[0].motion.cyclic
-    duration = model.pose(middle(model), [0.0], "warn").trust.duration
-    clip = model.clip(ClipQuestion(middle(model), 100 / duration, "warn")).clip
+    duration = poses.pose(model, PoseQuestion(middle(model), [0.0])).trust.duration
+    clip = clips.clip(model, ClipQuestion(middle(model), 100 / duration, "warn")).clip
     facing = quat.about(UP, -ingest.heading(clip))[:, None]
     body = quat.rotate(facing, clip.positions() - clip.root_path[:, None])
     away = np.linalg.norm(body - body[0], axis=-1).max(axis=1)

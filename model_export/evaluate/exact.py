@@ -22,7 +22,8 @@ from service.synthesis import session
 from service.synthesis.exact import holding
 from service.synthesis.exact.aims import Place
 from service.synthesis.exact.holding import Bench, Held
-from service.synthesis.session import OUTPUTS, Session, State
+from service.synthesis.ports import OUTPUTS
+from service.synthesis.session import Session, State
 
 # How much farther from the root than the captured place, m: what should be told to be too far, and
 # what certainly is.

@@ -1,6 +1,5 @@
 """`posefield pose` and `posefield clip`: one motion of a model."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -27,10 +26,10 @@ from service.cli.arguments import (
     numbers,
     open_model,
 )
-from service.encode import poses
+from service.encode import POSE_ENCODERS
 from service.motion import files
-from service.synthesis import spelling
-from service.synthesis.question import ClipQuestion
+from service.synthesis import clips, poses, spelling
+from service.synthesis.question import ClipQuestion, PoseQuestion
 
 
 def pose(
@@ -47,12 +46,12 @@ def pose(
 ) -> None:
     """Answer with the pose at one or more times, as JSON."""
     synthesizer = open_model(model)
-    asked, times = numbers(control or []), time or [0.0]
+    controls, times = numbers(control or []), time or [0.0]
     held = spelling.hold(exact, target or (), pin_feet)
-    answer = synthesizer.pose(asked, times, extrapolate, performer, level, held)
+    asked = PoseQuestion(controls, times, extrapolate, performer, level, joint_sigma, held)
+    answer = poses.pose(synthesizer, asked)
     tell(answer.trust)
-    trust = synthesizer.by_joint(answer.trust) if joint_sigma else answer.trust
-    typer.echo(poses.json(replace(answer, trust=trust)).decode())
+    typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
 
 
 def clip(
@@ -87,7 +86,7 @@ def clip(
         joint_sigma=joint_sigma,
         hold=held,
     )
-    answer = synthesizer.clip(asked)
+    answer = clips.clip(synthesizer, asked)
     files.write(found.encode(answer, convention), output)
     tell(answer.trust)
     typer.echo(wrote(output, answer, json))

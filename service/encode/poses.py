@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from service.encode import tables
 from service.encode.tables import Table, single
 from service.motion.answer import PoseAnswer
 
@@ -18,8 +17,3 @@ def table(answer: PoseAnswer[Any]) -> Table:
         {"trust": answer.trust.facts()},
         {"bone_offsets": single(answer.bone_offsets)},
     )
-
-
-def json(answer: PoseAnswer[Any]) -> bytes:
-    """One JSON object: schema PoseAnswer of the contract."""
-    return tables.json(table(answer))

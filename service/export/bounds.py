@@ -1,6 +1,6 @@
 """Whether many rows at once certainly pass the model's door, which looks at one at a time.
 
-Whatever passes here passes `Synthesizer.check`; of what does not, that says what is wrong.
+Whatever passes here passes `clips.check`; of what does not, that says what is wrong.
 """
 
 import math

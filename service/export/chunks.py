@@ -17,6 +17,7 @@ from service.export.query import KEPT, Fault, Query
 from service.export.target import open_target
 from service.motion.answer import ClipAnswer
 from service.motion.errors import InvalidField, QueryError
+from service.synthesis import clips
 from service.synthesis.synthesizer import Synthesizer
 
 CLIPS, POSES = 128, 8192
@@ -114,7 +115,7 @@ class _Chunk:
                 self._note(row.place, row.message)
                 continue
             try:
-                answer = self.synthesizer.clip(row.question)
+                answer = clips.clip(self.synthesizer, row.question)
             except QueryError as fault:
                 self._note(row.place, str(fault))
             else:

@@ -7,6 +7,7 @@ from service.encode import Encoder
 from service.encode.convention import Convention
 from service.export import manifest
 from service.export.query import Query
+from service.synthesis import clips
 from service.synthesis.question import Prospect
 from service.synthesis.synthesizer import Synthesizer
 
@@ -35,8 +36,8 @@ class Order:
             ),
             "miss some target": sum(prospect.missed for prospect in self.prospects),
         }
-        clips = len(self.prospects)
-        return [f"{count} of {clips} clips {said}" for said, count in counts.items() if count]
+        every = len(self.prospects)
+        return [f"{count} of {every} clips {said}" for said, count in counts.items() if count]
 
 
 def members(order: Order) -> Iterator[tuple[str, bytes]]:
@@ -53,7 +54,7 @@ def members(order: Order) -> Iterator[tuple[str, bytes]]:
 
 
 def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator[tuple[str, bytes]]:
-    answers = [order.model.clip(query.question) for query in queries]
+    answers = [clips.clip(order.model, query.question) for query in queries]
     contents = order.encoder.write(answers, order.convention)
     for query, answer, content in zip(queries, answers, contents, strict=True):
         file = f"{query.name}.{query.format}"

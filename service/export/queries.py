@@ -25,6 +25,7 @@ from service.export.originals import Original
 from service.export.query import Fault, Source
 from service.export.reading import Defaults, Reading
 from service.motion.errors import InvalidField, UnknownFormat
+from service.synthesis import clips
 from service.synthesis.synthesizer import Synthesizer
 
 METHOD, SEED = "latin", 0
@@ -104,7 +105,7 @@ def _check_usual(usual: Defaults, model: Synthesizer) -> None:
     if usual.format not in ENCODERS:
         raise UnknownFormat("format", f"{usual.format!r}, expected one of {', '.join(ENCODERS)}")
     middle = {control.name: control.default for control in model.session.card.controls}
-    model.check(replace(usual.question, controls=middle))
+    clips.check(model, replace(usual.question, controls=middle))
 
 
 def _blocks(asked: Asked, model: Synthesizer) -> tuple[_Blocks, dict[str, Any]]:

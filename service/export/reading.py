@@ -11,6 +11,7 @@ from service.export.columns import CONTROL, HELD
 from service.export.names import Seen, generated
 from service.export.query import KEPT, Fault, Query, Survey
 from service.motion.errors import QueryError
+from service.synthesis import clips
 from service.synthesis.question import ClipQuestion, Hold
 from service.synthesis.synthesizer import Synthesizer
 
@@ -115,7 +116,7 @@ class Reading:
     def _alone(self, block: Block) -> Table | Fault:
         try:
             table = Table(block, block.values())
-            self.model.check(next(self._queries(table)).question)
+            clips.check(self.model, next(self._queries(table)).question)
         except (ValueError, QueryError) as fault:
             return Fault(self.place(block.numbers[0]), str(fault))
         return table

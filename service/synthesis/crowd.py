@@ -65,7 +65,7 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     """Poses of a crowd where its characters stand.
 
     With a view, distances are those to where the characters were placed. Raises InvalidField and
-    OutsideSamples, with the index of the first character at fault, as `Synthesizer.pose` does for
+    OutsideSamples, with the index of the first character at fault, as `poses.pose` does for
     one.
     """
     card = model.session.card

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from service.motion.conventions import Floats
-from service.synthesis.session import OUTPUTS, Session
+from service.synthesis.ports import OUTPUTS
+from service.synthesis.session import Session
 
 BATCH = 512
 """Characters a call, each at one time, as a crowd asks."""

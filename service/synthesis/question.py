@@ -1,6 +1,6 @@
 """What a model can be asked for."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -50,6 +50,25 @@ ROOT: Root = "travelling"
 
 
 @dataclass(frozen=True)
+class PoseQuestion:
+    """Which poses: control values, times, s from the start of the clip, who moves, nobody that was
+    seen for none, and the level of detail.
+
+    extrapolate: what to do with controls like which nothing was captured, and with targets out of
+    reach. joint_sigma: whether the answer says how far each joint may err. hold: what the motion
+    has to meet exactly.
+    """
+
+    controls: Mapping[str, float]
+    times: Sequence[float]
+    extrapolate: Policy = POLICY
+    performer: str | None = None
+    level: int = 0
+    joint_sigma: bool = False
+    hold: Hold = HOLD
+
+
+@dataclass(frozen=True)
 class ClipQuestion:
     """Which clip: control values, frames a second, the part between start and end, s, who moves,
     nobody that was seen for none, and the level of detail.
@@ -78,6 +97,10 @@ class ClipQuestion:
     loop: bool = False
     joint_sigma: bool = False
     hold: Hold = HOLD
+
+
+MotionQuestion = PoseQuestion | ClipQuestion
+"""Either: both ask for a motion alike, and then for some of it."""
 
 
 @dataclass(frozen=True)

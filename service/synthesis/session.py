@@ -17,18 +17,8 @@ from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Singles
 from service.motion.errors import ModelError
 from service.motion.field import Weigher
-from service.synthesis import freeze
-
-INPUTS = {"controls": 2, "time": 2}
-PERFORMER, LEVEL = "performer", "level"
-OUTPUTS = {
-    "rotations": 4,
-    "root_position": 3,
-    "bone_offsets": 3,
-    "duration": 1,
-    "sigma": 1,
-    "travel": 3,
-}
+from service.synthesis import freeze, ports
+from service.synthesis.ports import OUTPUTS, PERFORMER
 
 # A model of 114 kB with four levels, all asked, takes 3.1 MB: twelve sessions, each with weights.
 OWN_MEMORY, COPIES = 2 << 20, 12
@@ -159,9 +149,9 @@ class Session:
 
     def trial(self) -> bytes:
         """Answer in the middle of the controls, asked anew: always `golden` of a sound model."""
-        answers = self.run(_middle(self.card), np.zeros((1, 1)), *OUTPUTS)
+        answers = self.run(ports.middle(self.card), np.zeros((1, 1)), *OUTPUTS)
         return b"".join(
-            answer.tobytes() for answer in (*answers, self.durations(_middle(self.card)))
+            answer.tobytes() for answer in (*answers, self.durations(ports.middle(self.card)))
         )
 
     def _feed(
@@ -209,9 +199,7 @@ def open_bytes(content: bytes, source: str) -> Session:
         card = cards.load(runtime.get_modelmeta().custom_metadata_map)
     except ValueError as fault:
         raise ModelError(source, str(fault)) from fault
-    _check_ports(runtime, card, source)
-    for level in range(len(card.levels)):
-        _check_answer(runtime, card, source, level)
+    ports.check(runtime, card, source)
     return _levelled(card, content, source)
 
 
@@ -249,43 +237,3 @@ def _start(content: bytes, source: str) -> Any:
     except Exception as fault:  # onnxruntime's exceptions share no base of their own
         first_line = str(fault).strip().splitlines()[0]
         raise ModelError(source, f"onnxruntime cannot load it: {first_line}") from fault
-
-
-def _check_ports(runtime: Any, card: ModelCard, source: str) -> None:
-    found = {p.name: len(p.shape) for p in runtime.get_inputs()}
-    if found != INPUTS:
-        raise ModelError(source, f"inputs (name: axes) {found}, expected {INPUTS}")
-    found = {p.name: len(p.shape) for p in runtime.get_outputs()}
-    if found != OUTPUTS:
-        raise ModelError(source, f"outputs (name: axes) {found}, expected {OUTPUTS}")
-    _check_options(runtime, card, source)
-
-
-def _check_options(runtime: Any, card: ModelCard, source: str) -> None:
-    """The graph takes a level, and as many labels as the card has names."""
-    performers = len(card.performers)
-    # onnxruntime lists inputs that have a default apart from the others.
-    found = {p.name: p.shape[1:] for p in runtime.get_overridable_initializers()}
-    expected: dict[str, list[Any]] = {PERFORMER: [performers]} if performers else {}
-    expected |= {LEVEL: []}
-    if found != expected:
-        raise ModelError(source, f"optional inputs (name: width) {found}, expected {expected}")
-
-
-def _check_answer(runtime: Any, card: ModelCard, source: str, level: int) -> None:
-    """Ask for the pose in the middle: a file whose weights are damaged shows here."""
-    feed = {"controls": _middle(card).astype(np.float32), "time": np.zeros((1, 1), np.float32)}
-    try:
-        answers = runtime.run([*OUTPUTS], {**feed, LEVEL: np.array(level)})
-    except Exception as fault:
-        raise ModelError(source, f"does not run: {str(fault).splitlines()[0]}") from fault
-    joints = len(card.skeleton)
-    if answers[0].shape != (1, 1, joints, 4):
-        raise ModelError(source, f"rotations {answers[0].shape}, expected (1, 1, {joints}, 4)")
-    if not all(np.isfinite(answer).all() for answer in answers):
-        raise ModelError(source, "answers with numbers that are not finite")
-
-
-def _middle(card: ModelCard) -> Floats:
-    """Controls (1, d) in the middle of what was sampled."""
-    return np.array([[control.default for control in card.controls]])

@@ -11,7 +11,8 @@ from service.motion.card import ModelCard
 from service.motion.conventions import Singles
 from service.motion.errors import InvalidField, OutsideSamples
 from service.synthesis import limits
-from service.synthesis.session import PERFORMER, Session
+from service.synthesis.ports import PERFORMER
+from service.synthesis.session import Session
 
 # Poses of a call: more leave a core's cache between one operator and the next.
 BATCH = 1536

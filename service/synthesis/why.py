@@ -40,7 +40,7 @@ class WhyQuestion:
 def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
     """Reasons for the answer at these controls.
 
-    Raises as `Synthesizer.pose` does, and InvalidField for a model that was trained before cards
+    Raises as `poses.pose` does, and InvalidField for a model that was trained before cards
     said what weights hang on.
     """
     card = model.session.card

@@ -7,7 +7,9 @@ is answered at once.
 import asyncio
 from asyncio import Future
 
-from service.synthesis.synthesizer import Moments, Row, Synthesizer
+from service.synthesis import poses
+from service.synthesis.poses import Moments, Row
+from service.synthesis.synthesizer import Synthesizer
 from service.web import metrics
 
 MOST = 64
@@ -26,9 +28,9 @@ class Batcher:
     async def row(self, model: Synthesizer, asked: Moments) -> Row:
         """What the model's graph says to a question; the same bytes whoever else asks."""
         self._arrive()
-        if self._before < 2 or len(asked.when) > 1 or not model.exact(asked.level):
+        if self._before < 2 or len(asked.when) > 1 or not poses.exact(model, asked.level):
             metrics.batched(1)
-            return model.poses([asked])[0]
+            return poses.rows(model, [asked])[0]
         return await self._together(model, asked)
 
     def _arrive(self) -> None:
@@ -60,7 +62,7 @@ class Batcher:
 def _ask(model: Synthesizer, own: Waiting) -> None:
     metrics.batched(len(own))
     try:
-        rows = model.poses([asked for asked, _ in own])
+        rows = poses.rows(model, [asked for asked, _ in own])
     except Exception as fault:
         for _, future in own:
             if not future.done():

@@ -12,6 +12,7 @@ from service.export.cells import LEGAL_NAME
 from service.export.pack import Order
 from service.export.query import Query
 from service.motion.errors import InvalidField, QueryError
+from service.synthesis import clips
 from service.synthesis.question import Prospect
 from service.synthesis.synthesizer import Synthesizer
 from service.web import decoding, problems, query
@@ -81,7 +82,7 @@ def _prospects(model: Synthesizer, queries: Sequence[Query], most: int) -> list[
     found, poses = [], 0
     for each in queries:
         try:
-            found.append(model.prospect(each.question))
+            found.append(clips.prospect(model, each.question))
         except QueryError as error:
             raise problems.within(error, each.place) from None
         poses += found[-1].frames

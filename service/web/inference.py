@@ -9,8 +9,8 @@ from starlette.responses import Response
 
 import service as package
 from service.motion.errors import QueryError
-from service.synthesis import session, tensors
-from service.synthesis.session import LEVEL, PERFORMER
+from service.synthesis import ports, tensors
+from service.synthesis.ports import LEVEL, PERFORMER
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.tensors import TensorQuestion
 from service.web import answers, body, inference_query, problems
@@ -112,8 +112,7 @@ def _outputs(joints: int) -> dict[str, list[int]]:
     timed = ("rotations", "root_position", "travel")
     inner["travel"] = [3]
     return {
-        name: [-1, *([-1] if name in timed else []), *inner.get(name, [])]
-        for name in session.OUTPUTS
+        name: [-1, *([-1] if name in timed else []), *inner.get(name, [])] for name in ports.OUTPUTS
     }
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from service.motion.card import ModelCard
 from service.motion.conventions import Singles
 from service.motion.errors import InvalidField, QueryError
-from service.synthesis import session
-from service.synthesis.session import LEVEL, PERFORMER
+from service.synthesis import ports
+from service.synthesis.ports import LEVEL, PERFORMER
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.tensors import TensorQuestion
 from service.web import problems
@@ -29,14 +29,14 @@ def question(card: ModelCard, asked: Received) -> TensorQuestion:
     """Question of the inputs; RequestFault for one that is missing, unknown, given twice, or of
     another kind than the graph takes."""
     names = [given.name for given in asked.body.inputs]
-    known = [*session.INPUTS, *([PERFORMER] if card.performers else []), LEVEL]
+    known = [*ports.INPUTS, *([PERFORMER] if card.performers else []), LEVEL]
     for index, name in enumerate(names):
         if name not in known or name in names[:index]:
             detail = f"{name!r}, expected each of {', '.join(known)} at most once"
             raise unfit(detail, pointer("inputs", str(index), "name"))
     tensors = dict(zip(names, asked.tensors, strict=True))
     try:
-        controls, times = (_table(tensors, name) for name in session.INPUTS)
+        controls, times = (_table(tensors, name) for name in ports.INPUTS)
         labels = _table(tensors, PERFORMER) if PERFORMER in tensors else None
         return TensorQuestion(controls, times, labels, _level(tensors))
     except QueryError as error:
@@ -47,11 +47,11 @@ def outputs(asked: Received) -> dict[str, bool]:
     """Whether each output is sent as bytes, by name, in the order asked for; all where none was."""
     usual = asked.body.parameters.binary_data_output
     if not asked.body.outputs:
-        return dict.fromkeys(session.OUTPUTS, usual)
+        return dict.fromkeys(ports.OUTPUTS, usual)
     found: dict[str, bool] = {}
     for index, output in enumerate(asked.body.outputs):
-        if output.name not in session.OUTPUTS or output.name in found:
-            detail = f"{output.name!r}, expected each of {', '.join(session.OUTPUTS)} at most once"
+        if output.name not in ports.OUTPUTS or output.name in found:
+            detail = f"{output.name!r}, expected each of {', '.join(ports.OUTPUTS)} at most once"
             raise unfit(detail, pointer("outputs", str(index), "name"))
         own = output.parameters.binary_data
         found[output.name] = own if isinstance(own, bool) else usual

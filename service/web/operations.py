@@ -20,7 +20,7 @@ from service.encode.grids import GRID_ENCODERS
 from service.encode.packs import PACKS, Pack
 from service.export import pack as packing
 from service.motion.crowd import CrowdClip
-from service.synthesis import crowd
+from service.synthesis import clips, crowd
 from service.synthesis.course import MOST_POSES
 from service.synthesis.question import HOLD
 from service.synthesis.synthesizer import Synthesizer
@@ -197,9 +197,9 @@ async def _clip(
     most = poses_within(service.settings.output_limit, joints, encoder.per_joint)
     if model.keeper.measures or question.clip.hold != HOLD:
         # A correction takes some milliseconds, in which others would wait.
-        answer = await to_thread.run_sync(model.clip, question.clip, min(most, MOST_POSES))
+        answer = await to_thread.run_sync(clips.clip, model, question.clip, min(most, MOST_POSES))
     else:
-        answer = model.clip(question.clip, min(most, MOST_POSES))
+        answer = clips.clip(model, question.clip, min(most, MOST_POSES))
     if len(answer.clip) <= encoder.at_once:
         content = encoder.encode(answer, convention)
     else:

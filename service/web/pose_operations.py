@@ -1,8 +1,6 @@
 """Poses at some times, in the formats that programs read; in JSON no file to save."""
 
-from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from anyio import to_thread
 from starlette.requests import Request
@@ -10,11 +8,12 @@ from starlette.responses import Response
 
 from service.encode import POSE_ENCODERS, PoseEncoder
 from service.encode.media import JSON
-from service.motion.answer import PoseAnswer
+from service.synthesis import poses
 from service.synthesis.exact.goals import Goals
-from service.synthesis.synthesizer import Moments, Row, Synthesizer
+from service.synthesis.poses import Moments
+from service.synthesis.question import PoseQuestion
+from service.synthesis.synthesizer import Synthesizer
 from service.web import answers, body, query, service
-from service.web.query import PoseQuestion
 from service.web.service import Handler, Service
 
 
@@ -33,52 +32,30 @@ async def query_pose(encoder: PoseEncoder, served: Service, request: Request) ->
 async def _answer(
     served: Service, model: Synthesizer, question: PoseQuestion, encoder: PoseEncoder
 ) -> Response:
-    controls, times, policy = question.controls, question.times, question.extrapolate
-    who, level, hold = question.performer, question.level, question.hold
-    given = (controls, times, policy, who, level, hold)
-    # Open controls are chosen by what the model makes of every captured clip.
-    found = to_thread.run_sync(model.moments, *given) if hold.targets else None
-    asked = model.moments(*given) if found is None else await found
-    by_joint = question.joint_sigma
+    if question.hold.targets:
+        # Open controls are chosen by what the model makes of every captured clip.
+        asked = await to_thread.run_sync(poses.moments, model, question)
+    else:
+        asked = poses.moments(model, question)
     goals = model.keeper.goals(asked.question, question.hold)
     if goals:
-        content = await to_thread.run_sync(_held, model, asked, goals, question, encoder)
-    elif len(times) > encoder.at_once:
-        content = await to_thread.run_sync(_made, model, asked, encoder, by_joint)
+        content = await to_thread.run_sync(_held, model, asked, goals, encoder)
+    elif len(question.times) > encoder.at_once:
+        content = await to_thread.run_sync(_made, model, asked, encoder)
     else:
         row = await served.batcher.row(model, asked)
-        content = _encoded(model, asked, row, encoder, by_joint)
+        content = encoder.encode(poses.posed(model, asked, row))
     if encoder.media_type == JSON:
         return Response(content, media_type=JSON)
     return answers.attachment(content, encoder.media_type, f"{model.name}.{encoder.extension}")
 
 
-def _made(model: Synthesizer, asked: Moments, encoder: PoseEncoder, by_joint: bool) -> bytes:
-    return _encoded(model, asked, model.poses([asked])[0], encoder, by_joint)
+def _held(model: Synthesizer, asked: Moments, goals: Goals, encoder: PoseEncoder) -> bytes:
+    return encoder.encode(poses.held(model, asked, goals))
 
 
-def _held(
-    model: Synthesizer,
-    asked: Moments,
-    goals: Goals,
-    question: PoseQuestion,
-    encoder: PoseEncoder,
-) -> bytes:
-    answer = model.held_poses(asked, goals, question.extrapolate)
-    return _with_joints(model, answer, encoder, question.joint_sigma)
-
-
-def _encoded(
-    model: Synthesizer, asked: Moments, row: Row, encoder: PoseEncoder, by_joint: bool
-) -> bytes:
-    return _with_joints(model, model.posed(asked, row), encoder, by_joint)
-
-
-def _with_joints(
-    model: Synthesizer, answer: PoseAnswer[Any], encoder: PoseEncoder, by_joint: bool
-) -> bytes:
-    trust = model.by_joint(answer.trust) if by_joint else answer.trust
-    return encoder.encode(replace(answer, trust=trust))
+def _made(model: Synthesizer, asked: Moments, encoder: PoseEncoder) -> bytes:
+    return encoder.encode(poses.posed(model, asked, poses.rows(model, [asked])[0]))
 
 
 OPERATIONS: dict[str, Handler] = {

@@ -27,6 +27,7 @@ from service.synthesis.question import (
     Hold,
     Moment,
     Policy,
+    PoseQuestion,
     Root,
     Target,
     When,
@@ -44,20 +45,6 @@ Word = TypeVar("Word")
 # get_args takes a microsecond.
 _choices = cache(get_args)
 FLAGS = {"true": True, "false": False}
-
-
-@dataclass(frozen=True)
-class PoseQuestion:
-    """Which poses: control values and times, s, who moves, nobody that was seen for none, the
-    level of detail, whether sigma is asked for by joint, and what the motion is held to."""
-
-    controls: dict[str, float]
-    times: list[float]
-    extrapolate: Policy
-    performer: str | None = None
-    level: int = 0
-    joint_sigma: bool = False
-    hold: Hold = HOLD
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,9 @@ from asking import asker
 from pxr import Usd
 
 from service.motion import card as cards
+from service.synthesis import poses
 from service.synthesis.library import Library
+from service.synthesis.question import PoseQuestion
 from service.web import contract
 from service.web.app import build
 from service.web.operations import OPERATIONS
@@ -33,7 +35,7 @@ def test_the_card_is_the_whole_card(ask, loaded):
 @pytest.mark.parametrize("extension", FORMATS)
 def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded):
     model = loaded.find("reach")
-    trust = model.pose(controls, [0.0], "warn").trust
+    trust = poses.pose(model, PoseQuestion(controls, [0.0])).trust
     answer = ask("GET", url(f"{CLIP}.{extension}", controls))
     assert answer.headers["posefield-model"] == model.identity
     assert float(answer.headers["posefield-sigma"]) == trust.sigma

@@ -11,7 +11,7 @@ from asking import asker
 
 from service import __version__
 from service.synthesis import library
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer
 from service.web.app import create_app
 from service.web.settings import Settings

@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 from asking import asker
 
-from service.synthesis import library
+from service.synthesis import clips, library
 from service.web.app import create_app
 from service.web.settings import Settings
 
@@ -313,10 +313,9 @@ def test_a_time_that_no_float32_holds_is_refused_like_any_other(time, refuse, co
 
 
 def test_an_answer_too_large_to_make_is_not_made(loaded, controls, monkeypatch):
-    model = loaded.find("reach")
     small = asker(create_app(loaded, Settings(output_limit=64 * 1024)))
     url = f"/v1/models/reach/clip.usda?{urlencode({**controls, 'fps': 1000})}"
-    monkeypatch.setattr(type(model), "_answer", None)
+    monkeypatch.setattr(clips, "_answer", None)
     answer = small("GET", url)
     assert answer.status_code == 422 and "frames, expected at most" in answer.json()["detail"]
     few = {"controls": {n: [v] * 200 for n, v in controls.items()}, "time": 0}

@@ -21,10 +21,9 @@ import numpy as np
 import trained
 from compare import FURTHEST, TURNED
 
-from service.motion import clip as clips
 from service.motion import quat, skeleton
-from service.motion.clip import Clip
-from service.synthesis import session
+from service.motion.clip import Clip, assemble
+from service.synthesis import clips, session
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
@@ -167,14 +166,14 @@ class _Expected:
         changed = {key: value for key, value in other.items() if key != "body"}
         if "controls" in changed:
             changed["controls"] = question["controls"] | changed["controls"]
-        clip = self.model.clip(ClipQuestion(**question | changed)).clip
+        clip = clips.clip(self.model, ClipQuestion(**question | changed)).clip
         return self._on(body, _cycles(clip, self.case.get("cycles", 1)))
 
     def _on(self, body: str, clip: Clip) -> Clip:
         if body == "clip":
             return clip
         joints = [self.case["joints"].index(joint) for joint in clip.skeleton.names]
-        return clips.assemble(
+        return assemble(
             clip.skeleton, clip.rotations, clip.root_path, self.offsets[joints], clip.rate
         )
 

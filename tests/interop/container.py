@@ -18,8 +18,9 @@ import trained
 from image import Image
 
 from service import __version__
-from service.encode import ENCODERS, poses
-from service.synthesis.question import ClipQuestion
+from service.encode import ENCODERS, POSE_ENCODERS
+from service.synthesis import clips, poses
+from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web.access import keys
 from service.web.pages import viewer
@@ -138,9 +139,11 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
 def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
     """Faults of answers, which have to be those of here to the last byte."""
     controls = {control.name: control.default for control in model.session.card.controls}
-    clip = model.clip(ClipQuestion(controls))
+    clip = clips.clip(model, ClipQuestion(controls))
     expected = {
-        f"/v1/models/{model.name}/pose": poses.json(model.pose(controls, [0.5], "warn")),
+        f"/v1/models/{model.name}/pose": POSE_ENCODERS["json"].encode(
+            poses.pose(model, PoseQuestion(controls, [0.5]))
+        ),
         f"/v1/models/{model.name}/clip.usdc": ENCODERS["usdc"].encode(
             clip, ENCODERS["usdc"].convention(None, None)
         ),

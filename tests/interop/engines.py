@@ -20,7 +20,8 @@ import numpy as np
 import running
 import trained
 
-from service.synthesis.session import OUTPUTS, Session
+from service.synthesis.ports import OUTPUTS
+from service.synthesis.session import Session
 
 HERE = Path(__file__).parent
 VENV = environment.ROOT / ".venv-engines"

@@ -11,6 +11,7 @@ import numpy as np
 import trained
 
 from service.check import check
+from service.synthesis import clips
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
@@ -52,5 +53,5 @@ def _taken(model: Synthesizer, entry: dict, folder: Path) -> tuple[str, dict[str
     shutil.copyfile(made, path)
     expectation = folder / f"{path.name}.npz"
     question = ClipQuestion(entry["controls"], entry["fps"])
-    np.savez(expectation, **cases.matrices_of(model.clip(question).clip))
+    np.savez(expectation, **cases.matrices_of(clips.clip(model, question).clip))
     return path.name, {cases.WHO: expectation}

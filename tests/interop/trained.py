@@ -9,7 +9,7 @@ from model_export import export, ingest, recipe, train
 from model_export.recipe import Recipe
 from model_export.sample import stroll, write
 from service.motion.answer import ClipAnswer
-from service.synthesis import session
+from service.synthesis import clips, session
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
@@ -67,4 +67,4 @@ def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
 
 def _middle(model: Synthesizer) -> tuple[str, ClipAnswer]:
     controls = {control.name: control.default for control in model.session.card.controls}
-    return model.name, model.clip(ClipQuestion(controls, 30.0, "refuse"))
+    return model.name, clips.clip(model, ClipQuestion(controls, 30.0, "refuse"))

@@ -8,7 +8,7 @@ import pytest
 
 from model_export import export, ingest, train
 from model_export.recipe import Recipe
-from service.synthesis import session
+from service.synthesis import clips, session
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
@@ -78,7 +78,7 @@ def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp
 def head(path, who, level=0):
     """Path of the head in a clip of somebody, on the whole."""
     model = Synthesizer("small", session.load(path))
-    answer = model.clip(ClipQuestion({"speed": 4.0}, performer=who, level=level))
+    answer = clips.clip(model, ClipQuestion({"speed": 4.0}, performer=who, level=level))
     return answer.clip.positions()[:, 2].mean(axis=0)
 
 

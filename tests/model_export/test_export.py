@@ -18,7 +18,7 @@ from model_export.model import Outputs
 from service.motion import quat
 from service.motion.errors import ExportRefused
 from service.synthesis import session
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 
 # The gate's figure, m: float32 against float64.
 GATE = 1e-4

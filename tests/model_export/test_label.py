@@ -18,7 +18,7 @@ from model_export.model import Outputs
 from service.motion import card
 from service.motion.errors import ExportRefused, ModelError
 from service.synthesis import session
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 
 SAMPLES, CONTROLS, BATCH = 25, 3, 40
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])

@@ -13,7 +13,7 @@ from model_export.recipe import Detail
 from service.motion import skeleton
 from service.motion.errors import TrainingError
 from service.synthesis import freeze, session
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 
 HAND = "LeftHand"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from model_export.report import curve, detail, render
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 
 SLOWER = (4e-6, 3e-6, 2e-6, 1e-6)
 

@@ -5,7 +5,7 @@ import pytest
 
 from service.encode import CROWD_ENCODERS, ENCODERS, poses_within
 from service.motion.crowd import Placement
-from service.synthesis import crowd, session
+from service.synthesis import clips, crowd, session
 from service.synthesis.crowd_question import CrowdQuestion
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
@@ -30,7 +30,7 @@ def test_no_clip_takes_more_than_was_reckoned(name, model):
     joints, encoder = len(model.session.card.skeleton) + 1, ENCODERS[name]
     for share in SHARES:
         question = controls(model, share)
-        long, short = (model.clip(ClipQuestion(question, fps=f)) for f in (400.0, 200.0))
+        long, short = (clips.clip(model, ClipQuestion(question, fps=f)) for f in (400.0, 200.0))
         more = len(encoder.encode(long)) - len(encoder.encode(short))
         per_joint = more / (len(long.clip) - len(short.clip)) / joints
         assert encoder.per_joint / 3 < per_joint < encoder.per_joint

@@ -15,6 +15,7 @@ from pxr import Usd, UsdSkel
 from service import check
 from service.export import run
 from service.motion.errors import InvalidField, UsdError
+from service.synthesis import clips
 from service.synthesis import library as synthesis
 
 ROWS, CHUNK = 20, 8
@@ -56,9 +57,9 @@ def test_an_archive_for_each_chunk_holds_the_files_of_the_folders(layout, made):
     archives = {f"clips-{n:06d}.{layout}" for n in range(3)}
     assert names == {*archives, "manifest.jsonl", "export.json"}
     members = list(unpacked(made[layout], layout))
-    clips = {name: content for name, content in members if not name.startswith("manifest")}
+    found = {name: content for name, content in members if not name.startswith("manifest")}
     loose = exporting.content(made["folder"])
-    assert clips == {path: content for path, content in loose.items() if path.startswith("clips")}
+    assert found == {path: content for path, content in loose.items() if path.startswith("clips")}
 
 
 @pytest.mark.parametrize("layout", ["tar", "zip"])
@@ -127,7 +128,7 @@ def test_a_library_is_one_character_that_can_play_every_clip(made, source, model
     skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skel"))
     source_of = UsdSkel.BindingAPI(skeleton).GetAnimationSourceRel()
     for row, query in enumerate(source.rows()):
-        clip = synthesizer.clip(query.question).clip
+        clip = clips.clip(synthesizer, query.question).clip
         source_of.SetTargets([f"/Character/Clips/{query.name.replace('-', '_')}"])
         cache, root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Character"))
         cache.Populate(root, Usd.PrimDefaultPredicate)
@@ -136,7 +137,7 @@ def test_a_library_is_one_character_that_can_play_every_clip(made, source, model
         # float32 keeps 1e-7 of a coordinate, and errors add up along the chain of joints.
         assert found == pytest.approx(clip.positions()[-1], abs=1e-5)
         # Negative control: its neighbour ends elsewhere.
-        other = synthesizer.clip(list(source.rows())[row - 1].question).clip
+        other = clips.clip(synthesizer, list(source.rows())[row - 1].question).clip
         assert np.abs(found - other.positions()[-1]).max() > 1e-4
 
 

@@ -11,7 +11,7 @@ from service.encode.convention import METRES
 from service.export import pack
 from service.export.pack import CLIPS, POSES, Order
 from service.export.query import Query
-from service.synthesis import session
+from service.synthesis import clips, session
 from service.synthesis.question import ClipQuestion, Prospect
 from service.synthesis.synthesizer import Synthesizer
 
@@ -35,7 +35,7 @@ def order(model):
         questions = [ClipQuestion(middle, fps=rate) for rate in rates]
         queries = [Query(f"c{i}", "json", q, f"/clips/{i}") for i, q in enumerate(questions)]
         encoder = dataclasses.replace(ENCODERS["json"], write=write)
-        prospects = [model.prospect(question) for question in questions]
+        prospects = [clips.prospect(model, question) for question in questions]
         return Order(model, encoder, METRES, queries, prospects)
 
     return ordered, made

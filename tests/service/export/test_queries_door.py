@@ -6,7 +6,7 @@ from rowing import POINT, rows, source, write_csv
 from service.export.columns import HELD, OPTIONS
 from service.export.queries import Defaults
 from service.motion.errors import FileError, InvalidField, OutsideSamples, UnknownFormat
-from service.synthesis import library
+from service.synthesis import clips, library
 from service.synthesis.question import ClipQuestion, Hold
 
 
@@ -101,5 +101,5 @@ def test_a_refusal_before_a_row_is_the_same_as_in_one(model, table):
     beyond = write_csv(table, [{**POINT, "turn": 99.0}])
     (fault,) = rows(model, beyond, usual)
     with pytest.raises(OutsideSamples) as caught:
-        model.check(ClipQuestion({**POINT, "turn": 99.0}, extrapolate="refuse"))
+        clips.check(model, ClipQuestion({**POINT, "turn": 99.0}, extrapolate="refuse"))
     assert fault.message == str(caught.value)

@@ -10,8 +10,9 @@ from service.motion import quat, skeleton
 from service.motion.conventions import UP
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField, OutsideSamples
-from service.synthesis import crowd, library
+from service.synthesis import crowd, library, poses
 from service.synthesis.crowd_question import Blending, CrowdQuestion
+from service.synthesis.question import PoseQuestion
 from service.synthesis.view import Camera, View
 
 COUNT = 60
@@ -63,13 +64,9 @@ def of(model, found):
 def alone(model, question, row):
     """Joints (J, 3) of one character asked for by itself, and what its answer is worth."""
     controls = {name: float(values[row]) for name, values in question.controls.items()}
-    answer = model.pose(
-        controls,
-        [float(question.times[row])],
-        "warn",
-        question.performers[question.performer[row]],
-        int(question.detail[row]),
-    )
+    time, level = float(question.times[row]), int(question.detail[row])
+    who = question.performers[question.performer[row]]
+    answer = poses.pose(model, PoseQuestion(controls, [time], performer=who, level=level))
     parents = model.session.card.skeleton.parents
     found = joints(answer.rotations, answer.root_position, answer.bone_offsets[None], parents)
     turn = quat.about(UP, question.placement.headings[row])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from service.motion.errors import InvalidField
-from service.synthesis import library
+from service.synthesis import library, poses
 from service.synthesis.grid import BATCH, GridQuestion, grid
+from service.synthesis.question import PoseQuestion
 
 ASKED = GridQuestion("turn", "target_height", 7, 5, {"stature": 1.7}, "tall", 0.3)
 
@@ -23,7 +24,7 @@ def test_each_point_is_the_sigma_of_an_answer(model):
     for row, along in enumerate(found.along.values):
         for column, across in enumerate(found.across.values):
             controls = {**fixed, "turn": across, "target_height": along}
-            trust = model.pose(controls, [0.0], "warn", "tall").trust
+            trust = poses.pose(model, PoseQuestion(controls, [0.0], performer="tall")).trust
             # One row of a product is summed in another order than many.
             assert abs(found.sigma[row, column] - trust.sigma) < 1e-6
             assert found.supported[row, column] == trust.supported
@@ -52,7 +53,7 @@ def test_support_is_what_an_answer_says_of_itself(model, stature):
 
 def supported(model, found, across, along):
     controls = {**found.controls, "turn": across, "target_height": along}
-    return model.pose(controls, [0.0], "ok").trust.supported
+    return poses.pose(model, PoseQuestion(controls, [0.0], "ok")).trust.supported
 
 
 def test_the_whole_graph_says_the_same(model):

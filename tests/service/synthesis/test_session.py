@@ -11,7 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from service.motion.errors import ModelError
 from service.synthesis import session
-from service.synthesis.session import OUTPUTS
+from service.synthesis.ports import OUTPUTS
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.synthesis import session
+from service.synthesis import poses, session
+from service.synthesis.question import PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 KINDS = ("model_path", "labelled_path", "walk_path")
@@ -25,7 +26,9 @@ def question(model, place, level):
     controls = {c.name: low + s * span for (c, low, span), s in zip(ranges, shares, strict=False)}
     names = (None, *card.performers)
     time *= card.durations[0]
-    return model.moments(controls, [time], "warn", names[who % len(names)], level)
+    return poses.moments(
+        model, PoseQuestion(controls, [time], performer=names[who % len(names)], level=level)
+    )
 
 
 # Beyond what was sampled too.
@@ -38,13 +41,13 @@ PLACE = st.tuples(st.tuples(*[SHARE] * 4), st.floats(0.0, 0.5), st.integers(0, 9
 def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, data):
     level = data.draw(st.integers(0, len(model.session.card.levels) - 1))
     asked = [question(model, place, level) for place in places]
-    for each, row in zip(asked, model.poses(asked), strict=True):
-        (own,) = model.poses([each])
+    for each, row in zip(asked, poses.rows(model, asked), strict=True):
+        (own,) = poses.rows(model, [each])
         assert [a.tobytes() for a in row] == [a.tobytes() for a in own]
 
 
 def test_every_level_is_known_to_be_exact(model):
-    assert all(model.exact(level) for level in range(len(model.session.card.levels)))
+    assert all(poses.exact(model, level) for level in range(len(model.session.card.levels)))
 
 
 def test_a_graph_that_sums_by_place_is_found_out(model_path, tmp_path):
@@ -60,4 +63,4 @@ def test_a_graph_that_sums_by_place_is_found_out(model_path, tmp_path):
     onnx.save(graph, path)
     model = Synthesizer("reaching", session.load(path))
     assert len(columns) == 1
-    assert not model.exact(0)
+    assert not poses.exact(model, 0)

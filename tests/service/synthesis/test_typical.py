@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from service.motion.errors import InvalidField
-from service.synthesis import session, typical
-from service.synthesis.question import ClipQuestion
+from service.synthesis import clips, poses, session, typical
+from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.typical import Chooser, fit
 from service.synthesis.why import WhyQuestion, why
@@ -118,8 +118,8 @@ def test_a_performer_who_is_named_is_typical_of_himself(card):
 
 def left_out(model, asked):
     """A question's answer, and that of the whole question with what was chosen."""
-    part = model.clip(asked)
-    whole = model.clip(replace(asked, controls=part.trust.controls))
+    part = clips.clip(model, asked)
+    whole = clips.clip(model, replace(asked, controls=part.trust.controls))
     return part, whole
 
 
@@ -134,14 +134,14 @@ def test_the_answer_is_that_of_the_whole_question(model, given, performer):
     assert replace(part.trust, inferred=()) == whole.trust
     for field in ("rotations", "translations"):
         assert getattr(part.clip, field).tobytes() == getattr(whole.clip, field).tobytes()
-    other = model.clip(replace(asked, controls={**part.trust.controls, "turn": -20.0}))
+    other = clips.clip(model, replace(asked, controls={**part.trust.controls, "turn": -20.0}))
     assert other.clip.rotations.tobytes() != whole.clip.rotations.tobytes(), "negative control"
 
 
 def test_poses_and_reasons_choose_alike(model):
     given = {"target_height": 1.2}
-    clip = model.clip(ClipQuestion(given)).trust
-    pose = model.pose(given, [0.1], "warn").trust
+    clip = clips.clip(model, ClipQuestion(given)).trust
+    pose = poses.pose(model, PoseQuestion(given, [0.1])).trust
     reasons = why(model, WhyQuestion(given, "warn"))
     assert clip.controls == pose.controls == reasons.controls
     assert clip.inferred == pose.inferred == reasons.inferred
@@ -153,22 +153,23 @@ def test_poses_and_reasons_choose_alike(model):
 def test_another_process_would_choose_the_same(model, labelled_path):
     again = Synthesizer("labelled", session.load(labelled_path))
     given = {"turn": -3.0}
-    assert again.pose(given, [0.0], "warn").trust == model.pose(given, [0.0], "warn").trust
+    asked = PoseQuestion(given, [0.0])
+    assert poses.pose(again, asked).trust == poses.pose(model, asked).trust
 
 
 def test_only_what_is_given_is_warned_of(model, card):
     high = card.control("target_height").maximum + 0.2
-    trust = model.pose({"target_height": high}, [0.0], "warn").trust
+    trust = poses.pose(model, PoseQuestion({"target_height": high}, [0.0])).trust
     assert len(trust.warnings) == 1 and trust.warnings[0].startswith("target_height")
     # All that was given is sampled: nothing that was chosen makes it refused.
     for turn in (card.control("turn").minimum, card.control("turn").maximum):
-        assert model.pose({"turn": turn}, [0.0], "refuse").trust.warnings == ()
+        assert poses.pose(model, PoseQuestion({"turn": turn}, [0.0], "refuse")).trust.warnings == ()
 
 
 def test_what_is_unknown_or_no_number_is_refused_all_the_same(model):
     with pytest.raises(InvalidField, match="no such control; this model has stature"):
-        model.pose({"speed": 1.0}, [0.0], "warn")
+        poses.pose(model, PoseQuestion({"speed": 1.0}, [0.0]))
     with pytest.raises(InvalidField, match="nan, expected a finite number"):
-        model.pose({"turn": float("nan")}, [0.0], "warn")
+        poses.pose(model, PoseQuestion({"turn": float("nan")}, [0.0]))
     with pytest.raises(InvalidField, match="expected one of middle, short, tall"):
-        model.pose({}, [0.0], "warn", "eve")
+        poses.pose(model, PoseQuestion({}, [0.0], performer="eve"))

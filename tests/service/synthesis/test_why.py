@@ -9,7 +9,8 @@ import pytest
 from service.motion.answer import Reasons
 from service.motion.errors import InvalidField, OutsideSamples
 from service.motion.field import Weigher
-from service.synthesis import library, session
+from service.synthesis import library, poses, session
+from service.synthesis.question import PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.why import WhyQuestion, why
 
@@ -147,7 +148,8 @@ def test_a_model_older_than_sources_still_loads_and_says_that_it_cannot_say(mode
     graph.metadata_props.extend(kept)
     old = Synthesizer("old", session.open_bytes(graph.SerializeToString(), "old"))
     point = [c.default for c in old.session.card.controls]
-    assert old.pose(asked(old.session.card, point).controls, [0.0], "warn").trust.sigma > 0.0
+    controls = asked(old.session.card, point).controls
+    assert poses.pose(old, PoseQuestion(controls, [0.0])).trust.sigma > 0.0
     with pytest.raises(InvalidField, match="train it again") as caught:
         why(old, asked(old.session.card, point))
     assert caught.value.field == "model"

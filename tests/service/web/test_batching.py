@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from service.motion.errors import InvalidField
-from service.synthesis import session
+from service.synthesis import poses, session
+from service.synthesis.question import PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web.batching import MOST, Batcher
 
@@ -21,19 +22,19 @@ def model(walk_path):
 @pytest.fixture
 def calls(model, monkeypatch):
     """How many questions each call of the graph answered."""
-    made, poses = [], Synthesizer.poses
+    made, rows = [], poses.rows
 
-    def counted(self, asked):
+    def counted(model, asked):
         made.append(len(asked))
-        return poses(self, asked)
+        return rows(model, asked)
 
-    monkeypatch.setattr(Synthesizer, "poses", counted)
+    monkeypatch.setattr(poses, "rows", counted)
     return made
 
 
 def question(model, haste, time=0.1, level=0):
     controls = {c.name: c.default for c in model.session.card.controls} | {"haste": haste}
-    return model.moments(controls, [time], "warn", None, level)
+    return poses.moments(model, PoseQuestion(controls, [time], level=level))
 
 
 def together(model, asked, rounds=1):
@@ -52,7 +53,7 @@ def together(model, asked, rounds=1):
 
 def test_one_call_answers_all_of_a_turn(model, calls):
     asked = [question(model, haste) for haste in HASTE]
-    model.exact(0)
+    poses.exact(model, 0)
     calls.clear()
     together(model, asked)
     assert calls == [1, 1, MOST, MOST, 7]
@@ -61,14 +62,14 @@ def test_one_call_answers_all_of_a_turn(model, calls):
 def test_each_gets_the_bytes_that_it_gets_alone(model):
     asked = [question(model, haste) for haste in HASTE]
     for each, row in zip(asked, together(model, asked), strict=True):
-        (own,) = model.poses([each])
+        (own,) = poses.rows(model, [each])
         assert all(np.array_equal(a, b) for a, b in zip(row, own, strict=True))
 
 
 def test_levels_are_not_mixed(model, calls):
     levels = range(len(model.session.card.levels))
     asked = [question(model, 4.0, level=level) for level in levels for _ in range(3)]
-    [model.exact(level) for level in levels]
+    [poses.exact(model, level) for level in levels]
     calls.clear()
     together(model, asked)
     assert calls[2:] == [3] * len(levels)
@@ -91,20 +92,20 @@ def test_one_that_has_no_answer_harms_no_other(model):
     asked = [question(model, 4.0, time) for time in (0.1, 99.0, 0.2)]
     first, wrong, last = together(model, asked)
     with pytest.raises(InvalidField, match="99 s, expected 0 to"):
-        model.posed(asked[1], wrong)
+        poses.posed(model, asked[1], wrong)
     for each, row in ((asked[0], first), (asked[2], last)):
-        np.testing.assert_array_equal(model.posed(each, row).rotations, row[0])
+        np.testing.assert_array_equal(poses.posed(model, each, row).rotations, row[0])
 
 
 def test_a_fault_of_the_graph_reaches_everybody(model, monkeypatch):
-    def broken(self, asked):
+    def broken(model, asked):
         if len(asked) > 1:
             raise RuntimeError("broken")
-        return original(self, asked)
+        return original(model, asked)
 
-    original = Synthesizer.poses
-    model.exact(0)
-    monkeypatch.setattr(Synthesizer, "poses", broken)
+    original = poses.rows
+    poses.exact(model, 0)
+    monkeypatch.setattr(poses, "rows", broken)
     with pytest.raises(RuntimeError, match="broken"):
         together(model, [question(model, 4.0)] * 3)
 
@@ -126,6 +127,6 @@ def test_a_client_that_went_away_is_passed_over(model):
 
 
 def test_a_model_that_sums_by_place_is_asked_one_by_one(model, calls, monkeypatch):
-    monkeypatch.setattr(Synthesizer, "exact", lambda self, level: False)
+    monkeypatch.setattr(poses, "exact", lambda model, level: False)
     together(model, [question(model, 4.0)] * 5)
     assert set(calls) == {1}

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.synthesis.question import ClipQuestion
+from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.web import query
 from service.web.problems import RequestFault
-from service.web.query import FileQuestion, PoseQuestion
+from service.web.query import FileQuestion
 
 
 def test_a_query_and_a_body_are_one_pose_question():

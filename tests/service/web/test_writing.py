@@ -7,7 +7,7 @@ import pytest
 
 from service.encode import ENCODERS
 from service.encode.convention import CENTIMETRES, METRES
-from service.synthesis import session
+from service.synthesis import clips, session
 from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web import writing
@@ -21,7 +21,7 @@ def answers(walk_path):
     model = Synthesizer("walk", session.load(walk_path))
     controls = {c.name: c.default for c in model.session.card.controls}
     questions = (controls | {"haste": 3.0 + 0.1 * number} for number in range(40))
-    return [model.clip(ClipQuestion(question)) for question in questions]
+    return [clips.clip(model, ClipQuestion(question)) for question in questions]
 
 
 @pytest.fixture

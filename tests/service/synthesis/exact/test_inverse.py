@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from service.motion.measure import Measure
-from service.synthesis import session
+from service.synthesis import clips, session
 from service.synthesis.question import ClipQuestion, Hold, Target
 from service.synthesis.synthesizer import Synthesizer
 
@@ -25,13 +25,13 @@ def captured(model, index):
     """Controls of a captured clip, and where the model puts the hand there."""
     card = model.session.card
     controls = {c.name: v for c, v in zip(card.controls, card.examples[index], strict=True)}
-    clip = model.clip(ClipQuestion(controls, fps=200.0, hold=Hold("none"))).clip
+    clip = clips.clip(model, ClipQuestion(controls, fps=200.0, hold=Hold("none"))).clip
     return controls, clip.positions()[-1, card.skeleton.names.index("RightHand")]
 
 
 def asked(model, place, joint="RightHand", **given):
     hold = Hold(targets=(Target(joint, tuple(place), "end"),))
-    return model.clip(ClipQuestion(given, hold=hold)).trust
+    return clips.clip(model, ClipQuestion(given, hold=hold)).trust
 
 
 def off(model, controls, truth):
@@ -46,7 +46,7 @@ def test_controls_are_those_of_motions_that_get_there(reach):
     for index in range(0, 46, 5):
         truth, place = captured(reach, index)
         found = asked(reach, place)
-        nothing = reach.clip(ClipQuestion({})).trust
+        nothing = clips.clip(reach, ClipQuestion({})).trust
         gains.append(off(reach, found.controls, truth) / off(reach, nothing.controls, truth))
         assert set(found.inferred) == set(truth)
         misses.append(found.targets[0].miss)
@@ -73,17 +73,18 @@ def test_what_is_given_stays(reach):
 def test_the_chosen_controls_give_the_same_clip(reach):
     _, place = captured(reach, 30)
     hold = Hold(targets=(Target("RightHand", tuple(place), "end"),))
-    partial = reach.clip(ClipQuestion({}, hold=hold))
-    whole = reach.clip(ClipQuestion(partial.trust.controls, hold=hold))
+    partial = clips.clip(reach, ClipQuestion({}, hold=hold))
+    whole = clips.clip(reach, ClipQuestion(partial.trust.controls, hold=hold))
     assert np.array_equal(partial.clip.rotations, whole.clip.rotations)
     assert whole.trust.inferred == ()
 
 
 @pytest.mark.parametrize("height", [2.8, 50.0])
 def test_a_target_beyond_reach_breaks_no_pose(reach, height):
-    whole = reach.clip(ClipQuestion({c.name: c.default for c in reach.session.card.controls}))
+    controls = {c.name: c.default for c in reach.session.card.controls}
+    whole = clips.clip(reach, ClipQuestion(controls))
     hold = Hold(targets=(Target("RightHand", (-0.2, height, 0.5), "end"),))
-    far = reach.clip(ClipQuestion({}, hold=hold))
+    far = clips.clip(reach, ClipQuestion({}, hold=hold))
     control = reach.session.card.control("target_height")
     assert far.trust.controls["target_height"] == control.maximum
     # As high as hips get that stand; the control itself would have lifted them off the floor.
