@@ -50,7 +50,6 @@ LABEL org.opencontainers.image.title="posefield" \
 ENV PATH=/opt/posefield/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     PYTHONUNBUFFERED=1 \
-    OPENBLAS_NUM_THREADS=1 \
     ORT_DISABLE_TELEMETRY=1 \
     POSEFIELD_HOST=0.0.0.0 \
     POSEFIELD_PORT=8000

@@ -154,11 +154,12 @@ class Keeper:
         here, there = socket.socketpair()
         descriptors = [there.fileno(), *(own.fileno() for own in self.work.sockets)]
         words = [sys.executable, "-P", "-m", "service.web.worker", *map(str, descriptors)]
+        # What the operator says of threads, by whichever name, counts more than what is usual.
+        usual = {} if ALONE.keys() & os.environ.keys() else ALONE
         worker.process = subprocess.Popen(
             words,
             stdin=subprocess.DEVNULL,
-            # What the operator says of threads counts more than what is usual.
-            env={**ALONE, **os.environ, **self.hooks.environ(worker.number)},
+            env={**usual, **os.environ, **self.hooks.environ(worker.number)},
             pass_fds=descriptors,
             # Ctrl-C reaches them through this process alone.
             process_group=0,

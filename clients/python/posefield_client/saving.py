@@ -63,7 +63,7 @@ class Saved:
     warnings: tuple[str, ...]
     entries: tuple[ManifestEntry, ...]
     supported: bool | None = None
-    inferred: Mapping[str, float] = field(default_factory=dict)
+    inferred: Mapping[str, float] = field(default_factory=dict, hash=False)
     missed: tuple[Missed, ...] = ()
 
 

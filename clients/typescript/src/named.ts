@@ -34,7 +34,8 @@ function inferred(text: string | null): Readonly<Record<string, number>> {
 }
 
 function isNumbers(value: unknown): value is Readonly<Record<string, number>> {
-  return isMap(value) && Object.values(value).every((each) => typeof each === "number");
+  if (!isMap(value) || isList(value)) return false;
+  return Object.values(value).every((each) => typeof each === "number");
 }
 
 /** Each is a JSON object in ASCII; lines of one header are joined by commas. */

@@ -140,6 +140,7 @@ test("heads that cannot be read are no answer", () => {
   const heads = [
     ["Posefield-Inferred", '{"turn": "left"}'],
     ["Posefield-Inferred", "7"],
+    ["Posefield-Inferred", "[7]"],
     ["Posefield-Missed", '{"what": "hand"}'],
     ["Posefield-Missed", "hand"],
   ] as const;

@@ -182,6 +182,7 @@ def test_what_was_chosen_and_what_is_missed_come_with_the_file(address, controls
     assert [each.miss for each in saved.missed] == pytest.approx([m.miss for m in trust.targets])
     plain = by_waiting(address, tmp_path / "plain.bvh", lambda model: model.clip(**controls))
     assert (plain.inferred, plain.missed) == ({}, ())
+    assert len({saved, plain}) == 2
 
 
 def test_a_file_may_be_read_by_those_whom_the_process_lets(address, controls, tmp_path):
