@@ -1,5 +1,7 @@
 # The service and its commands: nothing of the training job, nothing that builds.
-FROM python:3.11-slim-bookworm AS build
+# The index of all platforms of Python 3.11.17; a newer one: docker buildx imagetools inspect python:3.11-slim-bookworm
+ARG BASE=docker.io/library/python:3.11-slim-bookworm@sha256:0a310eeecf4e1f5a0743f9a6520c90c88d089c903ca5fd283f501e3a805f5f89
+FROM ${BASE} AS build
 ENV UV_COMPILE_BYTECODE=1 \
     UV_LINK_MODE=copy \
     UV_PROJECT_ENVIRONMENT=/opt/posefield \
@@ -28,14 +30,14 @@ WORKDIR /src
 # service/web/openapi.yaml is a link into api/.
 COPY api api
 COPY service service
-# `make page` builds it, once for every machine: the image needs no Node.
+# `make page` builds them, once for every machine: the image needs no Node.
 # hadolint ignore=SC2086
-RUN { test -f service/web/viewer/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
+RUN { test -f service/web/viewer/index.html && test -f service/web/docs/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
     uv sync --frozen --no-dev --no-editable ${EXTRAS}
 # What is in it, by what is installed: /opt/posefield/share/sbom.cdx.json (CycloneDX).
 RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
 
-FROM python:3.11-slim-bookworm
+FROM ${BASE}
 ARG SOURCE=""
 ARG REVISION=""
 LABEL org.opencontainers.image.title="posefield" \
@@ -43,6 +45,7 @@ LABEL org.opencontainers.image.title="posefield" \
       org.opencontainers.image.version="0.1.0" \
       org.opencontainers.image.licenses="Apache-2.0" \
       org.opencontainers.image.base.name="docker.io/library/python:3.11-slim-bookworm" \
+      org.opencontainers.image.base.digest="sha256:0a310eeecf4e1f5a0743f9a6520c90c88d089c903ca5fd283f501e3a805f5f89" \
       org.opencontainers.image.source="${SOURCE}" \
       org.opencontainers.image.revision="${REVISION}"
 # Bytecode is compiled above; the root may be read-only. onnxruntime reports to its vendor unless told not to.

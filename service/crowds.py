@@ -1,6 +1,5 @@
-"""The `crowd` command: from a model file to a file of characters who walk, and what to tell."""
+"""The `crowd` command: writes a walking crowd of a model to a file and reports on it."""
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import orjson
-import typer
 
+from service.cli.progress import Bar
 from service.encode import crowd, crowd_arrays
+from service.encode.crowd import writer
 from service.motion.conventions import Floats
 from service.motion.crowd import CrowdClip, Motions
 from service.motion.errors import FileError, InvalidField
@@ -24,9 +24,10 @@ ENDINGS = (*crowd.FILES, "npz")
 
 
 def write(model: Synthesizer, asked: Order, instancing: str, output: Path) -> dict[str, Any]:
-    """Write a crowd and tell what it is, as plain values.
+    """Write a crowd to a file, and return its report as plain values.
 
-    Raises InvalidField and FileError.
+    Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
+    written.
     """
     ending = output.suffix.removeprefix(".")
     if ending not in ENDINGS:
@@ -38,7 +39,7 @@ def write(model: Synthesizer, asked: Order, instancing: str, output: Path) -> di
     if ending == "npz":
         crowd_arrays.write(watched, output)
     else:
-        crowd.write(watched, output, instancing)
+        writer.write(watched, output, instancing)
     return {
         "file": str(output),
         "model": made.facts["model"],
@@ -54,7 +55,10 @@ def write(model: Synthesizer, asked: Order, instancing: str, output: Path) -> di
 
 
 def routes(path: Path) -> Sequence[Route]:
-    """Routes of a JSON file; FileError and InvalidField where it holds none."""
+    """Return the routes of a JSON file.
+
+    Raises FileError for a file that is not JSON, and InvalidField for invalid routes.
+    """
     return given.parse(_json(path))
 
 
@@ -69,7 +73,7 @@ def _json(path: Path) -> Any:
 
 @dataclass(frozen=True)
 class _Feet:
-    """Looks at motions as they pass, for how their feet slide; blind where no feet are named."""
+    """Foot skate of motions as they are written; empty if the model's card names no feet."""
 
     gait: Gait
     rate: float
@@ -90,20 +94,20 @@ class _Feet:
 
 
 def _watched(made: CrowdClip, motions: int, feet: _Feet) -> CrowdClip:
-    """The crowd, with a bar on standard error that grows as its motions are made."""
+    """Return the crowd with a progress bar on standard error while its motions are computed."""
 
     def batches() -> Iterator[Motions]:
-        with typer.progressbar(length=motions, label="walking", file=sys.stderr) as bar:
+        with Bar("motions", motions) as bar:
             for batch in made.batches:
                 feet.look(batch)
                 yield batch
-                bar.update(len(batch))
+                bar.advance(len(batch))
 
     return replace(made, batches=batches())
 
 
 def said(facts: dict[str, Any]) -> str:
-    """What to tell of a crowd on a few lines."""
+    """Return the report of a crowd as text."""
     shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
     lines = [
         f"{facts['file']}: {facts['characters']} characters, {facts['frames']} frames at "

@@ -1,11 +1,10 @@
-"""`posefield page`: the page and a model as a folder that works without a service.
+"""The `page` command: the web page and a model as a folder for static hosting.
 
-Poses are then made in the browser, by onnxruntime-web, which the image leaves out.
+Poses are then computed in the browser, by onnxruntime-web, which the container image leaves out.
 """
 
 import gzip
 from collections.abc import Iterator
-from html import escape
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import quote
@@ -15,10 +14,9 @@ import typer
 
 from service.motion import files
 from service.motion.errors import FileError
-from service.synthesis import session
+from service.synthesis import model_file, session
 
 WEB = Path(__file__).with_name("web")
-PAGE, OFFLINE = WEB / "viewer/index.html", WEB / "offline"
 PARTS = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
 _HEAD, _PRESSED = b"<head>", ".gz"
 
@@ -29,10 +27,10 @@ def page(
     json: Annotated[bool, typer.Option("--json", help="answer as JSON")] = False,
 ) -> None:
     """Write the page with a model in it, for any host of static files."""
-    content = session.read(model)
-    opened = session.open_bytes(content, str(model))
+    content = model_file.read(model)
+    opened = session.load_bytes(content, str(model))
     identity = f"{model.stem}@{opened.digest}"
-    written = write(_files(model.name, content, identity), output)
+    written = write(files_of(model.name, content, identity), output)
     if json:
         plain = {"folder": str(output), "model": identity, "files": written}
         typer.echo(orjson.dumps(plain, option=orjson.OPT_INDENT_2).decode())
@@ -45,7 +43,10 @@ def page(
 
 
 def write(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]:
-    """Write files by their names, each whole, and give their sizes; FileError where it fails."""
+    """Write files by name, each atomically, and return their sizes in bytes.
+
+    Raises FileError if a file cannot be written.
+    """
     sizes = {}
     for name, content in contents:
         files.write(content, folder / name)
@@ -53,21 +54,30 @@ def write(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]
     return sizes
 
 
-def _files(name: str, model: bytes, identity: str) -> Iterator[tuple[str, bytes]]:
-    """What the folder holds; the page comes last, so that it never names what is not there."""
-    shown = _marked(_read(PAGE), name, identity)
+def files_of(
+    name: str, model: bytes, identity: str, web: Path = WEB
+) -> Iterator[tuple[str, bytes]]:
+    """Yield names and contents of the folder's files; the page itself is last.
+
+    The page refers to the other files. web: folder of the built page and its parts. Raises
+    FileError if one of them is missing.
+    """
+    page = web / "viewer/index.html"
+    shown = _marked(_read(page), name, identity)
     for part in PARTS:
-        content = _read(OFFLINE / part)
+        content = _read(web / "offline" / part)
         plain = gzip.decompress(content) if part.endswith(_PRESSED) else content
         yield part.removesuffix(_PRESSED), plain
     yield name, model
-    yield PAGE.name, shown
+    yield page.name, shown
 
 
 def _marked(content: bytes, model: str, identity: str) -> bytes:
-    """The page, which looks for this mark before it asks a service."""
-    told = f'data-identity="{escape(identity)}"'
-    mark = f'<meta name="posefield-model" content="{escape(quote(model))}" {told}>'
+    """Return the page with the mark that makes it use the model instead of a service."""
+    # Imported here, since other commands need no Jinja.
+    from service.web.pages import templates
+
+    mark = templates.render("model.html", model=quote(model), identity=identity)
     before, head, after = content.partition(_HEAD)
     return before + head + mark.encode() + after
 

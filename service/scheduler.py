@@ -1,6 +1,6 @@
-"""A Dask cluster as the place where work is done: found, and fit for ours.
+"""Connection to a Dask cluster, and validation of its workers.
 
-Only who names a scheduler needs `distributed`, which is the extra "dask".
+Requires `distributed`, which is the extra "dask".
 """
 
 import hashlib
@@ -13,24 +13,25 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-from distributed import Client
+from distributed import Client, KilledWorker
 from distributed.comm.addressing import parse_address
 from distributed.comm.registry import get_backend
-from distributed.scheduler import KilledWorker
 
 from service.motion.errors import ClusterError
 
 TIMEOUT = 10.0
-"""Seconds that a scheduler has to answer, and to show a worker."""
+"""Seconds to wait for the scheduler, and for a first worker."""
 
-# More workers than this are not named one by one.
+# Largest number of workers that a message names.
 NAMED = 5
 
 
 @dataclass(frozen=True)
 class Kit:
-    """What must be the same on every worker: packages of ours by their source, distributions by
-    their version."""
+    """Software that must be the same on every worker.
+
+    packages: compared by a digest of their source. distributions: compared by version.
+    """
 
     packages: tuple[str, ...]
     distributions: tuple[str, ...]
@@ -38,10 +39,10 @@ class Kit:
 
 @contextmanager
 def connect(address: str, kit: Kit, timeout: float = TIMEOUT) -> Iterator[Client]:
-    """Client of the scheduler at an address such as tcp://host:8786.
+    """Yield a client of the scheduler at an address such as tcp://host:8786.
 
-    Raises ClusterError where nobody answers, there are no workers, or one of them has another kit
-    than is installed here.
+    kit: software that each worker must have as here. timeout: s. Raises ClusterError if the
+    scheduler does not respond, has no workers, or a worker has another kit.
     """
     with _client(address, timeout) as client:
         _check_workers(client, kit, address, timeout)
@@ -50,7 +51,7 @@ def connect(address: str, kit: Kit, timeout: float = TIMEOUT) -> Iterator[Client
 
 @cache
 def installed(kit: Kit) -> dict[str, str]:
-    """What of a kit is installed here, by name; Python itself is always of it."""
+    """Return the versions of a kit's parts on this machine by name; Python's is always included."""
     return {
         "Python": f"{sys.version_info.major}.{sys.version_info.minor}",
         **{name: _source(name) for name in kit.packages},
@@ -59,13 +60,13 @@ def installed(kit: Kit) -> dict[str, str]:
 
 
 def differences(found: Mapping[str, str], expected: Mapping[str, str]) -> str:
-    """In words what is installed there and not here; empty where all is the same."""
+    """Return the differences of two kits as text; empty if they are equal."""
     unlike = [name for name in expected if found[name] != expected[name]]
     return ", ".join(f"{name} {found[name]}, expected {expected[name]}" for name in unlike)
 
 
 def killed(fault: KilledWorker) -> str:
-    """In words that the workers which took up a job died, so that no more are given it."""
+    """Return the message for a job that was abandoned after its workers had died."""
     return (
         f"workers died at the same job {fault.allowed_failures + 1} times, the last was "
         f"{fault.last_worker.address}: out of memory?"
@@ -73,7 +74,7 @@ def killed(fault: KilledWorker) -> str:
 
 
 def _source(package: str) -> str:
-    """Digest of a package's modules: a version is the same for all that lies between two."""
+    """Return a digest of a package's modules, which also tells apart states of one version."""
     spec = find_spec(package)
     if spec is None or spec.origin is None:
         return "none"

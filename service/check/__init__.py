@@ -1,7 +1,7 @@
-"""Defects of a USD character that make readers show the wrong motion or none.
+"""Check of USD characters for defects that make readers show a wrong motion or none.
 
-USD's own validators are run too, but see hardly any of these: a file that passes them may still
-stand in its rest pose, or have no skeleton at all, in Blender or in a browser.
+USD's own validators run too, but detect few of these defects: a file that passes them may still
+show its rest pose, or have no skeleton at all, in Blender or in a browser.
 """
 
 from collections.abc import Iterator
@@ -19,8 +19,11 @@ __all__ = ["Finding", "check"]
 
 
 def check(path: Path) -> list[Finding]:
-    """Every defect that is found; raises UsdError when the file does not open."""
-    # Holds back what pxr would print: the findings say the same.
+    """Return all findings of a file.
+
+    Raises UsdError if the file does not open.
+    """
+    # Suppresses pxr's output, which repeats the findings.
     quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         stage = _open(path)

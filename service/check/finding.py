@@ -1,4 +1,4 @@
-"""One defect, and the short form in which the checks state it."""
+"""Finding: one defect, and the functions that build it."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -8,9 +8,9 @@ Severity = Literal["error", "warning"]
 
 @dataclass(frozen=True)
 class Finding:
-    """A defect of a file: its code, the path of its prim, and what was found and expected.
+    """Defect of a file: its code, the path of its prim, and the found and expected values.
 
-    An error makes some reader show the wrong motion or none; a warning only makes that likely.
+    An error makes some reader show a wrong motion or none; a warning makes it likely.
     """
 
     code: str
@@ -20,16 +20,16 @@ class Finding:
 
 
 def error(code: str, prim: Any, message: str) -> Finding:
-    """Error at a prim."""
+    """Return an error at a prim."""
     return Finding(code, str(prim.GetPath()), message)
 
 
 def warning(code: str, prim: Any, message: str) -> Finding:
-    """Warning at a prim."""
+    """Return a warning at a prim."""
     return Finding(code, str(prim.GetPath()), message, "warning")
 
 
 def some(values: list[Any]) -> str:
-    """The first few of many values, for a message."""
+    """Return the first three of many values as text, for a message."""
     shown = ", ".join(str(value) for value in values[:3])
     return shown if len(values) <= 3 else f"{shown} and {len(values) - 3} more"

@@ -1,4 +1,4 @@
-"""A skeleton's joints: their names, their order, and their transforms at rest and when bound."""
+"""Checks of a skeleton's joints: names, order, and rest and bind transforms."""
 
 import re
 from collections import Counter
@@ -13,12 +13,12 @@ from service.motion.conventions import Floats
 
 LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
-# Single precision, which files are often converted through, keeps 1e-7 of each number.
+# Far above the relative error of float32, 1e-7, in which many files have been.
 ORTHONORMAL = 1e-4
 
 
 def names(rig: Rig) -> Iterator[Finding]:
-    """Joints that readers cannot name, or cannot tell apart."""
+    """Yield findings on joint names that are missing, illegal or not unique."""
     if not rig.joints:
         yield error("no-joints", rig.skeleton, "no joints, expected at least one")
     illegal = [leaf for leaf in dict.fromkeys(rig.leaves) if not LEGAL.fullmatch(leaf)]
@@ -36,7 +36,7 @@ def names(rig: Rig) -> Iterator[Finding]:
 
 
 def order(rig: Rig) -> Iterator[Finding]:
-    """Joints whose parent is listed after them, or not at all."""
+    """Yield findings on joints whose parent is listed after them, or not at all."""
     places = {joint: place for place, joint in reversed(list(enumerate(rig.joints)))}
     parents = [(joint, joint.rpartition("/")[0]) for joint in rig.joints if "/" in joint]
     early = [j for j, parent in parents if parent in places and places[parent] > places[j]]
@@ -50,7 +50,7 @@ def order(rig: Rig) -> Iterator[Finding]:
 
 
 def transforms(rig: Rig) -> Iterator[Finding]:
-    """Rest and bind transforms that are missing, too few or too many, or no rigid motions."""
+    """Yield findings on rest and bind transforms that are missing, miscounted or not rigid."""
     for name in ("restTransforms", "bindTransforms"):
         if not rigs.authored(rig.skeleton, name):
             message = f"no {name}, expected one matrix for each of {len(rig.joints)} joints"

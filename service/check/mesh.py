@@ -1,4 +1,4 @@
-"""The skinned meshes of a skeleton, and whether the extent holds what moves."""
+"""Checks of a skeleton's skinned meshes and of its extent."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,13 +14,16 @@ from service.motion.conventions import Floats
 
 INDICES, WEIGHTS = "primvars:skel:jointIndices", "primvars:skel:jointWeights"
 SUM = 1e-3
-"""How far the weights of a point may be from 1; half-precision weights keep 5e-4."""
+"""Largest deviation of the sum of a point's weights from 1; half precision errs by 5e-4."""
 SLACK = 1e-4
-"""How far a joint may leave the extent, as a share of the extent's diagonal."""
+"""Largest distance of a joint outside the extent, as a share of the extent's diagonal."""
 
 
 def influences(rig: Rig, mesh: Any) -> Iterator[Finding]:
-    """Indices of joints that do not exist, and weights that do not share each point out."""
+    """Yield findings on indices of missing joints, and on weights that are miscounted.
+
+    Also on weights of a point that do not sum to one.
+    """
     indices, weights = rigs.array(mesh, INDICES), rigs.array(mesh, WEIGHTS)
     count = len(rigs.tokens(mesh, "skel:joints") or rig.joints)
     outside = indices[(indices < 0) | (indices >= count)]
@@ -35,7 +38,7 @@ def influences(rig: Rig, mesh: Any) -> Iterator[Finding]:
 
 
 def extents(rig: Rig) -> Iterator[Finding]:
-    """A root without an extent, or with one that joints leave."""
+    """Yield findings on a missing extent, and on one that does not contain all joints."""
     if rig.root is None:
         return
     if not rigs.authored(rig.root, "extent"):
@@ -78,7 +81,7 @@ def _contained(rig: Rig, query: Any) -> Iterator[Finding]:
 
 
 def _positions(rig: Rig, query: Any, time: float) -> Floats:
-    """Joint positions (J, 3) in the space of the root, which is that of its extent."""
+    """Return the joint positions (J, 3) in the space of the root, which is that of its extent."""
     places = UsdGeom.XformCache(Usd.TimeCode(time))
     to_root, _ = places.ComputeRelativeTransform(rig.skeleton, rig.root)
     matrices = np.array(query.ComputeJointSkelTransforms(time)).reshape(-1, 4, 4)

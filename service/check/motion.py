@@ -1,4 +1,4 @@
-"""A skeleton's animation: whether it is complete, and whether its rotations are what they seem."""
+"""Checks of a skeleton's animation: completeness, time samples, values and quaternion order."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,17 +13,17 @@ from service.motion.conventions import Floats
 
 COMPONENTS = ("translations", "rotations", "scales")
 UNIT = 1e-3
-"""How far a rotation's length may be from 1; half-precision rotations keep 5e-4."""
+"""Largest deviation of a quaternion's length from 1; half precision errs by 5e-4."""
 
-# A joint turns little from its rest most of the time. Rotations that read as near half turns and
-# become small ones in another order of their numbers were written in that other order.
+# Joints are near their rest rotations most of the time. If the rotations of a file are near half
+# turns, but small in another order of components, they were written in that order.
 FAR, NEAR = np.radians(120), np.radians(60)
 TELLING = 4
-"""Joints below which the order of the numbers cannot be judged."""
+"""Smallest number of joints from which the quaternion order can be judged."""
 
 
 def joints(rig: Rig) -> Iterator[Finding]:
-    """Animated joints that the skeleton lacks, and joints of the skeleton that are not animated."""
+    """Yield findings on animated joints missing in the skeleton, and joints not animated."""
     animated = rigs.tokens(rig.animation)
     unknown = [joint for joint in animated if joint not in rig.joints]
     still = [joint for joint in rig.joints if joint not in animated]
@@ -36,7 +36,7 @@ def joints(rig: Rig) -> Iterator[Finding]:
 
 
 def components(rig: Rig) -> Iterator[Finding]:
-    """Translations, rotations or scales that are missing, or not one for each joint."""
+    """Yield findings on translations, rotations or scales that are missing or miscounted."""
     expected = len(rigs.tokens(rig.animation))
     for name in COMPONENTS:
         if not rigs.authored(rig.animation, name):
@@ -50,7 +50,7 @@ def components(rig: Rig) -> Iterator[Finding]:
 
 
 def times(rig: Rig) -> Iterator[Finding]:
-    """Poses outside time samples, and frames without one."""
+    """Yield findings on poses without time samples, samples outside the range, missing frames."""
     found = {time for name in COMPONENTS[:2] for time in _codes(rig.animation, name)}
     if not found:
         message = "a pose as default values, expected time samples: some readers know no others"
@@ -71,7 +71,7 @@ def times(rig: Rig) -> Iterator[Finding]:
 
 
 def values(rig: Rig) -> Iterator[Finding]:
-    """Numbers that are no numbers, and rotations that are not of unit length or jump in sign."""
+    """Yield findings on numbers that are not finite, lengths other than 1, and sign changes."""
     for name in COMPONENTS:
         found = samples(rig.animation, name)
         wrong = [f"{time:g}" for time, sample in found if not np.all(np.isfinite(sample))]
@@ -84,7 +84,7 @@ def values(rig: Rig) -> Iterator[Finding]:
 
 
 def samples(animation: Any, name: str) -> list[tuple[float, Floats]]:
-    """Times and values of an attribute; one default value counts as time 0."""
+    """Return times and values of an attribute; a lone default value counts as time 0."""
     codes = _codes(animation, name)
     if codes:
         return [(code, rigs.array(animation, name, code)) for code in codes]
@@ -97,7 +97,7 @@ def _codes(animation: Any, name: str) -> list[float]:
 
 
 def _stacked(animation: Any) -> Floats | None:
-    """Rotations (F, J, 4) w x y z where every sample has as many, and all are finite."""
+    """Return the rotations (F, J, 4), w x y z; None for mixed shapes or non-finite values."""
     found = [sample for _, sample in samples(animation, "rotations")]
     if len({sample.shape for sample in found}) != 1 or not np.all(np.isfinite(found)):
         return None
@@ -135,7 +135,7 @@ def _order(rig: Rig, rotations: Floats) -> Iterator[Finding]:
 
 
 def _rest(rig: Rig) -> Floats | None:
-    """Rotations (J, 4) at rest, of the animated joints."""
+    """Return the rest rotations (J, 4) of the animated joints."""
     matrices = rigs.array(rig.skeleton, "restTransforms").reshape(-1, 4, 4)
     animated = rigs.tokens(rig.animation)
     whole = len(matrices) == len(rig.joints) and np.all(np.isfinite(matrices))
@@ -146,6 +146,6 @@ def _rest(rig: Rig) -> Floats | None:
 
 
 def _turn(rest: Floats, rotations: Floats) -> float:
-    """Median angle between rotations and rest, radians."""
+    """Return the median angle between rotations and rest, rad."""
     dots = np.abs(np.sum(rest * rotations, axis=-1))
     return float(np.median(2 * np.arccos(np.clip(dots, 0.0, 1.0))))

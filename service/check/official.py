@@ -1,4 +1,4 @@
-"""What USD's own validators find."""
+"""Findings of USD's own validators."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -10,7 +10,7 @@ from service.check.finding import Finding, Severity
 
 
 def findings(stage: Any) -> Iterator[Finding]:
-    """Errors and warnings of every validator that pxr brings."""
+    """Yield errors and warnings of all validators of pxr."""
     for fault in UsdValidation.ValidationContext(_validators()).Validate(stage):
         warned = fault.GetType() == UsdValidation.ValidationErrorType.Warn
         severity: Severity = "warning" if warned else "error"

@@ -1,4 +1,4 @@
-"""The skeletons of a stage, each with what it is bound to."""
+"""Skeletons of a stage with their bindings, and access to attributes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +11,10 @@ from service.motion.conventions import Floats
 
 @dataclass(frozen=True)
 class Rig:
-    """A Skeleton prim, the SkelRoot above it, its SkelAnimation (None when missing), its joints."""
+    """Skeleton of a stage: its prim, the SkelRoot above it, its SkelAnimation, and its joints.
+
+    root, animation: None if missing.
+    """
 
     stage: Any
     skeleton: Any
@@ -21,24 +24,24 @@ class Rig:
 
     @property
     def leaves(self) -> list[str]:
-        """The joints' names without their ancestors'."""
+        """Return the joints' names without their ancestors' names."""
         return [joint.rpartition("/")[2] for joint in self.joints]
 
 
 def rigs(stage: Any) -> list[Rig]:
-    """Every skeleton of the stage, instances included."""
+    """Return every skeleton of the stage, instances included."""
     prims = stage.Traverse(Usd.TraverseInstanceProxies())
     return [_rig(stage, prim) for prim in prims if prim.IsA(UsdSkel.Skeleton)]
 
 
 def authored(prim: Any, name: str) -> bool:
-    """Whether the attribute has a value of its own, a default or time samples."""
+    """Return whether the attribute has an authored value, a default or time samples."""
     attribute = prim.GetAttribute(name)
     return bool(attribute and attribute.HasAuthoredValue())
 
 
 def array(prim: Any, name: str, time: Any = None) -> Floats:
-    """Value of an attribute as numbers, empty where it has none or is of another type."""
+    """Return the value of an attribute as numbers; empty if it has none or another type."""
     code = Usd.TimeCode.Default() if time is None else time
     value = prim.GetAttribute(name).Get(code) if prim.HasAttribute(name) else None
     try:
@@ -48,7 +51,7 @@ def array(prim: Any, name: str, time: Any = None) -> Floats:
 
 
 def tokens(prim: Any, name: str = "joints") -> tuple[str, ...]:
-    """Tokens of an attribute, empty where it has none."""
+    """Return the tokens of an attribute; empty if it has none."""
     value = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
     return tuple(str(token) for token in value or ())
 

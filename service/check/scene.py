@@ -1,4 +1,4 @@
-"""What the stage says of itself, and how its prims are bound."""
+"""Checks of a stage's metadata and of the bindings between its prims."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -17,7 +17,7 @@ FALLBACKS = {
 
 
 def metadata(stage: Any) -> Iterator[Finding]:
-    """Findings in the head of the file."""
+    """Yield findings on the metadata of the stage."""
     root = stage.GetPseudoRoot()
     for key, reason in FALLBACKS.items():
         if not stage.HasAuthoredMetadata(key):
@@ -33,7 +33,7 @@ def metadata(stage: Any) -> Iterator[Finding]:
 
 
 def bindings(rig: Rig) -> Iterator[Finding]:
-    """Findings in how a skeleton hangs together with its root, its animation and its meshes."""
+    """Yield findings on the bindings of a skeleton to its root, animation and meshes."""
     if rig.root is None:
         message = "no SkelRoot above this skeleton, expected one instead of an Xform"
         yield error("no-skel-root", rig.skeleton, message)
@@ -51,7 +51,7 @@ def bindings(rig: Rig) -> Iterator[Finding]:
 
 
 def meshes(rig: Rig) -> list[Any]:
-    """Prims below the skeleton's root that are skinned and bound to it."""
+    """Return the prims below the skeleton's root that are skinned to it."""
     top = rig.root or rig.skeleton.GetParent()
     below = Usd.PrimRange(top, Usd.TraverseInstanceProxies())
     return [prim for prim in below if _skinned(prim, rig.skeleton)]

@@ -1,6 +1,6 @@
-"""The `posefield` command: what ships with the service; the training job adds its own commands.
+"""The `posefield` command of the service; the training job adds its own commands.
 
-Exit codes: 0 done; 1 `check` found defects; 2 a question or an argument that cannot be answered;
+Exit codes: 0 success; 1 `check` found defects; 2 a question or an argument that cannot be answered;
 3 a file that cannot be used; 4 samples from which no model can be made; 5 a process of an export
 that died; 128 and a signal's number where that ended an export.
 """
@@ -12,18 +12,18 @@ from typing import Annotated
 
 import typer
 
-from service import __version__, exports, page
-from service.cli import about, captured, checks, crowd, motions, serving
+from service import __version__, page
+from service.cli import about, captured, checks, crowd, exporting, motions, serving
 from service.motion.errors import FileError, MotionError, TrainingError, WorkerDied
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 INTERRUPTED = 130
-"""What a shell expects of a command that was told to stop."""
+"""Exit code that shells expect after SIGINT."""
 
-# Whose extra a missing module is; everything else that can be missing is training's.
+# Extra that provides a missing module; the default is the training extra.
 EXTRAS = {
-    **dict.fromkeys(("joblib", "numba", "sklearn"), "evaluate"),
+    **dict.fromkeys(("joblib", "sklearn"), "evaluate"),
     "distributed": "dask",
     "obstore": "store",
     **dict.fromkeys(("jwt", "cryptography"), "jwt"),
@@ -31,9 +31,9 @@ EXTRAS = {
 
 
 def main() -> None:
-    """Run the command line; faults that have a name end as one line and an exit code."""
+    """Run the command line; MotionErrors and missing modules end as one line and an exit code."""
     for plugin in entry_points(group="posefield.commands"):
-        # The image holds the service alone.
+        # The container image contains only the service.
         if find_spec(plugin.module.partition(".")[0]):
             plugin.load()(app)
     try:
@@ -72,7 +72,7 @@ app.command()(motions.clip)
 app.command()(crowd.crowd)
 app.command()(captured.why)
 app.command()(captured.suggest)
-app.command()(exports.export)
+app.command()(exporting.export)
 app.command()(page.page)
 app.command()(serving.serve)
 app.command()(serving.key)

@@ -1,4 +1,4 @@
-"""`posefield inspect`: what a model file is."""
+"""The `posefield inspect` command: summary of a model file."""
 
 from typing import Any
 
@@ -12,8 +12,7 @@ from service.synthesis import pace, session
 
 
 def inspect(model: ModelPath, json: Json = False) -> None:
-    """Say what a model file is: its controls, its skeleton, its errors, where it comes from, and
-    what a pose costs here."""
+    """Print a model file's controls, skeleton, errors, provenance and cost of a pose here."""
     opened = session.load(model)
     plain = {
         "identity": f"{model.stem}@{opened.digest}",
@@ -24,7 +23,7 @@ def inspect(model: ModelPath, json: Json = False) -> None:
 
 
 def _summary(plain: dict[str, Any]) -> str:
-    """A model card on one screen."""
+    """Return a summary of a model card, within one screen."""
     diagnostics = plain["diagnostics"]
     levels = zip(plain["levels"], plain["seconds_per_pose"], strict=True)
     lines = [
@@ -55,7 +54,7 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
 
 
 def _control(plain: dict[str, Any], joints: list[str]) -> str:
-    """A control in a line: what of it was sampled, and how it is measured where it is."""
+    """Return one line on a control: its sampled range, its description and its measure."""
     span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
     own = plain.get("measure")
     how = f" (measured: {measure.words(measure.parse(own), joints)})" if own else ""

@@ -1,4 +1,4 @@
-"""What commands tell: answers as JSON, and in words."""
+"""Output of commands: answers as JSON and as text."""
 
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,12 @@ from service.motion.answer import ClipAnswer, Reasons, Trust
 
 
 def as_json(value: Any) -> str:
-    """Plain values as JSON to read."""
+    """Return plain values as indented JSON."""
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
 
 
 def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
-    """What to tell of a clip that was written."""
+    """Return the message about a written clip, as JSON or as text."""
     frames = len(answer.clip)
     if json:
         return as_json(
@@ -28,7 +28,7 @@ def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
 
 
 def tell(found: Trust | Reasons) -> None:
-    """Say on standard error what was chosen for whoever asked, and what to beware of."""
+    """Print inferred controls and warnings on standard error."""
     if found.inferred:
         chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)
         typer.echo(f"inferred: {chosen}, most typical for what was given", err=True)

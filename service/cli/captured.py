@@ -1,4 +1,4 @@
-"""`posefield why` and `posefield suggest`: the clips behind an answer, and those that lack."""
+"""The `posefield why` and `posefield suggest` commands: captured clips, and those to add."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,46 +6,27 @@ from typing import Annotated
 import typer
 
 from service.cli.answers import as_json, tell
-from service.cli.arguments import (
-    Controls,
-    Extrapolate,
-    Json,
-    ModelPath,
-    Performer,
-    numbers,
-    open_model,
-)
+from service.cli.arguments import Json, ModelPath, open_model
+from service.cli.options import asks
 from service.encode import reasons, suggestions
 from service.export import queries
-from service.synthesis.suggest import COUNT, SuggestQuestion
+from service.question.model_question import SuggestQuestion, WhyQuestion
 from service.synthesis.suggest import suggest as find_suggestions
-from service.synthesis.why import NEAREST, WhyQuestion
 from service.synthesis.why import why as find_reasons
 
 
-def why(
-    model: ModelPath,
-    control: Controls = None,
-    extrapolate: Extrapolate = "warn",
-    performer: Performer = None,
-    nearest: Annotated[int, typer.Option(help="captured clips to list")] = NEAREST,
-    json: Json = False,
-) -> None:
-    """Say what an answer is made of: the captured clips near it, and what each counts for."""
-    synthesizer = open_model(model)
-    asked = WhyQuestion(numbers(control or []), extrapolate, performer, nearest)
-    found = find_reasons(synthesizer, asked)
+@asks(WhyQuestion)
+def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
+    """Explain an answer: the captured clips near it, and the weight of each."""
+    found = find_reasons(open_model(model), question)
     tell(found)
     typer.echo(as_json(reasons.plain(found)) if json else reasons.text(found))
 
 
+@asks(SuggestQuestion)
 def suggest(
     model: ModelPath,
-    count: Annotated[int, typer.Option(help="points to list")] = COUNT,
-    performer: Annotated[
-        str | None,
-        typer.Option(help="whose clips alone count as captured; everybody's if not said"),
-    ] = None,
+    question: SuggestQuestion,
     candidates: Annotated[
         Path | None,
         typer.Option(
@@ -54,8 +35,8 @@ def suggest(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say which clips to capture next: where one more would be worth most, the first first."""
+    """List the clips to capture next, the most useful first."""
     synthesizer = open_model(model)
     given = queries.points(candidates, synthesizer) if candidates else None
-    found = find_suggestions(synthesizer, SuggestQuestion(count, performer, given))
+    found = find_suggestions(synthesizer, question, given)
     typer.echo(as_json(suggestions.plain(found)) if json else suggestions.text(found))

@@ -1,4 +1,4 @@
-"""`posefield check`: what is wrong with a USD character."""
+"""The `posefield check` command: defects of a USD character."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +13,7 @@ def check(
     file: Annotated[Path, typer.Argument(help="a usda, usdc, usd or usdz file")],
     json: Json = False,
 ) -> None:
-    """Find what makes a USD character fail in some reader though validators pass it."""
+    """Find defects of a USD character that fail in some reader although validators accept them."""
     from service.check import check as find
 
     findings = find(file)

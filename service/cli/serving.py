@@ -1,4 +1,4 @@
-"""`posefield serve` and `posefield key`: the service, and keys to it."""
+"""The `posefield serve` and `posefield key` commands: the service, and keys to it."""
 
 from typing import Annotated
 
@@ -16,7 +16,7 @@ def serve(
     host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
     port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
 ) -> None:
-    """Answer over HTTP for the models given, until interrupted."""
+    """Serve the given models over HTTP until interrupted."""
     from service.web import server, settings
 
     server.serve(places, settings.read(host=host, port=port))
@@ -30,8 +30,11 @@ def key(
     metrics: Annotated[bool, typer.Option("--metrics", help="let it read /metrics too")] = False,
     json: Json = False,
 ) -> None:
-    """Make an API key: the line for POSEFIELD_KEYS_FILE on standard output, and, once, the key
-    itself on standard error."""
+    """Create an API key.
+
+    Prints the line for POSEFIELD_KEYS_FILE on standard output, and the key itself, once, on
+    standard error.
+    """
     from service.web.access import keys
 
     scopes = [f"read:{one}" for one in model or ["*"]] + ["metrics"] * metrics

@@ -1,4 +1,4 @@
-"""Layers of a SkelAnimation alone, for stages in which many clips move one character."""
+"""USD layers of a SkelAnimation alone, for stages in which many clips animate one character."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 from pxr import Sdf
 
-from service.encode import character, specs, takes
+from service.encode import character_prims, specs, takes
 from service.encode.content import Array, Content
 from service.encode.convention import Convention
 from service.encode.layers import Kind
@@ -18,31 +18,31 @@ PRIM = "Anim"
 
 @dataclass(frozen=True)
 class Animations(Kind):
-    """Layers of joints at these paths."""
+    """Layers of an animation of joints with given paths."""
 
     paths: tuple[str, ...]
 
     @property
     def values(self) -> tuple[Array, ...]:
-        """Arrays that every layer holds."""
+        """Return the arrays that every layer holds."""
         return ()
 
     def head(self, content: Content) -> Any:
-        """The layer without its prims."""
+        """Return the layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("animation.usda")
         self.state(made, PRIM, content)
         return made
 
     def layer(self, content: Content) -> Any:
-        """The layer, made by usd-core; the caller must keep it, since its prims do not."""
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
         made = self.head(content)
         with Sdf.ChangeBlock():
-            specs.samples(character.animation(made, PRIM, self.paths), content.samples)
+            specs.samples(character_prims.animation(made, PRIM, self.paths), content.samples)
         return made
 
 
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
-    """Binary layers of the clips' animations, without a character; the facts are in each."""
+    """Return binary layers of the clips' animations, with the facts and without a character."""
     return [
         CRATES.write(Animations(take.rate, convention, take.rig.paths), take.content)
         for take in takes.bare(answers, convention)

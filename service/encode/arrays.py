@@ -1,4 +1,4 @@
-"""Named arrays as NumPy's own archive, npz: the same arrays always give the same bytes."""
+"""Named arrays as an .npz archive; equal arrays give equal bytes."""
 
 import io
 import zipfile
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-# The first moment a zip archive can name: the bytes hang on the arrays alone.
+# The earliest time of the zip format, so that the bytes depend on the arrays alone.
 TIME = (1980, 1, 1, 0, 0, 0)
 READABLE = 0o644 << 16
 
 
 def archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
-    """Archive of stored members that numpy.load opens without pickle."""
+    """Return an archive of stored members that numpy.load opens without pickle."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as made:
         for name, values in arrays.items():

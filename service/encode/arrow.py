@@ -1,7 +1,8 @@
-"""A table as an Arrow IPC stream of one record batch.
+"""Tables as Arrow IPC streams of one record batch.
 
-Rows hold tensors by the canonical extension `arrow.fixed_shape_tensor`: a reader has each column as
-one array (N, ...) without parsing. The schema's metadata are JSON texts under keys like the card's.
+Tensor columns have the canonical extension type `arrow.fixed_shape_tensor`: a reader has each
+column as one array (N, ...) without parsing. The schema's metadata are JSON texts under keys like
+the card's.
 """
 
 import json
@@ -24,7 +25,7 @@ _TYPES = {
 
 
 def arrow(table: Table) -> bytes:
-    """Arrow IPC stream; the same table always gives the same bytes."""
+    """Return the Arrow IPC stream of a table; equal tables give equal bytes."""
     rows = nanoarrow.struct({n: _field(c) for n, c in table.columns.items()}, nullable=False)
     schema = nanoarrow.c_schema(rows).modify(metadata=_metadata(table))
     batch = nanoarrow.c_array_from_buffers(
@@ -43,7 +44,10 @@ def _metadata(table: Table) -> dict[str, str]:
 
 
 class _Pieces(list[bytes]):
-    """Keeps what is written: a BytesIO would grow for the last bytes, and take thrice as long."""
+    """Writable list of the written chunks.
+
+    Three times as fast as a BytesIO, which reallocates its buffer as it grows.
+    """
 
     def write(self, piece: memoryview) -> int:
         self.append(bytes(piece))
@@ -62,7 +66,7 @@ def _field(column: Column) -> Any:
 
 
 def _array(column: Column) -> Any:
-    """Column as Arrow holds it, on the same memory."""
+    """Return the column as an Arrow array on the same memory."""
     if column.dtype == bool:
         return _truths(column)
     numbers = nanoarrow.c_array(column.reshape(-1), _type(column))
@@ -72,7 +76,7 @@ def _array(column: Column) -> Any:
 
 
 def _truths(column: Column) -> Any:
-    """A bit each, where nanoarrow would take NumPy's bytes for bits."""
+    """Return booleans as an array of one bit each; nanoarrow would take NumPy's bytes for bits."""
     bits = np.packbits(column, bitorder="little")
     return nanoarrow.c_array_from_buffers(_type(column), len(column), [None, bits])
 

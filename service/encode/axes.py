@@ -1,8 +1,8 @@
-"""Places, lengths and turns in the units and axes of a file.
+"""Conversion of positions, lengths and rotations to the unit and axes of a file.
 
-Where Z is up the whole character is turned with the axes, joints' own axes too, and a pose at rest
-still turns none: (x, y, z) becomes (x, -z, y), which rounds nothing. Numbers that are not -0 do
-not become -0.
+For Z up the whole character is rotated with the axes, including the joints' own axes, so that the
+rotations of the rest pose remain the identity: (x, y, z) becomes (x, -z, y), which is exact.
+Numbers other than -0 never become -0.
 """
 
 import math
@@ -21,27 +21,36 @@ TURNED = [0, 2, 1]
 
 
 def places(convention: Convention, metres: Either) -> Either:
-    """Places (..., 3), or ways, of metres and Y up."""
+    """Return positions or displacements (..., 3) in the unit and axes of a file.
+
+    metres: with Y up.
+    """
     unit = convention.metres_per_unit
     return directions(convention, metres if unit == 1.0 else metres / unit)
 
 
 def directions(convention: Convention, along: Either) -> Either:
-    """Directions (..., 3) of Y up."""
+    """Return directions (..., 3) in the axes of a file.
+
+    along: with Y up.
+    """
     if convention.up == "y":
         return along
     return along[..., TURNED] * np.array([1, -1, 1], along.dtype) + along.dtype.type(0.0)
 
 
 def rotations(convention: Convention, turns: Singles) -> Singles:
-    """Quaternions (..., 4), real part last, of Y up."""
+    """Return quaternions (..., 4), real part last, in the axes of a file.
+
+    turns: with Y up.
+    """
     if convention.up == "y":
         return turns
     return turns[..., [*TURNED, 3]] * np.array([1, -1, 1, 1], turns.dtype) + turns.dtype.type(0.0)
 
 
 def moved(convention: Convention, clip: Clip) -> Clip:
-    """The clip in a file's units and axes, in which its skeleton is at rest as well."""
+    """Return the clip, with its skeleton, in the unit and axes of a file."""
     if convention == METRES:
         return clip
     joints, turns = clip.skeleton, clip.rotations
@@ -56,11 +65,17 @@ def moved(convention: Convention, clip: Clip) -> Clip:
 
 
 def box(convention: Convention, corners: Floats) -> Floats:
-    """Lowest and highest corner (..., 2, 3) of boxes in metres and Y up."""
+    """Return the lowest and highest corner (..., 2, 3) of boxes in the unit and axes of a file.
+
+    corners: m, with Y up.
+    """
     return np.sort(places(convention, corners), axis=-2)
 
 
 def rounded(convention: Convention, lengths: Floats) -> Floats:
-    """The nearest float32 as a short decimal, about: to a tenth of a micrometre."""
+    """Return lengths in the unit of a file, rounded to a tenth of a micrometre.
+
+    As decimals they are then short, and still near their float32 values.
+    """
     decimals = 7 + math.floor(math.log10(convention.metres_per_unit))
     return np.round(lengths, decimals) + 0.0

@@ -1,8 +1,8 @@
-"""A light body for a skeleton that has none: one tapered box a bone, skinned to one joint each.
+"""Body mesh of a skeleton without one: one tapered box per bone, each skinned to one joint.
 
-Readers need it: some show nothing, and some find no bones, where a skeleton has no skinned mesh.
-Which boxes there are is up to the skeleton alone, so that all clips of a model have one topology;
-where their points are follows the bones of a clip.
+Readers need it: some display nothing and some find no bones in a skeleton without a skinned mesh.
+The topology depends on the skeleton alone and is the same for all clips of a model; the points
+follow the bone offsets of a clip.
 """
 
 from dataclasses import dataclass
@@ -36,18 +36,19 @@ FACES: tuple[tuple[int, ...], ...] = (
 # Shares of the skeleton's size: about 1 cm, 5 cm, 2 cm and 2 mm on a person.
 THINNEST, THICKEST, STUB, SHORTEST = 0.006, 0.03, 0.012, 0.001
 THICKNESS = 0.1
-"""Half the width of a box as a share of its length, within THINNEST and THICKEST."""
+"""Half the width of a box as a share of its length, between THINNEST and THICKEST."""
 
-# Centre, left, right: readers that know one colour a mesh take the first.
+# Centre, left, right: readers that support one colour per mesh use the first.
 TINTS = np.array([(0.75, 0.75, 0.75), (0.25, 0.45, 0.85), (0.85, 0.4, 0.25)])
 
 
 @dataclass(frozen=True)
 class Bones:
-    """The K boxes to draw: joints (K,) that they turn with, and tints (K,) by index.
+    """K boxes of a body mesh.
 
-    ends (L,): where the first L of them lead, as an index of joint or, past the joints, of tip;
-    the others are stubs on joints where nothing follows.
+    joints (K,): the joint that each box is skinned to. ends (L,): for the first L boxes the far
+    end, an index of a joint or, after all joints, of a tip; the other boxes are stubs on leaf
+    joints. tints (K,): index in TINTS.
     """
 
     joints: Integers
@@ -57,7 +58,11 @@ class Bones:
 
 @dataclass(frozen=True)
 class Boxes:
-    """Where boxes are at rest: starts and arms (..., K, 3) and radii (..., K), m."""
+    """Boxes in the rest pose.
+
+    starts: near ends (..., K, 3), m. arms: vectors to the far ends (..., K, 3), m. radii: (..., K),
+    m.
+    """
 
     starts: Floats
     arms: Floats
@@ -65,10 +70,10 @@ class Boxes:
 
 
 def bones(skeleton: Skeleton) -> Bones:
-    """Boxes from joint to joint and to end sites, and stubs on joints where nothing follows.
+    """Return boxes between joints and to end sites, and stubs on leaf joints.
 
-    Bones of next to no length at the skeleton's own rest, and those that lie where another does,
-    get none. A box on one side of the plane x of the root is tinted by it: +x is left.
+    Bones shorter than a share of the skeleton's size and bones that coincide with another one have
+    no box. A box on one side of the plane x of the root has the tint of that side: +x is left.
     """
     count = len(skeleton)
     owners = np.array([*skeleton.parents[1:], *skeleton.tip_joints], dtype=np.int32)
@@ -83,7 +88,7 @@ def bones(skeleton: Skeleton) -> Bones:
 
 
 def boxes(skeleton: Skeleton, bones: Bones, offsets: Floats) -> Boxes:
-    """Where the boxes are if the joints rest at offsets (..., J, 3) from their parents, m."""
+    """Return the boxes for joints with rest offsets (..., J, 3) from their parents, m."""
     lead, stubs = offsets.shape[:-2], len(bones.joints) - len(bones.ends)
     tips = np.broadcast_to(skeleton.tip_offsets, (*lead, *skeleton.tip_offsets.shape))
     rest = skeleton.at_rest(offsets)
@@ -99,7 +104,7 @@ def boxes(skeleton: Skeleton, bones: Bones, offsets: Floats) -> Boxes:
 
 
 def mesh(found: Boxes) -> tuple[Singles, Singles]:
-    """Points and normals (..., 10 K, 3) of the boxes; a box without length looks upwards."""
+    """Return points and normals (..., 10 K, 3) of the boxes; those of zero length point up."""
     lengths = _lengths(found.arms)[..., None]
     up = np.array([0.0, 1.0, 0.0])
     direction = np.where(lengths > 0, found.arms / np.where(lengths > 0, lengths, 1.0), up)
@@ -114,7 +119,7 @@ def mesh(found: Boxes) -> tuple[Singles, Singles]:
 
 
 def faces(bones: Bones) -> tuple[Integers, Integers]:
-    """How many corners each face has, and the points that they are."""
+    """Return the number of corners of each face, and the point index of each corner."""
     counts = np.array([len(face) for face in FACES], dtype=np.int32)
     corners = np.array([point for face in FACES for point in face], dtype=np.int32)
     starts = np.arange(len(bones.joints), dtype=np.int32)[:, None] * POINTS
@@ -127,7 +132,7 @@ def _size(rest: Floats) -> Floats:
 
 
 def _rows(vectors: Floats) -> Singles:
-    """Components (3, boxes) of vectors (..., 3)."""
+    """Return the components (3, boxes) of vectors (..., 3)."""
     return np.ascontiguousarray(vectors.reshape(-1, 3).T, np.float32)
 
 
@@ -137,7 +142,7 @@ def _lengths(arms: Floats) -> Floats:
 
 
 def _distinct(skeleton: Skeleton, bones: Bones) -> Bones:
-    """Those that lie where no earlier one does, with their tints."""
+    """Return the boxes that do not coincide with an earlier one, with their tints."""
     found = boxes(skeleton, bones, skeleton.offsets)
     places = np.round(np.concatenate([found.starts, found.arms], axis=-1), 5)
     _, first = np.unique(places, axis=0, return_index=True)
@@ -147,7 +152,7 @@ def _distinct(skeleton: Skeleton, bones: Bones) -> Bones:
 
 
 def _across(direction: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (..., 3) square to each direction; all three are right-handed."""
+    """Return two unit vectors (..., 3) orthogonal to each direction; all three are right-handed."""
     along_z = np.abs(direction[..., 2:]) > 0.9
     helper = np.where(along_z, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     first = quat.cross(helper, direction)

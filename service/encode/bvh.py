@@ -1,12 +1,12 @@
-"""A clip as a BVH file, usually in centimetres: the unit that readers take its numbers to be in."""
+"""Clips as BVH files, by default in centimetres: the unit that BVH readers assume."""
 
 from service.encode import axes
 from service.encode.convention import Convention
-from service.motion import bvh as motion_file
+from service.motion import bvh_writer
 from service.motion.answer import ClipAnswer
 
 
 def bvh(answer: ClipAnswer, convention: Convention) -> bytes:
-    """BVH; the format has no place for the trust facts, nor for unit and axis."""
+    """Return a BVH file; the format cannot store provenance, unit or up axis."""
     clip = axes.moved(Convention(1.0, convention.up), answer.clip)
-    return motion_file.dumps(clip, metres_per_unit=convention.metres_per_unit)
+    return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)

@@ -1,4 +1,4 @@
-"""A character but for its motion: a skeleton at rest and the light body that is skinned to it."""
+"""Character without motion: a skeleton in its rest pose and the body mesh skinned to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,28 +7,27 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pxr import Gf, Vt
 
-from service.encode import axes, body, names, reach, specs
+from service.encode import axes, body, names, reach
 from service.encode.body import Bones, Boxes
 from service.encode.convention import METRES, Convention
 from service.encode.reach import Tree
-from service.encode.specs import Type
 from service.motion.conventions import Floats, Singles
 from service.motion.skeleton import Skeleton
 
-BINDING = ("SkelBindingAPI",)
-
 Numbers = Mapping[str, npt.NDArray[Any]]
-"""Arrays of one character by name: bind and rest matrices (J, 4, 4), points and normals (P, 3),
-extent (2, 3)."""
+"""Arrays of one character by name.
+
+bind, rest: matrices (J, 4, 4). points, normals: (P, 3). extent: (2, 3).
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What all clips of a skeleton share: names and paths of joints, points, and boxes to draw.
+    """Properties shared by all clips of a skeleton; compared by identity.
 
-    There is one of each skeleton, and it is equal to itself alone.
+    names, paths: of the joints, the latter as in USD. tree: of joints and tips. bones: boxes of the
+    body mesh.
     """
 
     skeleton: Skeleton
@@ -39,14 +38,14 @@ class Rig:
 
 
 def rig(skeleton: Skeleton) -> Rig:
-    """Rig of a skeleton; kept, for it takes milliseconds to make."""
+    """Return the rig of a skeleton, cached: it takes milliseconds to build."""
     tips = skeleton.tip_offsets.tobytes()
     shape = (skeleton.offsets.tobytes(), skeleton.tip_joints, tips)
     return _rig(_Key((skeleton.names, skeleton.parents, *shape), skeleton))
 
 
 class _Key:
-    """A skeleton by what it says: its arrays can neither be compared nor hashed."""
+    """Skeleton as a cache key, compared by content: arrays cannot be compared or hashed."""
 
     def __init__(self, said: tuple[Any, ...], skeleton: Skeleton) -> None:
         self.said, self.skeleton = said, skeleton
@@ -67,7 +66,10 @@ def _rig(key: _Key) -> Rig:
 
 @dataclass(frozen=True)
 class Rest:
-    """Characters of one rig at rest: offsets (M, J, 3) from parents, m, and their bodies' boxes."""
+    """M characters of one rig in the rest pose.
+
+    offsets: from the parents (M, J, 3), m. boxes: of their body meshes.
+    """
 
     rig: Rig
     offsets: Floats
@@ -75,14 +77,14 @@ class Rest:
 
 
 def resting(rig: Rig, offsets: Floats | Singles) -> Rest:
-    """Characters whose bones have the offsets (M, J, 3), m; each root is where the rig's is."""
+    """Return characters with bone offsets (M, J, 3), m; each root is at the rig's root position."""
     rest = offsets.astype(np.float64)
     rest[:, 0] = rig.skeleton.offsets[0]
     return Rest(rig, rest, body.boxes(rig.skeleton, rig.bones, rest))
 
 
 def numbers(rest: Rest, convention: Convention) -> dict[str, npt.NDArray[Any]]:
-    """Arrays (M, ...) of characters, but for their extents."""
+    """Return the arrays (M, ...) of the characters, without their extents."""
     points, normals = body.mesh(rest.boxes)
     points, normals = axes.places(convention, points), axes.directions(convention, normals)
     bind = _matrices(convention, rest.rig.skeleton.at_rest(rest.offsets))
@@ -91,7 +93,10 @@ def numbers(rest: Rest, convention: Convention) -> dict[str, npt.NDArray[Any]]:
 
 
 def balls(rest: Rest) -> Floats:
-    """Radii (M, P) about joints and tips within which what is drawn lies between them, m."""
+    """Return radii (M, P), m, of spheres about joints and tips that bound the body mesh.
+
+    Each box lies in the convex hull of the spheres about its two ends.
+    """
     bones, found, (characters, joints, _) = rest.rig.bones, rest.boxes, rest.offsets.shape
     radii = np.zeros((characters, joints + len(rest.rig.tree.tips)))
     every = np.arange(characters)[:, None]
@@ -104,7 +109,7 @@ def balls(rest: Rest) -> Floats:
 
 
 def at_rest(rig: Rig, convention: Convention = METRES) -> Numbers:
-    """Arrays of the character as its skeleton rests."""
+    """Return the arrays of the character in the skeleton's rest pose."""
     rest = resting(rig, rig.skeleton.offsets[None])
     made = {name: array[0] for name, array in numbers(rest, convention).items()}
     places = np.concatenate([made["bind"][:, 3, :3], made["points"]])
@@ -112,92 +117,9 @@ def at_rest(rig: Rig, convention: Convention = METRES) -> Numbers:
     return made | {"extent": extent.astype(np.float32)}
 
 
-def root(parent: Any, name: str, rig: Rig) -> Any:
-    """New SkelRoot with a skeleton and a body that are bound to each other, without numbers."""
-    made = specs.prim(parent, name, "SkelRoot", BINDING)
-    made.kind = "component"
-    specs.attribute(made, "extent", Type.Float3Array)
-    skeleton = specs.prim(made, "Skel", "Skeleton", BINDING)
-    mesh = specs.prim(made, "Body", "Mesh", BINDING)
-    for bound in (made, mesh):
-        specs.relation(bound, "skel:skeleton", skeleton.path)
-    _skeleton(skeleton, rig)
-    _mesh(mesh, rig.bones)
-    return made
-
-
-def fill(root: Any, numbers: Numbers) -> None:
-    """Give a SkelRoot its numbers."""
-    extent = Vt.Vec3fArray.FromNumpy(numbers["extent"])
-    for prim in ("", "Body"):
-        _attribute(root, prim, "extent").default = extent
-    for name, key in (("bindTransforms", "bind"), ("restTransforms", "rest")):
-        _attribute(root, "Skel", name).default = Vt.Matrix4dArray.FromNumpy(numbers[key])
-    for name in ("points", "normals"):
-        _attribute(root, "Body", name).default = Vt.Vec3fArray.FromNumpy(numbers[name])
-
-
-def bind(root: Any, animation: Any) -> None:
-    """Let the skeleton of a SkelRoot move as the SkelAnimation at a path does."""
-    skeleton = root.layer.GetPrimAtPath(root.path.AppendChild("Skel"))
-    specs.relation(skeleton, "skel:animationSource", animation)
-
-
-def animation(parent: Any, name: str, paths: tuple[str, ...]) -> Any:
-    """New SkelAnimation of these joints that still lacks the samples of its two attributes."""
-    made = specs.prim(parent, name, "SkelAnimation")
-    specs.uniform(made, "joints", Type.TokenArray, Vt.TokenArray(paths))
-    specs.attribute(made, "translations", Type.Float3Array)
-    specs.attribute(made, "rotations", Type.QuatfArray)
-    # Some readers keep the rest pose, without a word, where scales are missing.
-    specs.attribute(made, "scales", Type.Half3Array, Vt.Vec3hArray(len(paths), Gf.Vec3h(1, 1, 1)))
-    return made
-
-
-def _attribute(root: Any, prim: str, name: str) -> Any:
-    path = root.path.AppendChild(prim) if prim else root.path
-    return root.layer.GetAttributeAtPath(path.AppendProperty(name))
-
-
 def _matrices(convention: Convention, metres: Floats) -> Floats:
-    """Matrices (..., 4, 4) that move; USD multiplies row vectors, so the last row holds how far."""
+    """Return translation matrices (..., 4, 4) for row vectors, as in USD."""
     made = np.zeros((*metres.shape[:-1], 4, 4))
     made[...] = np.eye(4)
     made[..., 3, :3] = axes.rounded(convention, axes.places(convention, metres))
     return made
-
-
-def _skeleton(prim: Any, rig: Rig) -> None:
-    specs.uniform(prim, "joints", Type.TokenArray, Vt.TokenArray(rig.paths))
-    specs.uniform(prim, "jointNames", Type.TokenArray, Vt.TokenArray(rig.names))
-    for name in ("bindTransforms", "restTransforms"):
-        specs.uniform(prim, name, Type.Matrix4dArray)
-
-
-def _mesh(prim: Any, bones: Bones) -> None:
-    counts, corners = map(Vt.IntArray.FromNumpy, body.faces(bones))
-    specs.attribute(prim, "points", Type.Point3fArray)
-    specs.per_point(prim, "normals", Type.Normal3fArray)
-    specs.attribute(prim, "faceVertexCounts", Type.IntArray, counts)
-    specs.attribute(prim, "faceVertexIndices", Type.IntArray, corners)
-    specs.uniform(prim, "subdivisionScheme", Type.Token, "none")
-    specs.attribute(prim, "extent", Type.Float3Array)
-    _color(prim, bones)
-    _binding(prim, bones)
-
-
-def _color(prim: Any, bones: Bones) -> None:
-    tints, chosen = specs.vectors(body.TINTS), np.repeat(bones.tints, body.POINTS)
-    specs.per_point(prim, "primvars:displayColor", Type.Color3fArray, tints)
-    indices = Vt.IntArray.FromNumpy(chosen)
-    specs.attribute(prim, "primvars:displayColor:indices", Type.IntArray, indices)
-
-
-def _binding(prim: Any, bones: Bones) -> None:
-    joints = np.repeat(bones.joints, body.POINTS)
-    for name, kind, value in (
-        ("jointIndices", Type.IntArray, Vt.IntArray.FromNumpy(joints)),
-        ("jointWeights", Type.FloatArray, Vt.FloatArray(len(joints), 1.0)),
-    ):
-        specs.per_point(prim, f"primvars:skel:{name}", kind, value).SetInfo("elementSize", 1)
-    specs.attribute(prim, "primvars:skel:geomBindTransform", Type.Matrix4d, Gf.Matrix4d(1.0))

@@ -1,7 +1,7 @@
-"""What a layer says that others of its kind do not, and what of it shapes the layer's bytes.
+"""Content of one layer, and the pattern that determines the layout of its bytes.
 
-In its binary form USD writes once what occurs twice: equal samples, equal numbers. So a layer's
-bytes hang on which of them are equal, and for the rest the values are just copied into them.
+The binary form of USD stores equal samples and equal numbers once. So the layout depends on which
+of them are equal; for layers of equal layout the values are copied into a template.
 """
 
 from collections.abc import Hashable, Mapping
@@ -17,26 +17,26 @@ from service.motion.conventions import Singles
 
 Array = npt.NDArray[Any]
 Samples = Mapping[str, Singles]
-"""By name the samples (F, ...) of an attribute at the time codes 0 to F - 1."""
+"""Samples (F, ...) of attributes at the time codes 0 to F - 1, by name."""
 
 Repeats = tuple[int, ...] | None
-"""Of each row of samples the first that is equal to it; None where no two are."""
+"""For each row of samples the index of the first equal row; None if all rows differ."""
 
 PROBED = 8
-"""Numbers of a sample by which most are told apart."""
+"""Count of leading numbers of a sample whose sum is compared before whole samples are."""
 
 BARE, REPEAT = 1500, 36
-"""Bytes that a pattern takes, and each row of its repeats, about."""
+"""Approximate bytes of a pattern, and of each row of its repeats."""
 
 INLINE = -1
-"""Mark of a number that float32 holds: USD keeps it beside its type, and never looks for others."""
+"""Mark of a number that float32 holds exactly: USD stores it inline and does not deduplicate it."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """Samples of attributes, values by name, and facts.
+    """Content of a layer: samples of attributes, values by name, and facts.
 
-    No number is -0, which USD takes for 0 where it looks for what is equal.
+    No number is -0, which USD's deduplication does not distinguish from 0.
     """
 
     samples: Samples
@@ -45,35 +45,36 @@ class Content:
 
     @property
     def frames(self) -> int:
-        """How many samples each attribute has."""
+        """Return the number of samples of each attribute."""
         return len(next(iter(self.samples.values())))
 
 
 class Author(Protocol):
-    """A kind of layer; kinds that are equal make the same layer of the same content."""
+    """Kind of layer; equal kinds build equal layers of equal content."""
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Those that every layer of this kind holds."""
+        """Return the numbers that every layer of this kind holds."""
 
     @property
     def values(self) -> tuple[Array, ...]:
-        """Arrays that every layer of this kind holds."""
+        """Return the arrays that every layer of this kind holds."""
 
     def head(self, content: Content) -> Any:
-        """The layer without its prims."""
+        """Return the layer without its prims."""
 
     def layer(self, content: Content) -> Any:
-        """The layer, made by usd-core; the caller must keep it, since its prims do not."""
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
 
     def __hash__(self) -> int: ...
 
 
 class Pattern(NamedTuple):
-    """How arrays are shaped and which samples are equal, by name, which numbers are, and the
-    facts' shape.
+    """Properties of a content that determine the layout of its layer's bytes.
 
-    numbers: of each INLINE, or its first equal among those of the author and those before it.
+    samples: name, shape and repeats. values: name, shape and type. numbers: of each number INLINE,
+    or the index of the first equal one among those of the author and those before it. facts: their
+    shape.
     """
 
     samples: tuple[tuple[str, tuple[int, ...], Repeats], ...]
@@ -83,7 +84,7 @@ class Pattern(NamedTuple):
 
 
 def pattern(content: Content, known: tuple[float, ...]) -> Pattern:
-    """Pattern of a content beside the numbers that its author is known to hold."""
+    """Return the pattern of a content; known: the numbers of its author."""
     return Pattern(
         tuple((name, rows.shape, _repeats(rows)) for name, rows in content.samples.items()),
         tuple((name, found.shape, found.dtype.char) for name, found in content.values.items()),
@@ -92,13 +93,18 @@ def pattern(content: Content, known: tuple[float, ...]) -> Pattern:
     )
 
 
+def samples_size(content: Content) -> int:
+    """Return the bytes of the samples of a content."""
+    return sum(rows.nbytes for rows in content.samples.values())
+
+
 def size(pattern: Pattern) -> int:
-    """Bytes that it takes, about."""
+    """Return the approximate bytes of a pattern in memory."""
     return BARE + REPEAT * sum(len(repeats) for _, _, repeats in pattern.samples if repeats)
 
 
 def marks(pattern: Pattern, known: tuple[float, ...], texts: int, seed: int) -> Content:
-    """A content of that pattern in which whatever may differ is random, and occurs once."""
+    """Return a content of a pattern with random values, each of which occurs once."""
     rng = np.random.default_rng(seed)
     samples = {}
     for name, shape, repeats in pattern.samples:
@@ -115,7 +121,7 @@ def marks(pattern: Pattern, known: tuple[float, ...], texts: int, seed: int) -> 
 
 
 def short(pattern: Pattern) -> Pattern:
-    """Pattern of a layer of a single frame, with numbers that float32 holds."""
+    """Return the pattern of a layer of a single frame, with numbers that float32 holds."""
     return pattern._replace(
         samples=tuple((name, (1, *shape[1:]), None) for name, shape, _ in pattern.samples),
         numbers=(INLINE,) * len(pattern.numbers),
@@ -123,7 +129,11 @@ def short(pattern: Pattern) -> Pattern:
 
 
 def _repeats(rows: Singles) -> Repeats:
-    """Rows differ whose first numbers do, or the sums of some of them; at others it is looked."""
+    """Return the repeats of rows (F, ...).
+
+    Rows are compared by their first numbers, then by sums of a few numbers, and in full only if
+    some of these are equal.
+    """
     flat = rows.reshape(len(rows), -1)
     if _distinct(flat[:, 0]):
         return None
@@ -149,7 +159,7 @@ def _equals(numbers: tuple[float, ...], known: tuple[float, ...]) -> tuple[int, 
 
 
 def alike(a: Array, b: Array) -> bool:
-    """Whether two arrays are, or a sample (F, ...) is, equal to another array."""
+    """Return whether two arrays are equal, or any sample of (F, ...) equals the array."""
     if a.ndim == b.ndim:
         return bool(a.item(-2) == b.item(-2)) and np.array_equal(a, b)
     return bool(np.any(np.all(a == b, axis=tuple(range(1, a.ndim)))))

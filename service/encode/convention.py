@@ -1,4 +1,4 @@
-"""What a file calls joints, and what it measures them in; every format has a usual way."""
+"""Conventions of files: unit of length and up axis."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,7 +13,7 @@ METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01}
 
 @dataclass(frozen=True)
 class Convention:
-    """How a file measures: the metres that its unit of length stands for, and the axis that is up.
+    """Unit of length, as metres per unit, and up axis of a file.
 
     A character whose up axis is Z still faces its front: Y up, +Z ahead becomes Z up, -Y ahead.
     """
@@ -27,13 +27,13 @@ CENTIMETRES = Convention(0.01, "y")
 
 
 def of(unit: Unit | None, up: Up | None, usual: Convention) -> Convention:
-    """What was asked for, and as usual where nothing was."""
+    """Return the requested convention; None is the default of the format."""
     length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
     return Convention(length, usual.up if up is None else up)
 
 
 def refuse_other(found: Convention, law: Convention, name: str) -> None:
-    """InvalidField for a convention in which a format cannot be."""
+    """Raise InvalidField for a convention that a format does not allow."""
     if found.metres_per_unit != law.metres_per_unit:
         raise InvalidField(
             "unit",

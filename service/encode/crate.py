@@ -1,9 +1,9 @@
-"""Binary USD layers of one pattern: one is written by usd-core, the others are filled in.
+"""Templates of binary USD layers: usd-core writes one layer of a pattern, others are filled in.
 
-usd-core takes a millisecond for a layer; NumPy copies its values to their places in a twentieth of
-that. The places are not looked up in the format: a layer is written with numbers that occur once,
-they are looked for, and what is filled in must be what usd-core writes, to the byte. Words stay
-usd-core's own doing: they are compressed, and taken out of a layer of a single frame.
+usd-core takes a millisecond per layer; NumPy copies the values in a twentieth of that. The offsets
+are not derived from the file format: a layer with random values is written and searched for them,
+and a template is accepted only if its output equals that of usd-core byte for byte. Tokens are
+compressed, so usd-core writes them: they are copied from a layer of a single frame.
 """
 
 import struct
@@ -32,24 +32,28 @@ FLOAT, DOUBLE = struct.Struct("<f"), struct.Struct("<d")
 
 @dataclass(frozen=True)
 class Run:
-    """Samples that lie evenly: from offset on, one every stride bytes; and which ones they are."""
+    """Evenly spaced samples in a layer.
+
+    offset: of the first one. stride: bytes between neighbours. rows: their indices.
+    """
 
     offset: int
     stride: int
     rows: slice
 
     def fill(self, layer: bytearray, rows: Bytes) -> None:
-        """Copy samples (F, width) to their places."""
+        """Copy samples (F, width) to their offsets in a layer."""
         chosen, strides = rows[self.rows], (self.stride, 1)
         np.ndarray(chosen.shape, np.uint8, layer, self.offset, strides)[:] = chosen
 
 
 @dataclass(frozen=True)
 class Template:
-    """A layer's bytes but for its words, and where in them each sample, value and number lies.
+    """Bytes of a layer without its tokens, and the offsets of samples, values and numbers.
 
-    short: the pattern of a layer of a single frame. apart: names of arrays of one size. USD would
-    write equal ones once, and then this is no template of the layer.
+    numbers: offset, form and index of each number that is stored. short: the pattern of a layer of
+    a single frame. apart: pairs of arrays of one size; USD would store equal ones once, so the
+    template does not apply to layers in which they are equal.
     """
 
     values: bytes
@@ -61,11 +65,14 @@ class Template:
     apart: tuple[tuple[str, str], ...]
 
     def __len__(self) -> int:
-        """Bytes that it takes, about."""
+        """Return the approximate bytes of the template in memory."""
         return len(self.values) + sum(len(section.content) for section in self.sections)
 
     def write(self, author: Author, content: Content) -> bytes | None:
-        """The layer with other content of its pattern; None where it would not be usd-core's."""
+        """Return the layer with other content of its pattern.
+
+        None where the result would differ from usd-core's.
+        """
         spelt = _words(author, self.short, content.facts.texts)
         if spelt is None or self._merged(author, content):
             return None
@@ -87,20 +94,20 @@ class Template:
 
 
 def pattern(author: Author, content: Content) -> Pattern:
-    """What decides how the bytes of a layer are laid out."""
+    """Return the pattern that determines the layout of a layer's bytes."""
     return contents.pattern(content, author.numbers)
 
 
 def ordinary(author: Author, content: Content) -> bytes:
-    """The layer as usd-core writes it."""
+    """Return the layer as written by usd-core."""
     return layers.crate(author.layer(content))
 
 
 def template(author: Author, content: Content, pattern: Pattern) -> Template | None:
-    """Template of an author's layers of one pattern, or None where it cannot be trusted.
+    """Return a template of an author's layers of one pattern; None if it cannot be verified.
 
-    It can where everything is found and where it makes of the content, and of a random one of its
-    pattern, the bytes that usd-core makes.
+    It is verified if all offsets are found and if usd-core writes the same bytes for the content
+    and for random content of the same pattern.
     """
     texts = len(content.facts.texts)
     first, second = (contents.marks(pattern, author.numbers, texts, seed) for seed in (1, 2))
@@ -114,10 +121,10 @@ def template(author: Author, content: Content, pattern: Pattern) -> Template | N
 
 @lru_cache(maxsize=1024)
 def _words(author: Author, short: Pattern, texts: tuple[str, ...]) -> Section | None:
-    """The section of words of an author's layers that hold those texts.
+    """Return the section of tokens of an author's layers that hold those texts.
 
-    Kept, for usd-core takes half a millisecond. None where they are not numbered as others are: a
-    text that is also the name of a prim is one word with it.
+    Cached, since usd-core takes half a millisecond. None if the tokens are numbered differently
+    than in other layers: a text that equals the name of a prim shares its token.
     """
     found, usual = _short(author, short, texts), _usual(author, short, len(texts))
     return found.sections[0] if found and usual and found.alike(usual) else None
@@ -138,7 +145,7 @@ def _short(author: Author, short: Pattern, texts: tuple[str, ...]) -> Pieces | N
 
 @lru_cache(maxsize=16)
 def _single(author: Author, short: Pattern, count: int) -> Any:
-    """Layer of a single frame, which others are copied from: it takes twice as long to make."""
+    """Return a layer of a single frame to copy others from; building it takes twice as long."""
     return author.layer(contents.marks(short, author.numbers, count, seed=0))
 
 
@@ -158,7 +165,10 @@ def _located(author: Author, marks: Content, pattern: Pattern, found: Pieces) ->
 
 
 def _filled(pattern: Pattern, known: int) -> Iterator[tuple[struct.Struct, int]]:
-    """How and which numbers are copied into a layer: those that none before is equal to."""
+    """Yield form and index of each number that is stored.
+
+    Inline numbers are; of the others, those that equal no earlier one.
+    """
     for index, equal in enumerate(pattern.numbers):
         if equal == INLINE:
             yield FLOAT, index
@@ -167,14 +177,13 @@ def _filled(pattern: Pattern, known: int) -> Iterator[tuple[struct.Struct, int]]
 
 
 def _runs(values: bytes, marks: Singles) -> tuple[Run, ...]:
-    """Runs of evenly spaced samples, of which equal ones lie in one place; none where one lies
-    nowhere."""
+    """Return runs of evenly spaced samples, equal ones stored once; empty if any is not found."""
     first: dict[bytes, int] = {}
     for index, row in enumerate(marks):
         first.setdefault(row.tobytes(), index)
     places: list[int] = []
     for row in first:
-        # Samples lie in the order of time.
+        # Samples are stored in the order of time.
         places.append(values.find(row, places[-1] if places else 0))
     return () if min(places) < 0 else tuple(_even(list(first.values()), places))
 
@@ -195,7 +204,7 @@ def _arrays(author: Author, content: Content) -> dict[str, Array]:
 
 
 def _apart(author: Author, marks: Content) -> Iterator[tuple[str, str]]:
-    """Pairs of arrays, or samples and array, that could be equal."""
+    """Yield pairs of arrays, or of samples and an array, that have one size."""
     every = _arrays(author, marks)
     of_one = {n: v.shape[1:] if n in marks.samples else v.shape for n, v in every.items()}
     for a, b in combinations(every, 2):

@@ -1,4 +1,4 @@
-"""A crowd as plain arrays in one .npz file, every character where it stands in the world."""
+"""Crowds as plain arrays in one .npz file, in world space."""
 
 from io import BytesIO
 from pathlib import Path
@@ -11,8 +11,11 @@ from service.motion.crowd import CrowdClip
 
 
 def write(crowd: CrowdClip, path: Path) -> None:
-    """Write rotations (N, F, J, 4), root_position (N, F, 3), m, bone_offsets (N, J, 3), m, rate and
-    joints; raises FileError where that cannot be."""
+    """Write a crowd to an .npz file.
+
+    rotations: (N, F, J, 4). root_position: (N, F, 3), m. bone_offsets: (N, J, 3), m. rate: frames a
+    second. joints: names. Raises FileError if the file cannot be written.
+    """
     made = list(crowd.batches)
     rotations, roots, bones = (
         np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
@@ -35,7 +38,7 @@ _PARTS = ("rotations", "root_position", "bone_offsets")
 
 
 def _placed(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:
-    """Rotations and roots of all characters in the world."""
+    """Return rotations and root positions of all characters in the world."""
     turns = crowd.placement.turns[:, None]
     own = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
     moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]

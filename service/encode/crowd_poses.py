@@ -1,4 +1,4 @@
-"""A block of crowd poses as a table, one row a character."""
+"""Crowd poses as tables of one row per character."""
 
 from typing import Any
 
@@ -9,11 +9,11 @@ from service.encode.tables import Column, Table, single
 from service.motion.crowd import CrowdPoses
 
 JSON_LIMIT = 1000
-"""Characters: 2.6 MB at 31 joints. More is for programs, which read binary."""
+"""Largest number of characters in JSON, 2.6 MB at 31 joints; larger crowds need a binary format."""
 
 
 def table(poses: CrowdPoses) -> Table:
-    """Table of N rows, and what holds for the whole block."""
+    """Return a table of N rows, with the facts of the whole block."""
     return Table(_columns(poses), _facts(poses))
 
 

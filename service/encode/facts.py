@@ -1,4 +1,4 @@
-"""Plain facts as values of a USD dictionary, which knows no none and no mixed lists."""
+"""Plain facts as values of USD dictionaries, which hold neither None nor mixed lists."""
 
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -9,77 +9,82 @@ import numpy as np
 from pxr import Vt
 
 LARGEST = 2**63 - 1
-"""Of the integers that every reader of a layer can take."""
+"""Largest integer that every reader of a layer supports."""
 
 
 class Facts(NamedTuple):
-    """Facts in parts: a shape that many answers share, and the numbers and texts that fill it."""
+    """Facts split into a shape, which many results share, and its numbers and texts."""
 
     shape: Hashable
     numbers: tuple[float, ...]
     texts: tuple[str, ...]
 
     def whole(self) -> Any:
-        """The facts again."""
+        """Return the facts as one value."""
         return _joined(self.shape, iter(self.numbers), iter(self.texts), self.texts)
 
 
 class Group(NamedTuple):
-    """Facts by name, and the shape of each."""
+    """Shape of a dictionary: names, and the shape of each value."""
 
     names: tuple[str, ...]
     shapes: tuple[Hashable, ...]
 
 
 class Several(NamedTuple):
-    """Texts or groups in a row, and the shape of each."""
+    """Shape of a list of texts or dictionaries."""
 
     shapes: tuple[Hashable, ...]
 
 
 class Again(NamedTuple):
-    """Place of a text that came before, the nth of all: USD writes it once."""
+    """Shape of a repeated text, the nth of all: USD stores it once."""
 
     nth: int
 
 
 @dataclass(frozen=True)
 class Same:
-    """A fact that belongs to the shape: what is neither a finite number nor text, and text that is
-    the name of a fact too."""
+    """Shape of a fact that is a constant of the shape.
+
+    Any fact that is neither a finite number nor a text, and a text that is also the name of a fact.
+    """
 
     spelt: str
     fact: Any = field(compare=False)
 
 
 NUMBER, TEXT = "number", "text"
-"""Places of a finite number, and of a text."""
+"""Shapes of a finite number and of a text."""
 
 NONE = Facts(Group((), ()), (), ())
 
 
 def parted(facts: Mapping[str, Any]) -> Facts:
-    """The same facts in parts."""
+    """Return facts split into shape, numbers and texts."""
     parting = _Parting(frozenset(_names(facts)))
     shape = parting.shape(facts)
     return Facts(shape, tuple(parting.numbers), tuple(parting.texts))
 
 
 def dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """The same facts, but for those that are None."""
+    """Return facts as values of a USD dictionary, without those that are None."""
     return {name: _value(fact) for name, fact in facts.items() if fact is not None}
 
 
 @dataclass
 class _Parting:
-    """Numbers and texts of facts as they are met; texts by their places. names: of all facts."""
+    """Numbers and texts of facts, collected in order.
+
+    names: of all facts. texts: index by text.
+    """
 
     names: frozenset[str]
     numbers: list[float] = field(default_factory=list)
     texts: dict[str, int] = field(default_factory=dict)
 
     def shape(self, fact: Any) -> Hashable:
-        """Shape of a fact, whose numbers and texts are taken."""
+        """Return the shape of a fact, and collect its numbers and texts."""
         kind = type(fact)
         if kind is float and math.isfinite(fact):
             self.numbers.append(fact)
@@ -104,7 +109,7 @@ class _Parting:
 
 
 def _names(fact: Any) -> Iterator[str]:
-    """Names of facts, and of those in them."""
+    """Yield the names of facts, nested ones included."""
     if type(fact) is dict:
         yield from fact
         for each in fact.values():

@@ -1,7 +1,7 @@
-"""A clip as binary glTF 2.0: a skeleton of nodes, a light body skinned to it, and its animation.
+"""Clips as binary glTF 2.0: joint nodes, a body mesh skinned to them, and an animation.
 
-glTF is in metres, seconds and quaternions x y z w, with Y up: no file can say otherwise. Joints
-keep their names, which may be any text here.
+glTF is always in metres, seconds and quaternions x y z w, with Y up. Joints keep their names, which
+may be any text in glTF.
 """
 
 import struct
@@ -26,25 +26,28 @@ Bytes = npt.NDArray[np.uint8]
 
 MAGIC, VERSION, TEXT, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 VERTICES, CORNERS = 34962, 34963
-"""What a view of the buffer is for, in the numbers of OpenGL."""
+"""Targets of buffer views, by their OpenGL constants."""
 COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}
-# A share of one is the largest byte.
+# The byte 255 stands for a weight of one.
 WHOLE = np.array([255, 0, 0, 0], np.uint8)
 COLORS = np.round(255 * np.pad(body.TINTS, ((0, 0), (0, 1)), constant_values=1.0)).astype(np.uint8)
 STILL = 1e-9
-"""A joint's translation that varies by no more, m, is its offset and is not animated."""
+"""Largest variation, m, of a joint's translation that is taken as constant."""
 
 
 @dataclass(frozen=True)
 class Store:
-    """Arrays one behind the other, and what the file says of them."""
+    """Binary buffer under construction, with its views and accessors."""
 
     views: list[dict[str, Any]] = field(default_factory=list)
     accessors: list[dict[str, Any]] = field(default_factory=list)
     parts: list[bytes] = field(default_factory=list)
 
     def view(self, content: bytes, **said: Any) -> int:
-        """Index of a new view of bytes, which are filled up to a multiple of four."""
+        """Return the index of a new view of bytes, padded to a multiple of four.
+
+        said: further properties of the view.
+        """
         last = self.views[-1] if self.views else {"byteOffset": 0, "byteLength": 0}
         start = last["byteOffset"] + _filled(last["byteLength"])
         length = len(content)
@@ -53,27 +56,33 @@ class Store:
         return len(self.views) - 1
 
     def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **said: Any) -> int:
-        """Index of a new accessor of as many elements as the array has rows."""
+        """Return the index of a new accessor with one element per row of the array.
+
+        kind: glTF type such as "VEC3". said: further properties of the accessor.
+        """
         component = COMPONENTS[array.dtype.str[1:]]
         found = {"bufferView": view, "componentType": component, "count": len(array), "type": kind}
         self.accessors.append(found | said)
         return len(self.accessors) - 1
 
     def add(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
-        """Index of an accessor of a whole array; said: of its view."""
+        """Return the index of an accessor of a whole array; said: properties of its view."""
         return self.accessor(array, kind, self.view(array.tobytes(), **said))
 
     def bounded(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
-        """The same with the lowest and highest numbers, which some arrays must have."""
+        """Return the index of an accessor of a whole array, with minimum and maximum.
+
+        glTF requires them for positions and times. said: properties of its view.
+        """
         flat = array.reshape(len(array), -1)
         ends = {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}
         return self.accessor(array, kind, self.view(array.tobytes(), **said), **ends)
 
 
 def glb(answer: ClipAnswer, said: Convention) -> bytes:
-    """glTF of one clip, with the trust in `asset.extras.posefield`.
+    """Return the glTF file of one clip, with the provenance in `asset.extras.posefield`.
 
-    InvalidField for a convention other than metres with Y up.
+    Raises InvalidField for a convention other than metres with Y up.
     """
     convention.refuse_other(said, METRES, "glb")
     clip, store = answer.clip, Store()
@@ -106,7 +115,7 @@ def _asset(answer: ClipAnswer) -> dict[str, Any]:
 
 
 def _joints(clip: Clip, offsets: Floats) -> list[dict[str, Any]]:
-    """Nodes of the joints at rest."""
+    """Return the nodes of the joints in the rest pose."""
     nodes: list[dict[str, Any]] = [
         {"name": name, "translation": offset}
         for name, offset in zip(clip.skeleton.names, offsets.tolist(), strict=True)
@@ -134,8 +143,10 @@ def _primitive(store: Store, resting: Rest) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Fixed:
-    """What of a body its size does not change: colours, joints and weights (P, 4) of its points,
-    and the corners of its triangles (3 T,)."""
+    """Arrays of a body mesh that are equal for all bone offsets of a rig.
+
+    colors, joints, weights: of the points (P, 4). corners: of the triangles (3 T,).
+    """
 
     colors: Bytes
     joints: npt.NDArray[Any]
@@ -159,7 +170,7 @@ def _shares(store: Store, values: Bytes) -> int:
 
 
 def _skin(store: Store, rest: Floats) -> dict[str, Any]:
-    # Matrices by column: the last of them moves.
+    # Column-major matrices: the last column translates.
     inverse = np.tile(np.eye(4, dtype=np.float32), (len(rest), 1, 1))
     inverse[:, 3, :3] = -rest
     bound = store.add(inverse, "MAT4")
@@ -167,7 +178,7 @@ def _skin(store: Store, rest: Floats) -> dict[str, Any]:
 
 
 def _animation(store: Store, clip: Clip) -> dict[str, Any]:
-    """Channels of all joints' rotations, and of the translations of those that are moved."""
+    """Return channels of all rotations, and of the translations that are not constant."""
     when = store.bounded(_single(np.arange(len(clip)) / clip.rate), "SCALAR")
     # Readers interpolate between neighbours, which must lie in one hemisphere.
     turns = _single(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
@@ -189,7 +200,7 @@ def _animation(store: Store, clip: Clip) -> dict[str, Any]:
 
 
 def _tracks(store: Store, tracks: Singles, kind: str) -> list[int]:
-    """Accessors of each joint's frames (J, F, ...), which share a view."""
+    """Return one accessor for the frames of each joint, (J, F, ...), all in one view."""
     view, size = store.view(tracks.tobytes()), tracks[0].nbytes
     return [
         store.accessor(own, kind, view, byteOffset=joint * size) for joint, own in enumerate(tracks)
@@ -201,7 +212,7 @@ def _single(values: Floats | Singles) -> Singles:
 
 
 def _triangles(counts: Integers, points: Integers) -> Integers:
-    """Corners (3 T,) of faces cut into fans."""
+    """Return the corners (3 T,) of faces cut into triangle fans."""
     cut = counts - 2
     owner = np.repeat(np.arange(len(cut)), cut)
     first = (np.cumsum(counts) - counts)[owner]
@@ -210,7 +221,7 @@ def _triangles(counts: Integers, points: Integers) -> Integers:
 
 
 def _smallest(count: int) -> type[np.unsignedinteger[Any]]:
-    """Unsigned integers that can tell so many things apart; glTF keeps the largest for itself."""
+    """Return the smallest unsigned type for `count` values; glTF reserves the largest one."""
     kinds = (np.uint8, np.uint16, np.uint32)
     return next(kind for kind in kinds if count <= np.iinfo(kind).max)
 

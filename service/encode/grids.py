@@ -1,20 +1,16 @@
-"""Sigma over two controls as a table: the grid itself, or a row for each of its points."""
+"""Sigma grids as tables: the grid itself, or one row per point."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from service.encode import tables
-from service.encode.arrow import arrow
-from service.encode.media import ARROW, JSON, MSGPACK, NPZ
 from service.encode.tables import Table
 from service.motion.answer import SigmaGrid
 
 
 def table(grid: SigmaGrid) -> Table:
-    """The values of both axes, and sigma, inside and supported (rows, columns)."""
+    """Return the values of both axes, with sigma, inside and supported (R, C) as arrays."""
     arrays = {
         "across_values": grid.across.values,
         "along_values": grid.along.values,
@@ -26,7 +22,7 @@ def table(grid: SigmaGrid) -> Table:
 
 
 def points(grid: SigmaGrid) -> Table:
-    """The same as R C rows, those of one value along behind one another."""
+    """Return the grid as a table of R C rows, ordered by `along`, then `across`."""
     across, along = np.meshgrid(grid.across.values, grid.along.values)
     columns = {
         "across_values": across.ravel(),
@@ -48,23 +44,3 @@ def _facts(grid: SigmaGrid) -> dict[str, Any]:
         "performer": grid.performer,
         "units": {"across": across.unit, "along": along.unit, "sigma": "metre"},
     }
-
-
-@dataclass(frozen=True)
-class GridEncoder:
-    """How one format of a grid is named and made."""
-
-    extension: str
-    media_type: str
-    encode: Callable[[SigmaGrid], bytes]
-
-
-GRID_ENCODERS = {
-    encoder.extension: encoder
-    for encoder in (
-        GridEncoder("json", JSON, lambda grid: tables.json(table(grid))),
-        GridEncoder("msgpack", MSGPACK, lambda grid: tables.msgpack(table(grid))),
-        GridEncoder("npz", NPZ, lambda grid: tables.npz(table(grid))),
-        GridEncoder("arrow", ARROW, lambda grid: arrow(points(grid))),
-    )
-}

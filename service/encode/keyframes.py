@@ -1,8 +1,7 @@
-"""A clip as plain numbers in JSON, for programs that have no USD."""
+"""Clips as plain arrays: JSON and tables."""
 
 import numpy as np
 import numpy.typing as npt
-import orjson
 
 from service.encode import axes, tables
 from service.encode.convention import Convention
@@ -21,13 +20,14 @@ UNITS = {
 }
 LENGTHS = {1.0: "metre", 0.01: "centimetre"}
 DECIMALS = 6
-"""A micrometre; float32 keeps little more for a joint a few metres away."""
+"""Decimals of lengths in JSON: a micrometre, near float32's precision a few metres away."""
 
 
 def json(answer: ClipAnswer, convention: Convention) -> bytes:
-    """One JSON object: the skeleton, every frame's rotations and root position, and the trust.
+    """Return one JSON object: the skeleton, all rotations and root positions, and provenance.
 
-    Rounded, unlike the table: nobody reads a micrometre, and digits are what JSON takes time for.
+    Numbers are rounded, unlike those of `table`, since the time to write JSON grows with its
+    digits.
     """
     clip = axes.moved(convention, answer.clip)
     content = {
@@ -40,11 +40,11 @@ def json(answer: ClipAnswer, convention: Convention) -> bytes:
         **{name: _short(values) for name, values in tracks(clip).items()},
         "trust": answer.trust.facts(),
     }
-    return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+    return tables.document(content)
 
 
 def table(answer: ClipAnswer, convention: Convention) -> Table:
-    """The same as a table, one row a frame; bone offsets hold for all."""
+    """Return the clip as a table of one row per frame; bone offsets are one array for all."""
     clip = axes.moved(convention, answer.clip)
     numbers = {name: tables.single(values) for name, values in tracks(clip).items()}
     fixed = {"bone_offsets": numbers.pop("bone_offsets")}
@@ -59,19 +59,22 @@ def table(answer: ClipAnswer, convention: Convention) -> Table:
 
 
 def units(convention: Convention) -> dict[str, str]:
-    """What the numbers of a file in a convention are."""
+    """Return the units of a file in a convention."""
     metres = convention.metres_per_unit
     length = LENGTHS.get(metres, f"{metres:g} metres")
     return UNITS | {"length": length, "up": convention.up.upper()}
 
 
 def times(clip: Clip) -> Floats:
-    """When each frame is (F,), s."""
+    """Return the time of each frame (F,), s."""
     return np.arange(len(clip)) / clip.rate
 
 
 def tracks(clip: Clip) -> dict[str, Floats]:
-    """Rotations (F, J, 4), the root's position (F, 3) and bone offsets (J, 3)."""
+    """Return rotations (F, J, 4), root positions (F, 3) and bone offsets (J, 3).
+
+    In the unit of the clip; the root's offset is zero.
+    """
     # The root has a path and no bone.
     offsets = np.concatenate([np.zeros((1, 3)), clip.translations[0, 1:]])
     return {"rotations": clip.rotations, "root_position": clip.root_path, "bone_offsets": offsets}

@@ -1,4 +1,4 @@
-"""The head of a layer, and its bytes."""
+"""Metadata and binary form of USD layers."""
 
 import errno
 import tempfile
@@ -12,28 +12,32 @@ from pxr import Sdf, Tf
 from service.encode import facts
 from service.encode.content import Content
 from service.encode.convention import METRES, Convention
+from service.motion.errors import FileError
 
 MEMORY = Path("/dev/shm")
 
-# The first layer of a process makes usd-core load its formats, and of two threads that do so at
-# once each can wait for the other for ever. Modules are imported by one.
+# The first layer of a process makes usd-core load its file formats; two threads that do so at the
+# same time can deadlock. A module is imported by one thread only.
 Sdf.Layer.CreateAnonymous("first.usda")
 
 
 def head(
     made: Any, default: str, frames: int, rate: float, convention: Convention = METRES
 ) -> None:
-    """State default prim, units, axes and times: frames at the time codes 0 to frames - 1."""
+    """Set default prim, units, axes and times: frames at the time codes 0 to frames - 1.
+
+    rate: frames a second.
+    """
     made.defaultPrim = default
     made.startTimeCode, made.endTimeCode = 0.0, float(frames - 1)
-    # Readers differ in which of the two they believe.
+    # Some readers use one of the two, some the other.
     made.timeCodesPerSecond = made.framesPerSecond = float(rate)
     made.pseudoRoot.SetInfo("metersPerUnit", convention.metres_per_unit)
     made.pseudoRoot.SetInfo("upAxis", convention.up.upper())
 
 
 def say(made: Any, said: Mapping[str, Any]) -> None:
-    """State facts where there are any."""
+    """Set the custom layer data `posefield` to facts, unless there are none."""
     if said:
         made.customLayerData = {"posefield": dict(said)}
 
@@ -47,22 +51,31 @@ class Kind:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Those that every layer holds."""
+        """Return the numbers that every layer holds."""
         return (self.rate, self.convention.metres_per_unit)
 
     def state(self, made: Any, default: str, content: Content) -> None:
-        """Give a layer its head, with this default prim, and the facts of its content."""
+        """Set the metadata of a layer, with this default prim, and the facts of its content."""
         head(made, default, content.frames, self.rate, self.convention)
         say(made, facts.dictionary(content.facts.whole()))
 
 
-def crate(made: Any) -> bytes:
-    """The layer in its binary form, which pxr can only write to a file."""
+def crate(made: Any, memory: Path = MEMORY) -> bytes:
+    """Return the layer in its binary form, which pxr can only write to a file.
+
+    memory: folder for that file; the default folder of temporary files if it cannot be used. Raises
+    FileError if neither can be written.
+    """
     try:
-        return _written(made, MEMORY)
+        return _written(made, memory)
     except OSError:
-        # It may be missing, full or not ours: containers have 64 MB.
+        # It may be missing, full or not writable: containers have 64 MB of it.
+        pass
+    try:
         return _written(made, None)
+    except OSError as fault:
+        message = f"a temporary file of usd-core cannot be written: {fault.strerror}"
+        raise FileError(tempfile.gettempdir(), message) from fault
 
 
 def _written(made: Any, place: Path | None) -> bytes:
@@ -73,9 +86,9 @@ def _written(made: Any, place: Path | None) -> bytes:
 
 
 def export(made: Any, path: Path) -> None:
-    """Write a layer as text where the path ends in .usda, and in binary form else.
+    """Write a layer as text if the path ends in .usda, and in binary form otherwise.
 
-    Raises OSError where it cannot be, like all that writes.
+    Raises OSError if it cannot be written.
     """
     form = "usda" if path.suffix == ".usda" else "usdc"
     try:

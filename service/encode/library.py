@@ -1,14 +1,14 @@
-"""A stage of one character and all clips that it can play, each in a layer of its own.
+"""USD stage of one character and many clips, each clip in a layer of its own.
 
-    /Character                  SkelRoot, the default prim: as the model rests
+    /Character                  SkelRoot, the default prim: in the model's rest pose
       Skel                      bound to the first of the clips
       Body
       Clips
         NAME                    SkelAnimation, by a payload in NAME's layer
 
-Readers load payloads when they are asked for: pxr opens a stage of 100,000 clips without them in
-seconds. Its clips are written as text, because usd-core takes ten times as long and 250 MB more to
-make so many prims, and no less time to read them.
+Readers load payloads on demand: pxr opens a stage of 100,000 clips without them in seconds. The
+prims of the clips are written as text, because usd-core takes ten times as long and 250 MB more to
+create as many prims, and as long to read them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Sdf
 
-from service.encode import axes, character, layers, names, reach, specs
+from service.encode import axes, character, character_prims, layers, names, reach, specs
 from service.encode.convention import Convention
 from service.motion.answer import ClipAnswer
 from service.motion.conventions import Floats
@@ -32,9 +32,9 @@ Corner = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Entry:
-    """A clip of a library: its name, and where its layer lies beside the stage.
+    """Clip of a library: its name, and the path of its layer relative to the stage.
 
-    low, high: corners of a box that the character never leaves in it, m.
+    low, high: corners of a box that contains the character in all frames, m.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Entry:
 
 
 def entry(name: str, file: str, answer: ClipAnswer) -> Entry:
-    """Entry of an answer; its box is as large as if the body could point anywhere."""
+    """Return the entry of a result; its box holds for any rotations of the joints."""
     clip = answer.clip
     low, high = reach.anywhere(clip.skeleton, clip.translations[0], clip.root_path).tolist()
     return Entry(name, file, len(clip), clip.rate, tuple(low), tuple(high))
@@ -55,9 +55,9 @@ def entry(name: str, file: str, answer: ClipAnswer) -> Entry:
 def stage(
     skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[Entry]
 ) -> bytes:
-    """USD text of the stage; clips whose names are no legal names of prims get such.
+    """Return the USD text of the stage; names of clips are made legal names of prims.
 
-    It lasts as long as the longest clip at the rate of the stage, frames a second.
+    rate: of the stage, frames a second. The stage is as long as the longest clip.
     """
     prims = names.legal(each.name for each in entries)
     text = _character(skeleton, convention, rate, entries, prims[:1])
@@ -73,17 +73,17 @@ def _character(
     entries: Sequence[Entry],
     bound: tuple[str, ...],
 ) -> str:
-    """Text of the stage without its clips."""
+    """Return the text of the stage without its clips."""
     rig, made = character.rig(skeleton), Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
     layers.head(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
-    root = character.root(made, ROOT.name, rig)
+    root = character_prims.root(made, ROOT.name, rig)
     numbers = character.at_rest(rig, convention)
     extent = _box(numbers["extent"], entries, convention)
-    character.fill(root, {**numbers, "extent": extent})
+    character_prims.fill(root, character_prims.values({**numbers, "extent": extent}))
     specs.prim(root, CLIPS.name, "Scope")
     for name in bound:
-        character.bind(root, CLIPS.AppendChild(name))
+        character_prims.bind(root, CLIPS.AppendChild(name))
     text: str = made.ExportToString()
     return text
 
@@ -98,13 +98,13 @@ def _clips(prims: Sequence[str], entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def _asset(file: str) -> str:
-    """Path of a layer beside the stage, as USD text."""
+    """Return the path of a layer beside the stage as USD text."""
     path = f"./{file}"
     return f"@@@{path}@@@" if "@" in path else f"@{path}@"
 
 
 def _box(rest: Floats, entries: Sequence[Entry], convention: Convention) -> Floats:
-    """Lowest and highest corner (2, 3) of the character at rest and in all clips."""
+    """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
     boxes = np.array([(each.low, each.high) for each in entries]).reshape(-1, 2, 3)
     every = np.concatenate([rest[None], axes.box(convention, boxes)])
     return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]).astype(np.float32)

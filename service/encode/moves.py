@@ -1,4 +1,4 @@
-"""Motions as USD takes them: single precision, the real part last, neighbours of one sign."""
+"""Motions in USD's form: float32, real part last, neighbouring quaternions of one sign."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from service.motion.crowd import Motions
 
 @dataclass(frozen=True)
 class Moves:
-    """M motions of one skeleton, end to end: motion m has the frames starts[m] to starts[m + 1].
+    """M motions of one skeleton, concatenated: motion m has the frames starts[m] to starts[m + 1].
 
-    rotations (N, J, 4), real part last, and path (N, 3), m, of all frames; offsets (M, J, 3), m,
-    of which the root's is not used; starts (M + 1,). No number is -0.
+    rotations (N, J, 4): of all frames, real part last. path (N, 3): root positions, m. offsets (M,
+    J, 3): of the bones, m; the root's is not used. starts: (M + 1,). No number is -0.
     """
 
     rotations: Singles
@@ -29,13 +29,13 @@ class Moves:
 
     @cached_property
     def translations(self) -> Singles:
-        """Local translations (N, J, 3), m."""
+        """Return the local translations (N, J, 3), m."""
         local = np.repeat(self.offsets, np.diff(self.starts), axis=0)
         local[:, 0] = self.path
         return local
 
     def parts(self, frames: int) -> Iterator["Moves"]:
-        """The same a few motions at a time, of so many frames or one motion that has more."""
+        """Yield the motions in parts of at most `frames` frames, longer motions one by one."""
         first = 0
         while first < len(self):
             last = int(np.searchsorted(self.starts, self.starts[first] + frames, "right")) - 1
@@ -51,7 +51,7 @@ class Moves:
 
 
 def of_clips(clips: Sequence[Clip]) -> Moves:
-    """Moves of clips of one skeleton; bones keep the offsets that they have in the first frame."""
+    """Return the moves of clips of one skeleton, with the bone offsets of their first frames."""
     starts = _starts([len(clip) for clip in clips])
     made = _empty(starts, len(clips[0].skeleton))
     for index, clip in enumerate(clips):
@@ -63,7 +63,7 @@ def of_clips(clips: Sequence[Clip]) -> Moves:
 
 
 def of_motions(batch: Motions) -> Moves:
-    """Moves of a crowd's motions."""
+    """Return the moves of a crowd's motions."""
     count, frames, joints = batch.rotations.shape[:3]
     made = _empty(_starts([frames] * count), joints)
     _last(batch.rotations.reshape(-1, joints, 4), made.rotations)
@@ -84,8 +84,10 @@ def _empty(starts: Indices, joints: int) -> Moves:
 
 
 def _last(wxyz: Floats | Singles, xyzw: Singles) -> None:
-    """Write quaternions with the real part last: all numbers move up by one, which is one copy,
-    and the real parts are put right."""
+    """Write quaternions with the real part last.
+
+    All numbers move by one in a single copy, then the real parts are set.
+    """
     given, made = np.ascontiguousarray(wxyz).reshape(-1), xyzw.reshape(-1)
     made[:-1] = given[1:]
     made[3::4] = given[::4]
@@ -94,7 +96,7 @@ def _last(wxyz: Floats | Singles, xyzw: Singles) -> None:
 def _tidy(made: Moves) -> Moves:
     _unroll(made)
     for values in (made.rotations, made.path, made.offsets):
-        # USD takes -0 for 0 where it looks for equal samples.
+        # USD's deduplication does not distinguish -0 from 0.
         values += np.float32(0.0)
     return made
 

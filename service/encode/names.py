@@ -1,7 +1,7 @@
-"""Joint names that every reader of USD accepts.
+"""Joint names that all readers of USD accept.
 
-A colon, hyphen, space or leading digit makes some readers drop the whole skeleton without a word,
-and readers that know joints by their leaf name alone merge joints that share one.
+With a colon, hyphen, space or leading digit some readers silently drop the whole skeleton; readers
+that identify joints by their leaf name alone merge joints with equal leaf names.
 """
 
 import re
@@ -12,9 +12,9 @@ LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def legal(names: Iterable[str]) -> tuple[str, ...]:
-    """Unique legal names in the given order; a name that is already legal stays as it is.
+    """Return unique legal names in the given order; legal names are kept.
 
-    Of several names that become the same, the later ones get the endings _2, _3, and so on.
+    Of several names that become equal, the later ones get the endings _2, _3, and so on.
     """
     given = list(names)
     taken = {name for name in given if LEGAL.fullmatch(name)}
@@ -23,7 +23,7 @@ def legal(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
-    """Joint tokens of UsdSkel: each name behind those of its ancestors, divided by slashes."""
+    """Return the joint tokens of UsdSkel: names of ancestors and joint, separated by slashes."""
     found: list[str] = []
     for leaf, parent in zip(leaves, parents, strict=True):
         found.append(leaf if parent < 0 else f"{found[parent]}/{leaf}")
@@ -36,7 +36,7 @@ def _clean(name: str) -> str:
 
 
 def _unique(name: str, taken: set[str], counts: Counter[str]) -> str:
-    """A name that is not taken yet; counts: of each name the last ending that was tried."""
+    """Return a name that is not taken; counts: the last ending tried, by name."""
     found = name
     while True:
         counts[name] += 1

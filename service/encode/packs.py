@@ -1,33 +1,32 @@
-"""Many files in one, tar or zip, sent while the files are made; the same files, the same bytes."""
+"""Archives, tar or zip, streamed while their files are computed; equal files give equal bytes."""
 
 import tarfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from service.encode import usdz
+from service.encode import zip_archive
+from service.encode.media import Format, by_extension
 
 Members = Iterable[tuple[str, bytes]]
 """Names in the archive, with / between folders, and contents."""
 
-# The first moment that zip can name. Zero would do for tar, but GNU tar warns of so old a file.
+# The earliest time of the zip format. GNU tar would warn of files from time zero.
 MOMENT = int(datetime(1980, 1, 1, tzinfo=UTC).timestamp())
 END = bytes(2 * tarfile.BLOCKSIZE)
 
 
 @dataclass(frozen=True)
-class Pack:
-    """How one kind of archive is named and made."""
+class Pack(Format):
+    """Writer of one kind of archive."""
 
-    extension: str
-    media_type: str
     write: Callable[[Members], Iterator[bytes]]
 
 
 def tar(members: Members) -> Iterator[bytes]:
-    """POSIX tar of any number of files, nobody's and without a date, piece by piece.
+    """Yield the chunks of a POSIX tar, without owners and dates.
 
-    Names too long for ustar have a pax record. Raises ValueError for one that is not ASCII.
+    Names too long for ustar have a pax record. Raises ValueError for a name that is not ASCII.
     """
     for name, content in members:
         yield _header(name, len(content))
@@ -43,17 +42,15 @@ def _header(name: str, size: int) -> bytes:
 
 
 def zip(members: Members) -> Iterator[bytes]:  # noqa: A001  # read as packs.zip
-    """Zip of files below 4 GiB each and without a date, stored, piece by piece.
+    """Return an iterator over the chunks of a zip of stored files, without dates.
 
-    Beyond 65,534 files or 4 GiB it is a Zip64. Raises ValueError for a name that is not ASCII.
+    Each file is below 4 GiB. Beyond 65,534 files or 4 GiB the archive is a Zip64. Raises ValueError
+    for a name that is not ASCII.
     """
-    return usdz.archive(usdz.whole(name, content) for name, content in members)
+    return zip_archive.archive(zip_archive.whole(name, content) for name, content in members)
 
 
-PACKS = {
-    pack.extension: pack
-    for pack in (
-        Pack("zip", "application/zip", zip),
-        Pack("tar", "application/x-tar", tar),
-    )
-}
+PACKS = by_extension(
+    Pack("zip", "application/zip", zip),
+    Pack("tar", "application/x-tar", tar),
+)

@@ -1,4 +1,4 @@
-"""Poses as a table, one row a time."""
+"""Poses as tables of one row per time."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from service.motion.answer import PoseAnswer
 
 
 def table(answer: PoseAnswer[Any]) -> Table:
-    """Table of S rows; bone offsets hold for all times."""
+    """Return a table of S rows; bone offsets are one array for all times."""
     return Table(
         {
             "times": answer.times,

@@ -1,4 +1,4 @@
-"""Templates that were made, kept for the layers that come."""
+"""Cache of layer templates, keyed by author and pattern."""
 
 from collections import OrderedDict
 from dataclasses import dataclass, field
@@ -10,65 +10,68 @@ from service.encode import crate, text
 from service.encode.content import Author, Content, Pattern
 
 Key = tuple[Author, Pattern]
+LARGE = 16_000_000
+"""Bytes of samples beyond which no template is made: it takes several times as much."""
 
 
 class Template(Protocol):
-    """Writes layers of one pattern."""
+    """Writer of layers of one pattern."""
 
     def __len__(self) -> int:
-        """Bytes that it takes, about."""
+        """Return the approximate bytes of the template in memory."""
 
     def write(self, author: Author, content: Content) -> bytes | None:
-        """The layer as usd-core writes it; None where it can do no such thing."""
+        """Return the layer as written by usd-core; None if the template does not apply to it."""
 
 
 class Form(Protocol):
-    """A way to write layers: `crate` or `text`."""
+    """Form of layers, binary or text: the module `crate` or `text`."""
 
     def pattern(self, author: Author, content: Content) -> Pattern:
-        """What a template hangs on."""
+        """Return the pattern that selects the template."""
 
     def ordinary(self, author: Author, content: Content) -> bytes:
-        """The layer as usd-core writes it."""
+        """Return the layer as written by usd-core."""
 
     def template(self, author: Author, content: Content, pattern: Pattern) -> Template | None:
-        """Template of an author's layers of one pattern, or None where it cannot be trusted."""
+        """Return a template of an author's layers of one pattern; None if it cannot be verified."""
 
 
 @dataclass(frozen=True)
 class Refused:
-    """Mark of a pattern whose template cannot be trusted."""
+    """Entry of a pattern whose template could not be verified."""
 
     def __len__(self) -> int:
         return 0
 
     def write(self, author: Author, content: Content) -> bytes | None:
-        """Nothing."""
+        """Return None."""
         return None
 
 
 @dataclass(frozen=True)
 class Seen(Refused):
-    """Mark of a pattern that one layer has had."""
+    """Entry of a pattern that has occurred once."""
 
 
 @dataclass
 class Press:
-    """Writes layers in one form, by a template from the second of a pattern on.
+    """Writer of layers in one form, with a thread-safe cache of templates.
 
-    limit: bytes that templates and patterns take together at most, about; those that were not used
-    for longest go.
-    Any thread may write.
+    A template is made when a pattern occurs for the second time. limit: approximate bytes of all
+    templates and patterns; the least recently used ones are removed. taken: bytes in use.
     """
 
     form: Form
     limit: int
+    taken: int = field(default=0, init=False)
     _kept: OrderedDict[Key, Template] = field(default_factory=OrderedDict)
-    _taken: int = 0
     _lock: Lock = field(default_factory=Lock)
 
     def write(self, author: Author, content: Content) -> bytes:
-        """The layer of a content, as usd-core writes it."""
+        """Return the layer of a content, equal to usd-core's."""
+        if contents.samples_size(content) > LARGE:
+            return self.form.ordinary(author, content)
         pattern = self.form.pattern(author, content)
         known = self._look((author, pattern))
         if isinstance(known, Seen):
@@ -90,9 +93,9 @@ class Press:
         with self._lock:
             before = self._kept.pop(key, None)
             self._kept[key] = known
-            self._taken += _size(key, known) - (0 if before is None else _size(key, before))
-            while self._taken > self.limit:
-                self._taken -= _size(*self._kept.popitem(last=False))
+            self.taken += _size(key, known) - (0 if before is None else _size(key, before))
+            while self.taken > self.limit:
+                self.taken -= _size(*self._kept.popitem(last=False))
 
 
 def _size(key: Key, known: Template) -> int:
@@ -100,4 +103,4 @@ def _size(key: Key, known: Template) -> int:
 
 
 CRATES, TEXTS = Press(crate, 64_000_000), Press(text, 8_000_000)
-"""The presses of the process."""
+"""Writers of this process, of binary and text layers."""

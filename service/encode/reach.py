@@ -1,7 +1,7 @@
-"""Boxes that moving bodies never leave, for many motions at once.
+"""Extents: bounding boxes of skinned characters over whole motions, for many motions at once.
 
-Joints and tips are placed exactly, by forward kinematics; what is drawn of a body lies within
-balls about them that are the same for all frames.
+Positions of joints and tips are exact, by forward kinematics; the body lies within spheres about
+them whose radii are the same for all frames.
 """
 
 from collections.abc import Iterator
@@ -18,20 +18,20 @@ from service.motion.skeleton import Skeleton
 
 Places = npt.NDArray[np.intp]
 
-# Of float32 the last bits add up along a chain of joints and a path that leads away; points and
-# joints are rounded to it on their own, too, and readers turn them in it.
+# Rounding to float32 accumulates along a chain of joints and far from the origin. Points and joints
+# in a file are rounded separately, and readers compute with them in float32.
 SLACK = 1e-5
 FRAMES = 3200
-"""Poses that are placed at a time: their numbers fit the processor's cache."""
+"""Poses that are computed at a time: their arrays fit the processor's cache."""
 
 
 @dataclass(frozen=True)
 class Generation:
-    """Points as many joints away from the root, and what they hang on.
+    """Points of one depth in the tree, and their parents.
 
-    points: their places in the tree's order. turns: the places of those of them, the first, on
-    which others hang, among the turning joints. holders: of each the place of the joint that it
-    hangs on, and turners: the same among the turning joints; slices where they are neighbours.
+    points: their places in the tree's order. turns: places, among the turning joints, of those
+    points that have children; they come first. holders: place of each point's parent. turners: the
+    same among the turning joints. Slices stand for consecutive places.
     """
 
     points: slice
@@ -42,10 +42,11 @@ class Generation:
 
 @dataclass(frozen=True)
 class Tree:
-    """A skeleton's points: its joints, then its tips (E, 3), which are as far from theirs, m.
+    """Points of a skeleton: its joints, then its tips.
 
-    order (P,): of the points by generation, those first on which others hang. turning (T,): the
-    joints on which any point hangs, in that order.
+    tips (E, 3): offsets from their joints, m. order (P,): points by depth, those with children
+    first. turning (T,): points with children, in that order. generations: from the root's children
+    on.
     """
 
     tips: Floats
@@ -55,7 +56,7 @@ class Tree:
 
 
 def tree(skeleton: Skeleton) -> Tree:
-    """Points of a skeleton by generation."""
+    """Return the points of a skeleton by depth."""
     above = np.array([*skeleton.parents, *skeleton.tip_joints])
     depths = np.zeros(len(above), int)
     for point, parent in enumerate(above[1:], start=1):
@@ -67,9 +68,9 @@ def tree(skeleton: Skeleton) -> Tree:
 
 
 def boxes(tree: Tree, moves: Moves, balls: Floats) -> Floats:
-    """Lowest and highest corner (M, 2, 3) of all that each motion does in its own frame, m.
+    """Return the lowest and highest corner (M, 2, 3) of each motion in its own frame, m.
 
-    balls (M, P): radii about joints and tips, m. No motion's box hangs on the others.
+    balls (M, P): radii about joints and tips, m. The boxes of the motions are independent.
     """
     found = [_boxes(tree, part) for part in moves.parts(FRAMES)]
     (low, high), radii = np.concatenate(found, axis=-1), balls.T[tree.order]
@@ -77,21 +78,26 @@ def boxes(tree: Tree, moves: Moves, balls: Floats) -> Floats:
 
 
 def anywhere(skeleton: Skeleton, offsets: Floats, path: Floats) -> Floats:
-    """Lowest and highest corner (2, 3) of the skeleton's body in any pose, if its bones have the
-    offsets (J, 3) and its root follows a path (F, 3), m."""
+    """Return a box (2, 3), m, that contains the body in any pose.
+
+    offsets: of the bones (J, 3), m. path: root positions (F, 3), m.
+    """
     own = np.linalg.norm(np.concatenate([skeleton.offsets, skeleton.tip_offsets]), axis=-1)
     arms = own.copy()
     arms[: len(offsets)] = np.maximum(own[: len(offsets)], np.linalg.norm(offsets, axis=-1))
     far = [0.0]
     for arm, parent in zip(arms[1:], (*skeleton.parents[1:], *skeleton.tip_joints), strict=True):
         far.append(far[parent] + arm)
-    # A body that is nowhere wide is drawn as if it were a metre.
+    # The body mesh of a skeleton of zero size is drawn as if its size were a metre.
     reached = max(far) + body.THICKEST * (2.0 * max(far) or 1.0)
     return outwards(path.min(axis=0) - reached, path.max(axis=0) + reached)
 
 
 def outwards(low: Floats, high: Floats) -> Floats:
-    """Corners (..., 2, 3) moved apart by a share of a metre and of the largest coordinate."""
+    """Return corners (..., 2, 3) enlarged to allow for rounding errors.
+
+    Each axis grows at both ends by SLACK (1 + its largest absolute coordinate).
+    """
     slack = SLACK * (1.0 + np.maximum(np.abs(low), np.abs(high)))
     return np.stack([low - slack, high + slack], axis=-2)
 
@@ -107,25 +113,25 @@ def _grown(above: Places, depths: Places, order: Places, turning: Places) -> Ite
 
 
 def _neighbours(places: Places) -> Places | slice:
-    """A slice where it will do: of an array that is a view, and no copy."""
+    """Return a slice for consecutive places, since it selects a view instead of a copy."""
     first, count = int(places[0]), len(places)
     return slice(first, first + count) if np.all(np.diff(places) == 1) else places
 
 
 def _boxes(tree: Tree, moves: Moves) -> Singles:
-    """Lowest and highest place (2, 3, P, M) of each point."""
+    """Return the lowest and highest position (2, 3, P, M) of each point."""
     places = _places(tree, moves)
     low = np.minimum.reduceat(places, moves.starts[:-1], axis=-1)
     return np.stack([low, np.maximum.reduceat(places, moves.starts[:-1], axis=-1)])
 
 
 def _places(tree: Tree, moves: Moves) -> Singles:
-    """Places (3, P, N) of points in the tree's order, m.
+    """Return the positions (3, P, N) of points in the tree's order, m.
 
-    Components come first, unlike elsewhere: it is ten times as fast. Some stand there twice, so
-    that a vector product takes three calls of NumPy, which at this size cost as much as the
-    arithmetic. And there is no operation but plain ones of two numbers, whose results do not hang
-    on what else is in the arrays.
+    Components come first, unlike elsewhere, which is ten times as fast. Some are stored twice, so
+    that a vector product takes three calls of NumPy; at this size calls cost as much as the
+    arithmetic. All operations are elementwise, so that results do not depend on the other motions
+    in the arrays.
     """
     turns = _turns(tree, moves)
     arms = np.repeat(_arms(tree, moves.offsets), np.diff(moves.starts), axis=-1)
@@ -136,7 +142,7 @@ def _places(tree: Tree, moves: Moves) -> Singles:
         here = places[:, each.points]
         _rotate(held, arms[:, each.points], here)
         here += _rows(places, each.holders)
-        # In place: nothing reads a joint's local turn once its parent's is known.
+        # In place: a joint's local rotation is not read after its orientation is computed.
         own = turns[:, each.turns]
         _turn(held[:, : own.shape[1]], own)
     return places
@@ -147,8 +153,10 @@ def _rows(components: Singles, chosen: Places | slice) -> Singles:
 
 
 def _turns(tree: Tree, moves: Moves) -> Singles:
-    """Rotations (6, T, N) of the joints that turn others, x y z x y w; a motion at a time, which
-    the processor's cache holds."""
+    """Return the rotations (6, T, N) of the turning joints, as x y z x y w.
+
+    Copied by motion, so that a copy fits the processor's cache.
+    """
     made = np.empty((6, len(tree.turning), len(moves.rotations)), np.float32)
     for first, last in pairwise(moves.starts):
         turning = moves.rotations[first:last].take(tree.turning, 1).transpose(2, 1, 0)
@@ -158,15 +166,14 @@ def _turns(tree: Tree, moves: Moves) -> Singles:
 
 
 def _arms(tree: Tree, offsets: Singles) -> Singles:
-    """How far (5, P, M) points in the tree's order are from the joints that they hang on, as
-    x y z x y, m."""
+    """Return the offsets (5, P, M) of points from their parents, as x y z x y, m."""
     tips = np.broadcast_to(tree.tips.astype(np.float32), (len(offsets), *tree.tips.shape))
     arms = np.concatenate([offsets, tips], axis=1)[:, tree.order]
     return arms.transpose(2, 1, 0)[[0, 1, 2, 0, 1]]
 
 
 def _turn(a: Singles, b: Singles) -> None:
-    """Make of each quaternion b, x y z x y w, the product a b."""
+    """Replace each quaternion b, x y z x y w, by the product a b."""
     vector, part = _cross(a, b), np.empty_like(a[:3])
     vector += np.multiply(a[5], b[:3], out=part)
     vector += np.multiply(a[:3], b[5], out=part)
@@ -178,7 +185,7 @@ def _turn(a: Singles, b: Singles) -> None:
 
 
 def _rotate(q: Singles, v: Singles, out: Singles) -> None:
-    """Vectors x y z x y turned by quaternions, as x y z."""
+    """Write vectors x y z x y rotated by quaternions to `out`, as x y z."""
     twice = np.empty_like(v)
     once = _cross(q, v)
     np.add(once, once, out=twice[:3])

@@ -1,15 +1,15 @@
-"""Reasons for an answer as plain values, and as a table to read."""
+"""Reasons of a result, as plain values and as a text table."""
 
 from typing import Any
 
 from service.motion.answer import Backing, Captured, Reasons
 
 DECIMALS = 9
-"""Further ones hang on the machine that inverted the system."""
+"""Decimals that do not depend on the machine that inverted the kriging system."""
 
 
 def plain(found: Reasons) -> dict[str, Any]:
-    """Schema Reasons of the contract."""
+    """Return the reasons in the schema Reasons of the API."""
     return {
         "model": found.model,
         "controls": found.controls,
@@ -38,7 +38,7 @@ def _backing(found: Backing) -> dict[str, Any]:
 
 
 def text(found: Reasons) -> str:
-    """A line for each clip, the nearest first, one for all others, and what supports the answer."""
+    """Return one line for each clip, the nearest first, one for all others, and the support."""
     wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
     lines = [f"{'clip':{wide}}  distance   weight  "]
     lines += [

@@ -1,13 +1,13 @@
-"""A binary layer in pieces: values first, then its words, then all that refers to them by number.
+"""Binary USD layer split into values, tokens, and sections that refer to tokens by index.
 
-Of the format this takes what its table of contents says, which is also what every reader takes.
+Only the table of contents of the format is parsed, as by every reader.
 """
 
 import struct
 from dataclasses import dataclass
 
 TABLE = struct.Struct("<q")
-"""Where in the head of a file the place of its table stands, and how a table counts."""
+"""Offset of the table of contents in the head, and number of entries in the table."""
 TABLE_AT = 16
 ENTRY = struct.Struct("<16sqq")
 WORDS = b"TOKENS"
@@ -15,7 +15,7 @@ WORDS = b"TOKENS"
 
 @dataclass(frozen=True)
 class Section:
-    """One section by name, and its bytes."""
+    """One section: name and bytes."""
 
     name: bytes
     content: bytes
@@ -23,23 +23,23 @@ class Section:
 
 @dataclass(frozen=True)
 class Pieces:
-    """Head and values, without the place of the table, and the sections, the words first."""
+    """Head and values, with the table's offset set to zero, and the sections, tokens first."""
 
     values: bytes
     sections: tuple[Section, ...]
 
     @property
     def words(self) -> bytes:
-        """The section of words."""
+        """Return the section of tokens."""
         return self.sections[0].content
 
     def alike(self, other: "Pieces") -> bool:
-        """Whether both say the same but for the spelling of their words."""
+        """Return whether both are equal except for the text of their tokens."""
         return self.values == other.values and self.sections[1:] == other.sections[1:]
 
 
 def pieces(data: bytes) -> Pieces | None:
-    """Pieces of a binary layer; None where it is laid out in another way."""
+    """Return the pieces of a binary layer; None for another layout."""
     try:
         listed = _listed(data)
     except struct.error:
@@ -54,21 +54,21 @@ def pieces(data: bytes) -> Pieces | None:
 
 
 def _listed(data: bytes) -> list[tuple[bytes, int, int]]:
-    """Name, start and size of each section that the table of a binary layer lists."""
+    """Return name, start and size of each section in the table of a binary layer."""
     (table,) = TABLE.unpack_from(data, TABLE_AT)
     (count,) = TABLE.unpack_from(data, table)
     return [ENTRY.unpack_from(data, table + TABLE.size + i * ENTRY.size) for i in range(count)]
 
 
 def joined(values: bytes | bytearray, sections: tuple[Section, ...]) -> bytes:
-    """The binary layer again."""
+    """Return the binary layer of head, values and sections."""
     made = bytearray(values)
     end = tail(made, sections)
     return bytes(made) + end
 
 
 def tail(values: bytearray, sections: tuple[Section, ...]) -> bytes:
-    """Sections and table that follow the values, in which the place of the table is set."""
+    """Return sections and table for the end of a layer; set the table's offset in its head."""
     start, entries = len(values), []
     for section in sections:
         entries.append(ENTRY.pack(section.name, start, len(section.content)))
@@ -79,6 +79,6 @@ def tail(values: bytearray, sections: tuple[Section, ...]) -> bytes:
 
 
 def placed(values: bytearray, table: int) -> bytes:
-    """Head and values with another place of the table."""
+    """Return head and values with the given offset of the table."""
     TABLE.pack_into(values, TABLE_AT, table)
     return bytes(values)

@@ -1,4 +1,4 @@
-"""Short forms for writing prims, attributes and relationships straight into a layer."""
+"""Helpers that write prims, attributes and relationships directly into a layer."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ Type = Sdf.ValueTypeNames
 
 
 def prim(parent: Any, name: str, kind: str, apis: Sequence[str] = ()) -> Any:
-    """New prim of a schema with applied API schemas."""
+    """Return a new prim of a schema with applied API schemas."""
     spec = Sdf.PrimSpec(parent, name, Sdf.SpecifierDef, kind)
     if apis:
         spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=list(apis)))
@@ -21,7 +21,7 @@ def prim(parent: Any, name: str, kind: str, apis: Sequence[str] = ()) -> Any:
 
 
 def attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
-    """New varying attribute, with a default value where one is given."""
+    """Return a new varying attribute, with a default value unless it is None."""
     spec = Sdf.AttributeSpec(owner, name, kind)
     if value is not None:
         spec.default = value
@@ -29,32 +29,32 @@ def attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
 
 
 def uniform(owner: Any, name: str, kind: Any, value: Any = None) -> None:
-    """New attribute that never varies in time, with its value where one is given."""
+    """Create an attribute that does not vary over time, with a value unless it is None."""
     spec = Sdf.AttributeSpec(owner, name, kind, Sdf.VariabilityUniform)
     if value is not None:
         spec.default = value
 
 
 def per_point(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
-    """New attribute with one element for each point of a mesh."""
+    """Return a new attribute with one element per point of a mesh."""
     spec = attribute(owner, name, kind, value)
     spec.SetInfo("interpolation", "vertex")
     return spec
 
 
 def relation(owner: Any, name: str, target: Any) -> None:
-    """New relationship to the prim at a path."""
+    """Create a relationship to the prim at a path."""
     spec = Sdf.RelationshipSpec(owner, name, custom=False)
     spec.targetPathList.explicitItems = [target]
 
 
 def vectors(values: Floats) -> Any:
-    """float3[] of (N, 3)."""
+    """Return a float3[] of an array (N, 3)."""
     return Vt.Vec3fArray.FromNumpy(values.astype(np.float32))
 
 
 def samples(prim: Any, values: Samples) -> None:
-    """Samples of the translations and rotations of a SkelAnimation."""
+    """Set the time samples of translations and rotations of a SkelAnimation."""
     _samples(prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"]))
     _samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
 

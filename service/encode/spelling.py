@@ -1,7 +1,7 @@
-"""Numbers as USD text has them.
+"""Numbers in the syntax of USD text.
 
-usd-core spells each number on its own, orjson a whole array. Both write the fewest digits that mean
-the number in its precision, and differ in few forms: 1.0 for 1, and where exponents begin.
+usd-core formats each number by itself, orjson a whole array. Both write the fewest digits that
+identify the number in its precision, and differ in few forms: 1.0 for 1, and the use of exponents.
 """
 
 import numpy as np
@@ -11,27 +11,30 @@ from service.encode.content import Array
 from service.motion.conventions import Floats, Singles
 
 LARGEST = 1e13
-"""Orjson takes exponents from there on, usd-core later."""
+"""Smallest number that orjson writes with an exponent; usd-core starts later."""
 SMALLEST = 1e-5
-"""Orjson takes exponents below it in double precision, usd-core later."""
+"""Largest float64 below which orjson writes an exponent; usd-core starts later."""
 
 
 def plain(values: Array) -> bool:
-    """Whether both spell the numbers alike; they do not those that are none."""
+    """Return whether orjson and usd-core agree on all numbers; they do not on NaN and infinity."""
     sizes = np.abs(values)
     small = values.dtype == np.float64 and np.any((sizes < SMALLEST) & (sizes > 0))
     return not small and bool(np.all(sizes < LARGEST))
 
 
 def array(values: Array) -> bytes:
-    """Vectors (N, 3) in single or matrices (N, 4, 4) in double precision, in square brackets."""
+    """Return vectors (N, 3) in float32 or matrices (N, 4, 4) in float64, in square brackets."""
     if values.ndim == 2:
         return b"[(%b)]" % vectors(values[None])[0]
     return b"[%b]" % b", ".join(b"( (%b) )" % rows for rows in vectors(values))
 
 
 def moves(rows: Singles) -> list[bytes]:
-    """Each row of vectors (F, N, 3); where all but the first vector stay, they are spelt once."""
+    """Return the text of each row of vectors (F, N, 3).
+
+    If all but the first vector are constant, those are formatted once.
+    """
     if rows.shape[1] == 1 or np.any(rows[:, 1:] != rows[:1, 1:]):
         return vectors(rows)
     (same,) = vectors(rows[:1, 1:])
@@ -39,12 +42,15 @@ def moves(rows: Singles) -> list[bytes]:
 
 
 def quaternions(rows: Singles) -> list[bytes]:
-    """Each row of quaternions (F, N, 4), real part last; in text it is the first."""
+    """Return the text of each row of quaternions (F, N, 4).
+
+    The real part is last in the array and first in the text.
+    """
     return vectors(rows[..., [3, 0, 1, 2]])
 
 
 def vectors(rows: Singles | Floats) -> list[bytes]:
-    """Each row of (F, N, n) plain numbers without the outer brackets: `1, 2), (3, 4`."""
+    """Return the text of each row of (F, N, n) without the outer brackets: `1, 2), (3, 4`."""
     data = orjson.dumps(np.ascontiguousarray(rows), option=orjson.OPT_SERIALIZE_NUMPY)
     if np.any(rows == np.trunc(rows)):
         data = data.replace(b".0,", b",").replace(b".0]", b"]")

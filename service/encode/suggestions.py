@@ -1,16 +1,16 @@
-"""Points to capture next as plain values, and as a table to read."""
+"""Suggested points, as plain values and as a text table."""
 
 from typing import Any
 
 from service.motion.answer import Suggestion, Suggestions
 
 DECIMALS = 9
-"""Further ones hang on the machine that solved the system."""
+"""Decimals that do not depend on the machine that solved the kriging system."""
 HEADING = ("gain", "variance", "lacks", "nearest clip", "controls")
 
 
 def plain(found: Suggestions) -> dict[str, Any]:
-    """Schema Suggestions of the contract."""
+    """Return the suggestions in the schema Suggestions of the API."""
     return {
         "model": found.model,
         "performer": found.performer,
@@ -25,7 +25,7 @@ def _plain(found: Suggestion) -> dict[str, Any]:
 
 
 def text(found: Suggestions) -> str:
-    """A line for each point, the one that is worth most first."""
+    """Return one line for each point, the largest gain first."""
     rows = [HEADING, *map(_cells, found.suggestions)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEADING))]
     lines = ("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows)

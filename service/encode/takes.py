@@ -1,4 +1,4 @@
-"""Answers as the arrays that files hold: made together, and the same as if each were made alone."""
+"""Clips as the arrays of their files, computed together with the same result as one by one."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -12,14 +12,15 @@ from service.encode.character import Rig
 from service.encode.content import Array, Content, Samples
 from service.encode.convention import Convention
 from service.encode.moves import Moves
+from service.motion import cancel
 from service.motion.answer import ClipAnswer
 
 TOGETHER = 3200
-"""Frames of clips that are made at a time, or one clip that has more."""
+"""Frames of clips that are computed at a time; a longer clip is computed alone."""
 
 
 class Take(NamedTuple):
-    """A rig, how fast it moves, and what a file says of it."""
+    """Rig, frame rate and layer content of one clip."""
 
     rig: Rig
     rate: float
@@ -27,7 +28,7 @@ class Take(NamedTuple):
 
 
 def whole(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take]:
-    """Takes in the order of their answers: samples, the values of a character, and facts."""
+    """Yield takes in the order of their results, with samples, character values and facts."""
     for rig, some in _alike(answers):
         made = moves.of_clips([answer.clip for answer in some])
         rest = character.resting(rig, made.offsets)
@@ -40,7 +41,7 @@ def whole(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Tak
 
 
 def bare(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take]:
-    """Takes in the order of their answers: samples and facts alone."""
+    """Yield takes in the order of their results, with samples and facts only."""
     for rig, some in _alike(answers):
         made = moves.of_clips([answer.clip for answer in some])
         for answer, samples in zip(some, _samples(made, convention), strict=True):
@@ -48,7 +49,7 @@ def bare(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take
 
 
 def _alike(answers: Sequence[ClipAnswer]) -> Iterator[tuple[Rig, list[ClipAnswer]]]:
-    """Neighbours of one skeleton, a few at a time."""
+    """Yield consecutive results of one skeleton, at most TOGETHER frames at a time."""
     _keep_freed_memory()
     for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
         part: list[ClipAnswer] = []
@@ -64,15 +65,17 @@ def _alike(answers: Sequence[ClipAnswer]) -> Iterator[tuple[Rig, list[ClipAnswer
 
 @cache
 def _keep_freed_memory() -> None:
-    """Let glibc keep up to 64 MB of what is freed: it gives large blocks back, and to ask for their
-    pages again would take as long as all else.
+    """Make glibc keep up to 64 MB of freed memory.
 
-    Its limits grow to the size of what comes and goes (mallopt(3), M_MMAP_THRESHOLD).
+    It would return large blocks to the system, and requesting their pages again would take as long
+    as all other work. Its thresholds grow with the size of freed blocks (mallopt(3),
+    M_MMAP_THRESHOLD).
     """
     np.empty(31 << 20, np.uint8)
 
 
 def _take(rig: Rig, answer: ClipAnswer, samples: Samples, values: Mapping[str, Array]) -> Take:
+    cancel.check()
     content = Content(samples, values, facts.parted(answer.trust.facts()))
     return Take(rig, answer.clip.rate, content)
 

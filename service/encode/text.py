@@ -1,4 +1,4 @@
-"""USD text of layers of one shape: one is written by usd-core, the numbers of others are put in."""
+"""Templates of USD text layers: usd-core writes one layer of a shape, others get their numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,22 +9,25 @@ from service.encode.content import Author, Content, Pattern
 from service.motion.conventions import Singles
 
 INDENT = b"            "
-"""As deep as samples lie in our layers."""
+"""Indentation of time samples in the layers of this package."""
 
 
 @dataclass(frozen=True)
 class Template:
-    """What stands between the arrays of a layer's prims, and the names of those that follow."""
+    """Text between the arrays of a layer, and the names of the arrays in order."""
 
     between: tuple[bytes, ...]
     names: tuple[str, ...]
 
     def __len__(self) -> int:
-        """Bytes that it takes, about."""
+        """Return the approximate bytes of the template in memory."""
         return sum(map(len, self.between))
 
     def write(self, author: Author, content: Content) -> bytes | None:
-        """The layer with other content of its shape; None where some number is not plain."""
+        """Return the layer with other content of its shape.
+
+        None if orjson and usd-core format some number differently.
+        """
         if not all(map(spelling.plain, (*content.samples.values(), *content.values.values()))):
             return None
         spelt, parts = _spelt(content), [b""] * (2 * len(self.names) + 1)
@@ -33,22 +36,22 @@ class Template:
 
 
 def pattern(author: Author, content: Content) -> Pattern:
-    """How the arrays of a content are shaped, which is all that its template hangs on."""
+    """Return the shapes of the arrays of a content, on which alone its template depends."""
     samples = tuple((name, rows.shape, None) for name, rows in content.samples.items())
     values = tuple((name, found.shape, found.dtype.char) for name, found in content.values.items())
     return Pattern(samples, values, (), facts.NONE.shape)
 
 
 def ordinary(author: Author, content: Content) -> bytes:
-    """The layer as usd-core writes it."""
+    """Return the layer as written by usd-core."""
     text: str = author.layer(content).ExportToString()
     return text.encode()
 
 
 def template(author: Author, content: Content, pattern: Pattern) -> Template | None:
-    """Template of an author's layers of one shape, or None where it cannot be trusted.
+    """Return a template of an author's layers of one shape; None if it cannot be verified.
 
-    It can where it makes of the content the text that usd-core makes.
+    It is verified if it writes the same text as usd-core for the content.
     """
     marks = contents.marks(pattern, author.numbers, 0, seed=1)
     body = ordinary(author, marks).removeprefix(_head(author, marks))
@@ -70,13 +73,13 @@ def _spelt(content: Content) -> dict[str, bytes]:
 
 
 def _samples(rows: Singles) -> bytes:
-    """Time samples, from the first time code to the last bracket."""
+    """Return time samples as text, from the first time code to the last bracket."""
     spelt = spelling.quaternions(rows) if rows.shape[-1] == 4 else spelling.moves(rows)
     return (b",\n" + INDENT).join(b"%d: [(%b)]" % each for each in enumerate(spelt))
 
 
 def _holes(body: bytes, spelt: dict[str, bytes]) -> Iterator[tuple[int, int, str]]:
-    """Where arrays start and end in a text, and their names."""
+    """Yield start, end and name of each array in a text."""
     for name, text in spelt.items():
         at = body.find(text)
         while at >= 0:

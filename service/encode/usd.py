@@ -1,7 +1,7 @@
-"""Clips as USD layers: a bound skeleton, its baked animation and a light skinned body.
+"""Clips as USD layers: a bound skeleton, its baked animation and a skinned body mesh.
 
-Written into a layer without a stage: it is faster, and a stage leaks for each that is opened.
-The names of prims never vary, because USD keeps every name that it has ever seen.
+The layers are written without a stage, which is faster; every opened stage also leaks memory. The
+names of prims are constant, because USD never frees a name.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf
 
-from service.encode import body, character, specs, takes
+from service.encode import body, character_prims, specs, takes, zip_archive
 from service.encode.character import Rig
 from service.encode.content import Array, Content
 from service.encode.convention import Convention
@@ -33,48 +33,61 @@ class Clips(Kind):
 
     @property
     def values(self) -> tuple[Array, ...]:
-        """Arrays that every layer holds."""
+        """Return the arrays that every layer holds."""
         return (TINTS,)
 
     def head(self, content: Content) -> Any:
-        """The layer without its prims."""
+        """Return the layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
         self.state(made, ROOT.name, content)
         return made
 
     def layer(self, content: Content) -> Any:
-        """The layer, made by usd-core; the caller must keep it, since its prims do not."""
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
         made.TransferContent(_prims(self.rig))
         with Sdf.ChangeBlock():
             self.state(made, ROOT.name, content)
-            character.fill(made.GetPrimAtPath(ROOT), content.values)
+            character_prims.fill(made.GetPrimAtPath(ROOT), character_prims.values(content.values))
             specs.samples(made.GetPrimAtPath(ANIMATION), content.samples)
         return made
 
 
 @lru_cache(maxsize=16)
 def _prims(rig: Rig) -> Any:
-    """Layer of a character and its animation without numbers; kept, for it takes as long to make
-    as to export."""
+    """Return a layer of a character and its animation without numbers.
+
+    Cached, since building it takes as long as exporting it.
+    """
     made = Sdf.Layer.CreateAnonymous("prims.usda")
-    root = character.root(made, ROOT.name, rig)
-    character.bind(root, character.animation(root, ANIMATION.name, rig.paths).path)
+    root = character_prims.root(made, ROOT.name, rig)
+    character_prims.bind(root, character_prims.animation(root, ANIMATION.name, rig.paths).path)
     return made
 
 
 def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
-    """USD as text."""
-    return [TEXTS.write(*each) for each in _authored(answers, convention)]
+    """Return USD layers as text."""
+    return [TEXTS.write(*each) for each in authored(answers, convention)]
 
 
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
-    """USD in its binary form."""
-    return [CRATES.write(*each) for each in _authored(answers, convention)]
+    """Return USD layers in binary form."""
+    return [CRATES.write(*each) for each in authored(answers, convention)]
 
 
-def _authored(
+def usdz(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return USDZ files of one binary layer each."""
+    return list(map(package, usdc(answers, convention)))
+
+
+def package(layer: bytes) -> bytes:
+    """Return a USDZ file that holds one binary layer."""
+    return b"".join(zip_archive.archive([zip_archive.whole("clip.usdc", layer)]))
+
+
+def authored(
     answers: Sequence[ClipAnswer], convention: Convention
 ) -> Iterator[tuple[Clips, Content]]:
+    """Yield the author and the content of the layer of each answer."""
     for take in takes.whole(answers, convention):
         yield Clips(take.rate, convention, take.rig), take.content

@@ -1,1 +1,1 @@
-"""Many clips at once: queries in, files and a manifest of them out."""
+"""Export of many clips: queries in, files and their manifest out."""

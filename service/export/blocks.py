@@ -1,4 +1,4 @@
-"""Rows that lie one behind another in a source, column by column and not yet read."""
+"""Blocks of consecutive rows of a source, as columns of cells that are not yet parsed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -7,13 +7,16 @@ from typing import Any
 from service.export.columns import Column
 
 SIZE = 4096
-"""Rows read together: more are no faster."""
+"""Rows of a block; larger blocks are no faster."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Rows from the index `first` on; numbers: the line or row of each; cells: of each column;
-    readers: how those are read."""
+    """Consecutive rows of a source.
+
+    first: index of the first row. numbers: the line or row number of each, for messages. columns:
+    the columns. readers: parser of each column's cells. cells: cells of each column.
+    """
 
     first: int
     numbers: Sequence[int]
@@ -25,21 +28,21 @@ class Block:
         return len(self.numbers)
 
     def part(self, start: int, stop: int) -> "Block":
-        """Rows from start to before stop."""
+        """Return the rows from `start` to before `stop`."""
         cells = [column[start:stop] for column in self.cells]
         numbers = self.numbers[start:stop]
         return Block(self.first + start, numbers, self.columns, self.readers, cells)
 
     def halves(self) -> Iterator["Block"]:
-        """The former half and the latter."""
+        """Yield the first and the second half of the rows."""
         middle = len(self) // 2
         yield self.part(0, middle)
         yield self.part(middle, len(self))
 
     def values(self) -> dict[str, list[Any]]:
-        """Values of each field; ValueError says what is wrong with a cell if there is but one row.
+        """Return the values of each field; columns without any value are left out.
 
-        Columns that say nothing are left out.
+        Raises ValueError for an invalid cell; the message is exact if the block has one row.
         """
         columns = zip(self.columns, self.readers, self.cells, strict=True)
         found = {c.field: c.read(reader, cells) for c, reader, cells in columns}
@@ -52,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Broken:
-    """A row that has no cells: its line or row, and what is wrong with it."""
+    """A row that cannot be split into cells: its line or row number, and the reason."""
 
     number: int
     message: str
@@ -60,9 +63,9 @@ class Broken:
 
 @dataclass
 class Gathering:
-    """Rows of equal columns, gathered until a block is full.
+    """Collector of rows with equal columns, up to the size of a block.
 
-    readers: of the columns. index: of the next row.
+    columns: the columns. readers: parser of each column's cells. index: of the next row.
     """
 
     columns: Sequence[Column]
@@ -74,19 +77,19 @@ class Gathering:
         self._rows: list[Sequence[Any]] = []
 
     def add(self, number: int, row: Sequence[Any]) -> bool:
-        """Take a row; whether the block is full."""
+        """Add a row; return whether the block is full."""
         self._numbers.append(number)
         self._rows.append(row)
         return len(self._rows) == SIZE
 
     def broken(self, row: Broken) -> Iterator[Block | Broken]:
-        """What was gathered, and then a row that has no cells."""
+        """Yield the collected block, then a row without cells."""
         yield from self.flush()
         self.index += 1
         yield row
 
     def flush(self) -> Iterator[Block]:
-        """What was gathered, if anything."""
+        """Yield the collected rows as a block, if there are any."""
         numbers, rows = self._numbers, self._rows
         if rows:
             cells = list(zip(*rows, strict=True))

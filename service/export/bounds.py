@@ -1,6 +1,6 @@
-"""Whether many rows at once certainly pass the model's door, which looks at one at a time.
+"""Vectorised validation of many rows; it may reject valid rows, but never accepts invalid ones.
 
-Whatever passes here passes `clips.check`; of what does not, that says what is wrong.
+Rejected rows are validated one by one by `clips.check`, which names the fault.
 """
 
 import math
@@ -13,14 +13,17 @@ from service.export.columns import CONTROL
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
 from service.motion.support import Support
+from service.question.motion_question import ClipQuestion
 from service.synthesis import course, limits
-from service.synthesis.question import ClipQuestion
 
 Values = Mapping[str, Sequence[Any]]
 
 
 def pass_all(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
-    """Whether rows of values by field, usual where nothing is said, are all sound."""
+    """Return whether all rows are valid; false if one needs validation by itself.
+
+    values: by field. usual: defaults of missing values.
+    """
     return (
         _controls_pass(card, support, values, usual)
         and _within(_column(values, "level", usual.level), 0, len(card.levels) - 1)
@@ -63,17 +66,20 @@ def _loops_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
 
 
 def _hold_passes(values: Values) -> bool:
-    """Whether no row says what has to be looked at by itself; the usual has been looked at."""
+    """Return whether no row has constraints that need validation by themselves.
+
+    The defaults have been validated before.
+    """
     plain = {"auto", "none", None}.issuperset(values.get("exact", ()))
     return plain and not any(values.get("targets", ())) and not any(values.get("pin_feet", ()))
 
 
 def _column(values: Values, field: str, usual: float) -> Floats:
-    """Numbers of a field (n,), or (1,) where no row says any."""
+    """Return the numbers of a field (n,), or its default (1,) where no row has a value."""
     said = values.get(field, (None,))
     return np.array([usual if value is None else value for value in said], dtype=float)
 
 
 def _within(numbers: Floats, low: float, high: float) -> bool:
-    """Whether all lie from low to high; what is no number does not."""
+    """Return whether all numbers are from `low` to `high`; false for NaN."""
     return bool(np.all((numbers >= low) & (numbers <= high)))

@@ -1,37 +1,36 @@
-"""What the cells of one column may hold, and how they are read.
+"""Kinds of cells, each with its parsers for text and for typed values.
 
-Each kind reads many cells at once, and raises ValueError where any of them is wrong: which one it
-was shows when it is read alone. None is a cell that says nothing.
+A kind parses many cells at once and raises ValueError if one of them is invalid; parsing that cell
+alone identifies it. None is an empty cell.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from service.synthesis import question, spelling
-from service.synthesis.question import Target
+import msgspec
 
-LEGAL_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}", re.ASCII)
+from service.question import words
+from service.question.motion_question import LEGAL_NAME, Exact, Target
 
 
 class Kind(Protocol):
-    """How cells of a column are read, from text and from values of JSON or Parquet."""
+    """Parsers of a column's cells, for text and for values of JSON or Parquet."""
 
     @property
     def expected(self) -> str:
-        """What a cell should hold, for messages."""
+        """Description of a valid cell, for messages."""
 
     def text(self, cells: Sequence[str]) -> list[Any]:
-        """Values of cells of text; an empty one says nothing."""
+        """Return the values of text cells; None for an empty one."""
 
     def values(self, cells: Sequence[Any]) -> list[Any]:
-        """Values of cells that have types."""
+        """Return the values of typed cells."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """Numbers, in a unit if one is stated."""
+    """Numbers, with an optional unit."""
 
     unit: str | None = None
 
@@ -41,13 +40,13 @@ class Number:
 
     def text(self, cells: Sequence[str]) -> list[float | None]:
         together = "".join(cells)
-        # Python reads 1_000 and digits of other scripts as numbers; a table means something else.
+        # float() accepts 1_000 and digits of other scripts; in a table they are errors.
         if "_" in together or not together.isascii():
             raise ValueError
         return [float(cell) if cell else None for cell in cells]
 
     def values(self, cells: Sequence[Any]) -> list[float | None]:
-        # True is a number to Python.
+        # bool is a subclass of int.
         if not set(map(type, cells)) <= {float, int, type(None)}:
             raise ValueError
         try:
@@ -58,7 +57,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Whole:
-    """Whole numbers, also where a column with gaps has turned them into 1.0 and 2.0."""
+    """Whole numbers, also as floats such as 1.0, which columns with gaps are converted to."""
 
     expected: str = "a whole number"
 
@@ -74,7 +73,7 @@ class Whole:
 
 @dataclass(frozen=True)
 class Word:
-    """One of a few words."""
+    """One of a list of words."""
 
     choices: tuple[str, ...]
 
@@ -86,7 +85,7 @@ class Word:
         return self.values([cell or None for cell in cells])
 
     def values(self, cells: Sequence[Any]) -> list[str | None]:
-        # A list or an object of JSON has no hash.
+        # Lists and objects of JSON are not hashable.
         if not set(map(type, cells)) <= {str, type(None)} or not {*cells} <= {*self.choices, None}:
             raise ValueError
         return list(cells)
@@ -112,31 +111,35 @@ class Flag:
 
 
 @dataclass(frozen=True)
-class Exact:
-    """Which measured controls a clip is held to: auto, none, or names with commas between; of JSON
-    and Parquet also a list of names."""
+class ExactCell:
+    """Measured controls that a clip must match: auto, none, or comma-separated names.
+
+    JSON and Parquet may have a list of names instead.
+    """
 
     expected: str = "auto, none or names of controls, commas between"
 
-    def text(self, cells: Sequence[str]) -> list[question.Exact | None]:
-        return [spelling.exact(cell) if cell else None for cell in cells]
+    def text(self, cells: Sequence[str]) -> list[Exact | None]:
+        return [words.exact(cell) if cell else None for cell in cells]
 
-    def values(self, cells: Sequence[Any]) -> list[question.Exact | None]:
+    def values(self, cells: Sequence[Any]) -> list[Exact | None]:
         return [_exact(cell) for cell in cells]
 
 
-def _exact(cell: object) -> question.Exact | None:
+def _exact(cell: object) -> Exact | None:
     if isinstance(cell, list) and cell and {*map(type, cell)} == {str}:
         return tuple(cell)
     if cell is None or isinstance(cell, str):
-        return spelling.exact(cell) if cell else None
+        return words.exact(cell) if cell else None
     raise ValueError
 
 
 @dataclass(frozen=True)
 class Targets:
-    """Targets of a clip: as text JOINT@MOMENT:X,Y,Z with semicolons between, else a list of
-    objects with joint, position and time or at."""
+    """Targets of a clip: JOINT@MOMENT:X,Y,Z; ... in text, else a list of objects.
+
+    The objects have the keys joint, position, and time or at.
+    """
 
     expected: str = "targets: JOINT@MOMENT:X,Y,Z; ... in text, else a list of objects"
 
@@ -151,15 +154,16 @@ def _targets(cell: object) -> tuple[Target, ...] | None:
     if cell is None or cell == "":
         return None
     if isinstance(cell, str):
-        return tuple(spelling.target(words.strip()) for words in cell.split(";"))
-    if not isinstance(cell, list):
-        raise ValueError
-    return tuple(map(spelling.plain_target, cell))
+        return tuple(words.target(part.strip()) for part in cell.split(";"))
+    try:
+        return msgspec.convert(cell, tuple[Target, ...])
+    except msgspec.ValidationError as fault:
+        raise ValueError(str(fault)) from None
 
 
 @dataclass(frozen=True)
-class Name:
-    """Names that can be file names everywhere."""
+class NameCell:
+    """Names that are valid file names on every system."""
 
     expected: str = "1 to 100 of the letters A to Z, digits, '.', '_' and '-', not '.' first"
 

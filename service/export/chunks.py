@@ -1,18 +1,18 @@
-"""A chunk of an export: some rows of the queries, made into files by whoever it is given to.
+"""Chunks of an export: a range of rows of the queries, made into files.
 
-`make(work, task)` is all of it: a pure function of the job and the rows, so a chunk may be done
-anywhere, again, or twice at once, and its files are the same. Its last act is to leave its part of
-the manifest with the others.
+`make(work, task)` is a pure function of the job and the rows, so a chunk can be made on any
+machine, repeatedly or twice at once, with the same files. Its last step records the chunk's part of
+the manifest.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from service.encode import ENCODERS
-from service.export import layouts, ledger, manifest
+from service.export import checkpoint, layouts, manifest
+from service.export.checkpoint import Part
 from service.export.job import Job, Work, opened
 from service.export.layouts import Entry, File, Layout, path
-from service.export.ledger import Part
 from service.export.query import KEPT, Fault, Query
 from service.export.target import open_target
 from service.motion.answer import ClipAnswer
@@ -21,20 +21,21 @@ from service.synthesis import clips
 from service.synthesis.synthesizer import Synthesizer
 
 CLIPS, POSES = 128, 8192
-"""Clips and poses that are held at once, but for a clip that alone has more: enough to share what
-their files have in common."""
+"""Largest number of clips and poses in memory, except for a single longer clip: enough for files to
+share data.
+"""
 
 Stopped = Callable[[], bool]
-"""Whether everything should stop; what was begun is put away."""
+"""Returns true when the work should stop."""
 
 
 class Stop(Exception):
-    """A chunk that was given up because everything should stop."""
+    """Raised when a chunk is abandoned because the work should stop."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """The chunk of a number, from row `first` on; its rows in their order."""
+    """One chunk: its number, the index of its first row, and its rows in order."""
 
     number: int
     first: int
@@ -42,25 +43,29 @@ class Task:
 
 
 def make(work: Work, task: Task, stopped: Stopped = lambda: False) -> Part:
-    """Do a chunk; what it came to.
+    """Make a chunk and return its result.
 
-    Raises InvalidField that names rows at fault where they are not skipped, FileError where the
-    target cannot be written, Stop where it should stop; none of these leaves a part.
+    Raises InvalidField, which names the rows at fault, unless they are skipped; FileError if the
+    target cannot be written; Stop if the work should stop. None of these records a part.
     """
     target = open_target(work.target)
     layout = layouts.find(work.job.layout)
     chunk = _Chunk(work.job, layout, opened(work), task, [])
-    entries, size = layout.put(target, task.number, chunk.batches(stopped))
+    entries, archives = layout.write(target, task.number, chunk.batches(stopped))
     if chunk.faults and not work.skip:
         raise refusal(len(chunk.faults), chunk.faults)
     warned = sum(bool(entry["warnings"]) for entry in entries)
-    part = Part(len(entries), size, warned, chunk.faults)
-    ledger.record(target, task.number, part, entries)
+    size = sum(file.bytes for file in archives) or sum(entry["bytes"] for entry in entries)
+    part = Part(len(entries), size, warned, chunk.faults, archives)
+    checkpoint.record(target, task.number, part, entries)
     return part
 
 
 def refusal(count: int, faults: Sequence[Fault]) -> InvalidField:
-    """What to say of rows that are no queries; of a count of them, the first are at hand."""
+    """Return the error for invalid rows, with the first of them in its message.
+
+    count: their number. faults: the known ones, at least the first KEPT.
+    """
     said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:KEPT])
     more = f"\n  and {count - KEPT} more" if count > KEPT else ""
     found = f"rows that cannot be answered: {count} (--skip-errors leaves them out)"
@@ -76,7 +81,7 @@ class _Made:
 
 @dataclass(frozen=True)
 class _Chunk:
-    """A chunk while it is made. faults: those found so far."""
+    """A chunk in progress. faults: those found so far."""
 
     job: Job
     layout: Layout
@@ -85,7 +90,7 @@ class _Chunk:
     faults: list[Fault]
 
     def batches(self, stopped: Stopped) -> Iterator[list[File]]:
-        """Files of the rows that can be answered, in order."""
+        """Yield batches of files of the valid rows, in order."""
         made: list[_Made] = []
         poses = 0
         for one in self._made():
@@ -122,11 +127,11 @@ class _Chunk:
                 yield _Made(path(number, row.name, row.format), row, answer)
 
     def _note(self, place: str, message: str) -> None:
-        # In which folder a table lies is no part of the job, so that it must not show in its files.
+        # The table's folder is not part of the job and must not affect its files.
         self.faults.append(Fault(place.rpartition("/")[2], message))
 
     def _contents(self, made: list[_Made]) -> list[bytes]:
-        """Files of the clips, those of a format made together."""
+        """Return the files of the clips; those of one format are encoded together."""
         contents: dict[int, bytes] = {}
         for extension in dict.fromkeys(one.query.format for one in made):
             own = [index for index, one in enumerate(made) if one.query.format == extension]

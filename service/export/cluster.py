@@ -1,8 +1,8 @@
-"""A crew on a Dask cluster: chunks are done by the workers of a scheduler.
+"""Export on the workers of a Dask scheduler.
 
-A worker that dies loses nothing: Dask gives what it had to another, and a chunk done twice leaves
-the same files. The model's bytes and the job go to the workers as the result of a task of their
-own: what was scattered is lost with those who hold it, but a task is done again.
+If a worker dies, Dask reassigns its chunks; a chunk made twice leaves the same files. The model's
+bytes and the job are the result of a task of their own: scattered data is lost with its workers,
+but a task is repeated.
 """
 
 import time
@@ -19,36 +19,34 @@ from distributed import Client, Future, get_worker
 from distributed.client import FutureCancelledError
 from distributed.comm import CommClosedError
 from distributed.scheduler import KilledWorker
-from distributed.worker import thread_state
 
 from service import scheduler
-from service.export import chunks, ledger
+from service.export import checkpoint, chunks
+from service.export.checkpoint import Part
 from service.export.chunks import Stop, Stopped, Task
-from service.export.crew import Crew
 from service.export.job import MAKERS, Work
-from service.export.ledger import Part
+from service.export.pool import RESUMES, Runner
 from service.export.target import open_target
 from service.motion.errors import ClusterError, FileError
 
 KIT = scheduler.Kit(("service",), MAKERS)
-"""What a chunk's bytes hang on."""
+"""Code and packages on which a chunk's bytes depend."""
 AHEAD = 3
-"""Chunks in hand for each thread of the workers: the next ones are there when one is done."""
+"""Chunks submitted for each thread of the workers, so that none waits for the next."""
 PATIENCE = 0.1
-"""Seconds until a crew that waits looks whether it should stop, and who works."""
+"""Seconds between two checks for a stop and for the number of workers."""
 FETCH = 5.0
-"""Seconds until a part that was done is taken for lost with its worker."""
+"""Seconds until the result of a finished chunk is considered lost with its worker."""
 DESERTED = 60.0
-"""Seconds without any worker after which nobody is expected to come back."""
-GOES_ON = "what is done stays, and the same command goes on"
+"""Seconds without workers after which the export fails."""
 
 
 @contextmanager
-def crew(address: str) -> Iterator[Crew]:
-    """Crew of the workers of the scheduler at an address such as tcp://host:8786.
+def runner(address: str) -> Iterator[Runner]:
+    """Connect to the scheduler at an address such as tcp://host:8786, and yield the runner.
 
-    Raises ClusterError where it cannot be worked on; the crew itself, where the scheduler goes, all
-    workers stay away, or a chunk has killed every worker that took it up.
+    Raises ClusterError if it cannot be used; the runner raises it if the scheduler ends, if there
+    are no workers for a minute, or if one chunk has ended every worker that ran it.
     """
     with scheduler.connect(address, KIT) as client:
         yield partial(_together, client, address)
@@ -67,20 +65,20 @@ def _together(
 
 @dataclass(frozen=True)
 class _Given:
-    """What every chunk needs, wherever it is done; kit: what must be installed there."""
+    """Data that every chunk needs. kit: packages and versions that a worker must have installed."""
 
     work: Work
     kit: Mapping[str, str]
 
     @classmethod
     def by(cls, client: Client, work: Work) -> Future:
-        """The same, held by the workers for as long as this is."""
+        """Return a future of this data, which the workers keep as long as the future exists."""
         own = cls(work, scheduler.installed(KIT))
         return client.submit(_same, own, key=f"posefield-{uuid.uuid4().hex}")
 
 
 class _Hands:
-    """Chunks that are in hand: given out, and not yet taken back."""
+    """Chunks that are submitted and not yet collected."""
 
     def __init__(self, client: Client, address: str, given: Future) -> None:
         self._client, self._address, self._given = client, address, given
@@ -90,7 +88,7 @@ class _Hands:
         self._threads, self._counted = 0, -1.0
 
     def parts(self, tasks: Iterator[Task], stopped: Stopped) -> Iterator[Part]:
-        """Parts of tasks as they are done."""
+        """Yield the parts of tasks in the order of completion."""
         while not stopped():
             for task in islice(tasks, max(self._room(), 0)):
                 self._give(task)
@@ -101,7 +99,7 @@ class _Hands:
             yield from self._take()
 
     def put_down(self) -> None:
-        """Cancel what is in hand: workers stop within a batch, and leave no part."""
+        """Cancel the submitted chunks; workers stop within a batch and record no part."""
         self._client.cancel([*self._pending, self._given])
 
     def _give(self, task: Task) -> None:
@@ -117,14 +115,14 @@ class _Hands:
         except Empty:
             return
         except TimeoutError:
-            # Its worker died before the result was fetched: it is done again.
+            # The worker died before the result was fetched: Dask repeats the chunk.
             future.add_done_callback(self._ready.put)
             return
         self._pending.discard(future)
         yield part
 
     def _room(self) -> int:
-        """How many more chunks to give out; workers come and go."""
+        """Return how many more chunks to submit, by the present number of workers' threads."""
         now = time.monotonic()
         if now - self._counted > 1.0 or not self._threads:
             threads = sum(self._client.nthreads().values())
@@ -136,20 +134,20 @@ class _Hands:
         if threads or self._counted < 0.0:
             self._counted = now
         elif now - self._counted > DESERTED:
-            message = f"has had no workers for {DESERTED:g} s; {GOES_ON}"
+            message = f"has had no workers for {DESERTED:g} s; {RESUMES}"
             raise ClusterError(self._address, message)
 
 
 @contextmanager
 def _said(address: str) -> Iterator[None]:
-    """What Dask says in words of ours."""
+    """Convert Dask's errors to ClusterError."""
     try:
         yield
     except KilledWorker as fault:
-        message = f"{scheduler.killed(fault)} {GOES_ON.capitalize()}"
+        message = f"{scheduler.killed(fault)} {RESUMES.capitalize()}"
         raise ClusterError(address, message) from fault
     except (FutureCancelledError, CommClosedError) as fault:
-        raise ClusterError(address, f"the scheduler has gone; {GOES_ON}") from fault
+        raise ClusterError(address, f"the scheduler has gone; {RESUMES}") from fault
 
 
 def _same(given: _Given) -> _Given:
@@ -157,25 +155,28 @@ def _same(given: _Given) -> _Given:
 
 
 def _do(given: _Given, task: Task) -> Part | None:
-    """A chunk, on a worker; nothing where nobody waits for it any more."""
+    """Make a chunk on a worker; return None if it was cancelled.
+
+    Raises ClusterError if the worker's packages differ, and FileError if it cannot see the target.
+    """
     worker = get_worker()
-    # Workers that came later were not asked.
+    # Workers that joined later were not checked at the connection.
     if unlike := scheduler.differences(scheduler.installed(KIT), given.kit):
         raise ClusterError(worker.address, unlike)
     work = given.work
-    if open_target(work.target).read(ledger.JOB) is None:
+    if open_target(work.target).read(checkpoint.JOB) is None:
         raise FileError(
             work.target,
             f"holds no export for worker {worker.address}; expected a folder that all machines "
             "share, or an object store's URL",
         )
     try:
-        return chunks.make(work, task, _abandoned(worker, thread_state.key))
+        return chunks.make(work, task, _abandoned(worker, worker.get_current_task()))
     except Stop:
         return None
 
 
 def _abandoned(worker: Any, key: str) -> Callable[[], bool]:
-    """Whether nobody waits for a task any more: it was cancelled, or who gave it has gone."""
+    """Return a function that returns true once a task is cancelled or its client is gone."""
     task = worker.state.tasks[key]
     return lambda: task.state == "cancelled"

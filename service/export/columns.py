@@ -1,54 +1,72 @@
-"""Which columns a table of queries may have, and what a heading means.
+"""Columns of query tables, and the parsing of their headings.
 
-One column for each control of the model, by its name, and those of `OPTIONS`. A heading may state
-the unit of a control, `speed [m/s]` or `speed (m/s)`, and then it must be the model's. A control
-with the name of an option is `controls/NAME`, as any control may be written.
+There is one column for each control of the model, by its name, and those of `OPTIONS`. A heading
+may state the unit of a control, `speed [m/s]` or `speed (m/s)`, which must then be the model's.
+`controls/NAME` is accepted for any control, and required for one with the name of an option.
 """
 
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, get_args
+from functools import partial
+from typing import Any, Literal, get_args, get_origin
 
 from service.encode import ENCODERS
-from service.export.cells import Exact, Flag, Kind, Name, Number, Targets, Whole, Word
+from service.export.cells import ExactCell, Flag, Kind, NameCell, Number, Targets, Whole, Word
 from service.motion.card import ModelCard
-from service.motion.roles import Names
-from service.synthesis.question import Policy, Root
+from service.question import words
+from service.question.motion_question import Exact, Name, NamedClipQuestion, Target
+from service.question.words import Parameter
 
 CONTROL = "controls/"
 LONGEST = 200
-"""Characters of what was found that a message repeats."""
+"""Longest value that a message repeats, characters."""
 WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))")
 
-OPTIONS: Mapping[str, Callable[[ModelCard], Kind]] = {
-    "name": lambda _: Name(),
-    "format": lambda _: Word(tuple(ENCODERS)),
-    "fps": lambda _: Number("frames a second"),
-    "level": lambda _: Whole(),
-    "start": lambda _: Number("s"),
-    "end": lambda _: Number("s"),
-    "performer": lambda card: Word(card.performers),
-    "extrapolate": lambda _: Word(get_args(Policy)),
-    "names": lambda _: Word(get_args(Names)),
-    "root": lambda _: Word(get_args(Root)),
-    "loop": lambda _: Flag(),
-    "exact": lambda _: Exact(),
-    "targets": lambda _: Targets(),
-    "pin_feet": lambda _: Flag(),
-}
-"""Every column but the controls; those that are neither name nor format are fields of a
-ClipQuestion, or of what that is held to."""
+NO_COLUMN = ("joint_sigma",)
+"""Fields of a question without a column."""
 
-HELD = ("exact", "targets", "pin_feet")
-"""Fields of a Hold."""
+
+def _kinds() -> dict[str, Callable[[ModelCard], Kind]]:
+    found: dict[str, Callable[[ModelCard], Kind]] = {"format": lambda _: Word(tuple(ENCODERS))}
+    for parameter in words.parameters(NamedClipQuestion).values():
+        if parameter.field not in NO_COLUMN:
+            found[parameter.field] = partial(_kind, parameter)
+    return found
+
+
+def _kind(parameter: Parameter, card: ModelCard) -> Kind:
+    """Return the kind of the cells of a field's column."""
+    if parameter.field == "performer":
+        return Word(card.performers)
+    if get_origin(parameter.kind) is Literal:
+        return Word(get_args(parameter.kind))
+    if parameter.kind is float:
+        return Number(parameter.unit)
+    return KINDS[parameter.kind]
+
+
+KINDS: Mapping[Any, Kind] = {
+    int: Whole(),
+    bool: Flag(),
+    Exact: ExactCell(),
+    Target: Targets(),
+    Name: NameCell(),
+}
+"""Kind of cells by the type of a field."""
+
+OPTIONS = _kinds()
+"""All columns except the controls: the format, and the fields of a NamedClipQuestion."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: field, what of a query it says, a control's with `controls/` before its name;
-    what its cells hold; and the unit that its heading may state."""
+    """A column of a table.
+
+    field: field of the query; a control's begins with `controls/`. kind: kind of its cells. unit:
+    unit that its heading may state.
+    """
 
     field: str
     kind: Kind
@@ -56,17 +74,20 @@ class Column:
 
     @property
     def name(self) -> str:
-        """How it is called in messages."""
+        """Name in messages."""
         return self.field.removeprefix(CONTROL)
 
     @property
     def control(self) -> bool:
-        """Whether it is a control, which every row must state."""
+        """True for a control, which every row must have."""
         return self.field.startswith(CONTROL)
 
     def read(self, reader: Callable[[Sequence[Any]], list[Any]], cells: Sequence[Any]) -> list[Any]:
-        """Values of cells by one of the kind's readers; ValueError says what is wrong with the
-        first if there is but one."""
+        """Return the values of cells by one of the kind's parsers.
+
+        Raises ValueError for an invalid cell; the message describes the first cell, so it is exact
+        for one cell only.
+        """
         try:
             values = reader(cells)
             if self.control and None in values:
@@ -79,20 +100,23 @@ class Column:
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of tables for one model: controls in the card's order, and the others."""
+    """Columns of tables for one model.
+
+    controls: those of the controls, in the card's order. titles: every column by each of its names.
+    """
 
     controls: tuple[Column, ...]
     titles: Mapping[str, Column]
 
     @property
     def all(self) -> tuple[Column, ...]:
-        """Every column once."""
+        """All columns, each once."""
         return tuple(dict.fromkeys(self.titles.values()))
 
     def heading(self, titles: Sequence[str]) -> tuple[Column, ...]:
-        """Columns that a heading names, in its order.
+        """Return the columns of a heading, in its order.
 
-        ValueError for a column that is unknown, there twice, missing or in another unit.
+        Raises ValueError for a column that is unknown, repeated, missing or in another unit.
         """
         found = tuple(self.find(title) for title in titles)
         if len(set(found)) < len(found):
@@ -108,7 +132,7 @@ class Columns:
         return found
 
     def find(self, title: str) -> Column:
-        """The column of a title; ValueError where there is none, or its unit is another."""
+        """Return the column of a title; ValueError if it is unknown or its unit differs."""
         exact = self.titles.get(title)
         if exact:
             return exact
@@ -131,7 +155,7 @@ class Columns:
 
 
 def of(card: ModelCard) -> Columns:
-    """Columns of tables for a model."""
+    """Return the columns of tables for a model."""
     controls = tuple(Column(CONTROL + c.name, Number(c.unit), c.unit) for c in card.controls)
     options = {name: _option(name, kind(card)) for name, kind in OPTIONS.items()}
     return Columns(
@@ -141,7 +165,7 @@ def of(card: ModelCard) -> Columns:
 
 
 def shown(value: object) -> str:
-    """What was found, for messages: not all of what is long."""
+    """Return a value as text for messages, truncated to LONGEST characters."""
     whole = repr(value)
     return whole if len(whole) <= LONGEST else f"{whole[:LONGEST]}..."
 

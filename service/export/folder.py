@@ -1,7 +1,7 @@
-"""A local folder of files that are whole or not there.
+"""Local folder as a target, whose files are complete or absent.
 
-A file is written aside under a name that is its writer's own, and renamed: whoever is killed leaves
-nothing but such a name, and two who write the same file do each other no harm.
+A file is written under a temporary name that is unique to the writer, and renamed: an aborted write
+leaves only such a name, and two writers of one file do not conflict.
 """
 
 import contextlib
@@ -14,17 +14,23 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from service.motion import files
 from service.motion.errors import FileError
 
 TRIES, PAUSE = 40, 0.05
-"""To take away a folder that another process may still be writing to; the pause in seconds."""
+"""Attempts to remove a folder that another process may still be writing to, and the pause between
+them, s.
+"""
 
 LINKLESS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
-"""What file systems say that have no second names for a file: exFAT, and some over a network."""
+"""Errors of file systems without hard links: exFAT, and some network file systems."""
 
 
 class Folder:
-    """Files under a root. Paths are text: to make a path object costs a tenth of a small write."""
+    """Files under a root folder.
+
+    Paths are strings: creating a Path costs a tenth of a small write.
+    """
 
     def __init__(self, root: str, aside: str) -> None:
         self.root = root
@@ -32,25 +38,24 @@ class Folder:
         self._made: set[str] = set()
 
     def prepare(self) -> None:
-        """Make the root, and in it the folder for what is not yet whole."""
+        """Create the root and its folder for temporary files."""
         folder = Path(self._aside).parent
         with _said(str(folder)):
             folder.mkdir(parents=True, exist_ok=True)
 
     def write(self, files: Iterable[tuple[str, bytes]]) -> None:
-        """Put files, each in place of that of its name."""
+        """Write files, replacing those of the same names."""
         for path, content in files:
             self.stream(path, (content,))
 
-    def stream(self, path: str, pieces: Iterable[bytes]) -> int:
-        """Put one file that comes in pieces; its size in bytes."""
+    def stream(self, path: str, pieces: Iterable[bytes]) -> None:
+        """Write one file from an iterable of pieces."""
         whole = self._path(path)
-        with self._set_aside(whole, pieces) as size:
+        with self._set_aside(whole, pieces):
             os.rename(self._aside, whole)
-        return size
 
     def create(self, path: str, content: bytes) -> bool:
-        """Put a file where there is none; False, and nothing done, where there is one."""
+        """Write a file if none exists; return whether it was written."""
         whole = self._path(path)
         with self._set_aside(whole, (content,)):
             try:
@@ -60,15 +65,20 @@ class Folder:
                     os.unlink(self._aside)
 
     def read(self, path: str) -> bytes | None:
-        """Content of a file; None where there is none."""
+        """Return the content of a file; None if it does not exist."""
         with _said(self._path(path)):
             try:
                 return Path(self.root, path).read_bytes()
             except (FileNotFoundError, NotADirectoryError):
                 return None
 
+    def pieces(self, path: str) -> Iterator[bytes]:
+        """Yield the content of a file in pieces; none if it does not exist."""
+        with _said(self._path(path)), contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            yield from files.pieces(Path(self.root, path))
+
     def names(self, folder: str) -> set[str]:
-        """Names of the files in a folder."""
+        """Return the names of the files in a folder."""
         with _said(self._path(folder)):
             try:
                 return set(os.listdir(self._path(folder)))
@@ -76,23 +86,23 @@ class Folder:
                 return set()
 
     def holds(self, path: str, size: int) -> bool:
-        """Whether a file has stayed: after a power cut it may be there and empty."""
+        """Return whether a file exists with this size; after a power cut it may be empty."""
         try:
             return os.stat(self._path(path)).st_size == size
         except OSError:
             return False
 
     def empty(self, but: str) -> bool:
-        """Whether nothing is here but one folder."""
+        """Return whether the root contains nothing except, possibly, one folder."""
         return self.names("") <= {but}
 
     def drop(self, path: str) -> None:
-        """Take away a file, if it is there."""
+        """Remove a file, if it exists."""
         with _said(self._path(path)):
             Path(self._path(path)).unlink(missing_ok=True)
 
     def remove(self, folder: str) -> None:
-        """Take away a folder and all that is in it."""
+        """Remove a folder and its content; FileError if that fails repeatedly."""
         for _ in range(TRIES):
             shutil.rmtree(self._path(folder), ignore_errors=True)
             if not Path(self.root, folder).exists():
@@ -104,14 +114,14 @@ class Folder:
         return f"{self.root}/{path}" if path else self.root
 
     @contextmanager
-    def _set_aside(self, whole: str, pieces: Iterable[bytes]) -> Iterator[int]:
-        """Size of the pieces, which lie aside for the caller to put in place."""
+    def _set_aside(self, whole: str, pieces: Iterable[bytes]) -> Iterator[None]:
+        """Write the pieces to the temporary file, which the caller renames."""
         with _said(whole):
             self._room(whole.rpartition("/")[0])
             try:
                 with open(self._aside, "wb") as file:
-                    size = sum(map(file.write, pieces))
-                yield size
+                    file.writelines(pieces)
+                yield
             except BaseException:
                 with contextlib.suppress(OSError):
                     os.unlink(self._aside)
@@ -124,7 +134,7 @@ class Folder:
 
 
 def _place(aside: str, whole: str) -> bool:
-    """Put a file where there is none; whether there was none."""
+    """Move a file to a path if none exists there; return whether it was moved."""
     try:
         os.link(aside, whole)
     except FileExistsError:
@@ -132,7 +142,8 @@ def _place(aside: str, whole: str) -> bool:
     except OSError as fault:
         if fault.errno not in LINKLESS:
             raise
-        # Two who begin at once may both be told that there was none; the later one's file stays.
+        # Not atomic: two processes that begin at once may both find no file; the later one's
+        # remains.
         if os.path.exists(whole):
             return False
         os.rename(aside, whole)
@@ -141,7 +152,7 @@ def _place(aside: str, whole: str) -> bool:
 
 @contextmanager
 def _said(path: str) -> Iterator[None]:
-    """Faults of the file system as FileError of that path."""
+    """Convert errors of the file system to FileError for this path."""
     try:
         yield
     except OSError as fault:

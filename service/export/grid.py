@@ -14,14 +14,14 @@ from service.motion.card import ModelCard
 from service.motion.errors import InvalidField
 
 MOST = 10**9
-"""Points of a grid: more is a slip of the keyboard."""
+"""Largest number of points; a greater one is considered a typing error."""
 MOST_STEPS = 10**6
-"""Of one axis, which is held."""
+"""Largest number of values of one axis, which are held in memory."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A column, and what it takes along the grid."""
+    """A column and its values along the grid."""
 
     column: Column
     values: tuple[Any, ...]
@@ -29,28 +29,28 @@ class Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """All combinations of the values of axes: that of the last axis changes fastest.
+    """All combinations of the axes' values; the last axis varies fastest.
 
-    Controls without an axis have one value, the card's default.
+    Controls without an axis have the card's default.
     """
 
     axes: tuple[Axis, ...]
 
     @property
     def count(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return prod(len(axis.values) for axis in self.axes)
 
     def place(self, point: int) -> str:
-        """How a point is named in messages."""
+        """Return the name of a point for messages."""
         return f"grid point {point}"
 
     def spec(self) -> dict[str, Any]:
-        """All that the points hang on, as plain values."""
+        """Return all parameters that determine the points, as plain values."""
         return {"grid": [[axis.column.field, list(axis.values)] for axis in self.axes]}
 
     def blocks(self) -> Iterator[Block]:
-        """Points from the first on."""
+        """Yield the points in blocks, in order."""
         columns = [axis.column for axis in self.axes]
         readers = [column.kind.values for column in columns]
         shape = [len(axis.values) for axis in self.axes]
@@ -62,9 +62,9 @@ class Grid:
 
 
 def parse(texts: Sequence[str], columns: Columns, card: ModelCard) -> Grid:
-    """Grid of NAME=VALUES texts; InvalidField for one that is not, or is given twice.
+    """Return the grid of NAME=VALUES texts; InvalidField for a malformed or repeated one.
 
-    VALUES: one, several separated by commas, or `start:stop:count`, both ends among them.
+    VALUES: one value, several separated by commas, or `start:stop:count`, both ends included.
     """
     given = [_axis(text, columns) for text in texts]
     named = [axis.column.field for axis in given]
@@ -95,7 +95,7 @@ def _axis(text: str, columns: Columns) -> Axis:
 
 
 def _values(column: Column, text: str) -> list[Any]:
-    # One by one, so that a fault names its value.
+    # Parsed one by one, so that an error names its value.
     if ":" in text and isinstance(column.kind, Number | Whole):
         return [column.read(column.kind.values, [value])[0] for value in _steps(text)]
     values = [column.read(column.kind.text, [cell])[0] for cell in text.split(",")]
@@ -105,7 +105,7 @@ def _values(column: Column, text: str) -> list[Any]:
 
 
 def _steps(text: str) -> list[float]:
-    """Numbers of start:stop:count, evenly apart; ValueError."""
+    """Return the evenly spaced numbers of start:stop:count; ValueError for malformed text."""
     try:
         start, stop, steps = Number().text(text.split(":"))
         (count,) = Whole().values([steps])

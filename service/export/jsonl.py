@@ -1,7 +1,7 @@
 """Queries of a JSON Lines file: UTF-8, one object a line.
 
-Its keys are those of a table's heading; controls may stand in an object `controls` instead. Blank
-lines are no rows. null says nothing, as does a key that is not there.
+The keys are those of a table's heading; controls may be in an object `controls` instead. Blank
+lines are ignored. null equals a missing key.
 """
 
 import json
@@ -18,23 +18,22 @@ from service.export.originals import Original, lines
 
 BOM = b"\xef\xbb\xbf"
 HEADINGS = 256
-"""Different sets of keys that are remembered: most files have one or a few."""
+"""Number of cached sets of keys: most files have one or a few."""
 
 
 @dataclass(frozen=True)
 class JsonLines:
-    """A JSON Lines file; how many rows it has only its end tells."""
+    """A JSON Lines file as a source of rows."""
 
     original: Original
     columns: Columns
-    count: None = None
 
     def place(self, line: int) -> str:
-        """How a row is named in messages."""
+        """Return the name of a row for messages."""
         return f"{self.original.path}:{line}"
 
     def blocks(self) -> Iterator[Block | Broken]:
-        """Rows in columns that are the same for all of them."""
+        """Yield blocks of rows, all with the same columns."""
         return self.original.unchanged(self._blocks())
 
     def _blocks(self) -> Iterator[Block | Broken]:
@@ -58,7 +57,7 @@ class JsonLines:
 
 
 class _Rows:
-    """Turns lines into cells of all columns."""
+    """Parser of lines to cells of all columns."""
 
     def __init__(self, columns: Columns) -> None:
         self._width = len(columns.all)
@@ -68,7 +67,7 @@ class _Rows:
         )
 
     def cells(self, line: bytes) -> Sequence[Any]:
-        """Cells of a line; ValueError where it is no object, or its keys are no heading."""
+        """Return the cells of a line; ValueError if it is not an object or has invalid keys."""
         keys, values = _pairs(line)
         cells = [None] * self._width
         for place, value in zip(self._places(keys), values, strict=True):
@@ -77,7 +76,7 @@ class _Rows:
 
 
 def _pairs(line: bytes) -> tuple[tuple[str, ...], list[Any]]:
-    """Keys and values of an object, those of `controls` among them."""
+    """Return keys and values of an object, including those of `controls`."""
     row = _object(line)
     nested = row.pop("controls", {})
     if not isinstance(nested, dict):
@@ -95,7 +94,7 @@ def _object(line: bytes) -> dict[str, Any]:
         raise ValueError(f"{shown(row)}, expected an object")
     nested = row.get("controls")
     keys = len(row) + (len(nested) if isinstance(nested, dict) else 0)
-    # A key costs a colon: where there are more, one may be in a string, or a key was there twice.
+    # A key takes one colon: if there are more, a string contains one or a key is repeated.
     if line.count(b":") > keys:
         _look_for_twins(line)
     return row

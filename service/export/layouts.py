@@ -1,26 +1,27 @@
-"""How the files of many clips are laid out: as they are in folders, or packed into archives.
+"""Layouts of the files of an export: loose in folders, packed into archives, or a USD library.
 
-An archive holds the files under the paths that they have in folders: unpacked, all archives of an
-export give what the folders would have been. A library is a stage of one character beside layers of
-nothing but motion.
+Archives contain the files under the paths that they have in folders, so unpacking all archives of
+an export gives the same folders. A library is a stage of one character, with layers that contain
+only motion.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service.encode import ENCODERS, animation
+from service.encode import ENCODERS
 from service.encode.convention import Convention
 from service.encode.packs import PACKS, Pack
-from service.export import library, manifest
-from service.export.job import Job, Work
+from service.export import manifest
+from service.export.job import Job, Work, opened
 from service.export.query import Query
-from service.export.target import Target
+from service.export.target import Target, Written, put
+from service.motion import roles
 from service.motion.answer import ClipAnswer
 from service.motion.errors import InvalidField
 
 CROWDED = 1000
-"""Files in a folder; many more make file systems and file browsers slow."""
+"""Files per folder; many more make file systems and file browsers slow."""
 
 Entry = dict[str, Any]
 
@@ -34,9 +35,10 @@ class File:
     entry: Entry
 
 
-Put = Callable[[Target, int, Iterable[list[File]]], tuple[list[Entry], int]]
-"""Puts the files of the chunk of a number, which come in batches: their entries, and the bytes
-written."""
+Put = Callable[[Target, int, Iterable[list[File]]], tuple[list[Entry], list[Written]]]
+"""Write the files of the chunk of a number, which come in batches; return their entries and the
+archives that contain them.
+"""
 
 
 Write = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
@@ -44,15 +46,17 @@ Write = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
 
 @dataclass(frozen=True)
 class Layout:
-    """Where files lie, and what is in them.
+    """Paths and contents of the files of an export.
 
-    chunk: rows that are usually done together. encode: what writes files of a format. misfit: why
-    a query has no place here; none where all have. describe: what else an entry says of a clip of
-    some name and path. complete: files about the whole export, from all its entries.
+    chunk: default number of rows in a chunk. write: writes the files of a chunk. encode: returns
+    the encoder of a format. misfit: returns the reason for which a query does not fit this layout,
+    or None; the field is None if every query fits. describe: returns further values of a clip's
+    entry, from its name, path and answer. complete: returns files about the whole export, from all
+    entries.
     """
 
     chunk: int
-    put: Put
+    write: Put
     encode: Callable[[str], Write] = lambda extension: ENCODERS[extension].write
     misfit: Callable[[Job, Query], str | None] | None = None
     describe: Callable[[str, str, ClipAnswer], Entry] = lambda name, path, answer: {}
@@ -62,35 +66,39 @@ class Layout:
 
 
 def path(row: int, name: str, extension: str) -> str:
-    """Where the file of a row lies, or would if it were not packed."""
+    """Return the path of a row's file, in a folder or inside an archive."""
     return f"clips/{row // CROWDED:03d}/{name}.{extension}"
 
 
-def loose(target: Target, number: int, batches: Iterable[list[File]]) -> tuple[list[Entry], int]:
-    """Files as they are."""
+def loose(
+    target: Target, number: int, batches: Iterable[list[File]]
+) -> tuple[list[Entry], list[Written]]:
+    """Write each file separately."""
     entries = []
     for files in batches:
         target.write([(file.path, file.content) for file in files])
         entries += [file.entry for file in files]
-    return entries, sum(entry["bytes"] for entry in entries)
+    return entries, []
 
 
 def packed(pack: Pack) -> Put:
-    """Files in one archive a chunk, whose part of the manifest is its last member."""
+    """Return a function that writes one archive per chunk, with its part of the manifest last."""
 
-    def put(target: Target, number: int, batches: Iterable[list[File]]) -> tuple[list[Entry], int]:
+    def archived(
+        target: Target, number: int, batches: Iterable[list[File]]
+    ) -> tuple[list[Entry], list[Written]]:
         entries: list[Entry] = []
-        archive = f"clips-{number:06d}.{pack.extension}"
-        size = target.stream(archive, pack.write(_members(number, batches, entries)))
-        return [{**entry, "archive": archive} for entry in entries], size
+        path = f"clips-{number:06d}.{pack.extension}"
+        archive = put(target, path, pack.write(_members(number, batches, entries)))
+        return [{**entry, "archive": path} for entry in entries], [archive]
 
-    return put
+    return archived
 
 
 def _members(
     number: int, batches: Iterable[list[File]], entries: list[Entry]
 ) -> Iterator[tuple[str, bytes]]:
-    """Files by path, then their entries, which are added to `entries` on the way."""
+    """Yield the files by path, then the manifest of their entries, which are added to `entries`."""
     for files in batches:
         for file in files:
             entries.append(file.entry)
@@ -98,22 +106,55 @@ def _members(
     yield f"manifest-{number:06d}.jsonl", b"".join(map(manifest.line, entries))
 
 
+STAGE, LIBRARY_FORMAT = "character.usd", "usdc"
+
+
+def _misfit(job: Job, query: Query) -> str | None:
+    """Return the reason for which a query does not fit a library of one character, or None."""
+    if query.format != LIBRARY_FORMAT:
+        return f"format: {query.format!r}, expected {LIBRARY_FORMAT!r} in a library"
+    if query.question.names != job.names:
+        found = query.question.names
+        return f"names: {found!r}, expected {job.names!r} as of the library's character"
+    return None
+
+
+def _animations(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return binary layers of the clips' animations, without a character."""
+    from service.encode import animation  # usd-core, which other layouts do not need.
+
+    return animation.usdc(answers, convention)
+
+
+def _box(name: str, file: str, answer: ClipAnswer) -> Entry:
+    """Return the corners, m, of a box that contains the character throughout a clip."""
+    from service.encode import library
+
+    entry = library.entry(name, file, answer)
+    return {"low": entry.low, "high": entry.high}
+
+
+def _stage(work: Work, entries: Iterable[Entry]) -> Iterator[tuple[str, bytes]]:
+    """Yield the stage of a library, at the rate of its first clip."""
+    from service.encode import library
+
+    job, card = work.job, opened(work).session.card
+    keys = ("name", "file", "frames", "fps", "low", "high")
+    clips = [library.Entry(*(entry[key] for key in keys)) for entry in entries]
+    skeleton = roles.renamed(card.skeleton, card.roles, job.names)
+    convention = ENCODERS[LIBRARY_FORMAT].convention(job.unit, job.up)
+    yield STAGE, library.stage(skeleton, convention, clips[0].rate, clips)
+
+
 LAYOUTS = {
     "folder": Layout(256, loose),
-    "library": Layout(
-        256,
-        loose,
-        lambda extension: animation.usdc,
-        library.misfit,
-        library.describe,
-        library.complete,
-    ),
+    "library": Layout(256, loose, lambda extension: _animations, _misfit, _box, _stage),
     **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
 }
 
 
 def find(name: str) -> Layout:
-    """Layout of a name; InvalidField where there is none."""
+    """Return the layout of a name; InvalidField if there is none."""
     if name not in LAYOUTS:
         raise InvalidField("layout", f"{name!r}, expected one of {', '.join(LAYOUTS)}")
     return LAYOUTS[name]

@@ -1,4 +1,4 @@
-"""What is said of each clip that was written."""
+"""Manifest of an export: one entry for each written clip."""
 
 import hashlib
 from typing import Any
@@ -9,9 +9,9 @@ from service.motion.answer import ClipAnswer
 
 
 def entry(name: str, file: str, content: bytes, answer: ClipAnswer) -> dict[str, Any]:
-    """The clip of a file as plain values: where it lies, how it can be checked, what it shows.
+    """Return the manifest entry of a clip as plain values: path, checksum, frames and trust.
 
-    file: path beside the manifest. content: the file's bytes.
+    file: path relative to the manifest. content: the file's bytes.
     """
     facts = answer.trust.facts()
     return {
@@ -26,5 +26,5 @@ def entry(name: str, file: str, content: bytes, answer: ClipAnswer) -> dict[str,
 
 
 def line(found: dict[str, Any]) -> bytes:
-    """An entry as a line of the manifest, which is JSON Lines."""
+    """Return an entry as a line of JSON Lines."""
     return orjson.dumps(found, option=orjson.OPT_APPEND_NEWLINE)

@@ -1,4 +1,4 @@
-"""What clips are called where nobody said, and that no two are called the same."""
+"""Names of clips: generated names, and the detection of repeated ones."""
 
 import hashlib
 from collections.abc import Sequence
@@ -10,23 +10,24 @@ Digests = NDArray[np.uint64]
 
 
 def generated(index: int) -> str:
-    """Name of the row of that index, counted from 0: whoever reads it, and whatever is skipped."""
+    """Return the name of the row with this index, from 0; it does not depend on skipped rows."""
     return f"clip-{index:06d}"
 
 
 class Seen:
-    """Names that were given so far, as 8 bytes each.
+    """Set of the names used so far, as digests of 8 bytes each.
 
-    Capitals count for nothing, as in some file systems. Of ten million names two have equal
-    digests with a probability of 3 in a million, and are then taken for the same.
+    Case is ignored, as in some file systems. Among ten million names, two have equal digests with a
+    probability of 3 in a million; they are then reported as repeated.
     """
 
     def __init__(self) -> None:
-        # Sorted, each more than twice as long as the next, so that a name is merged a few times.
+        # Sorted arrays, each more than twice as long as the next, so that a name is merged few
+        # times.
         self._runs: list[Digests] = []
 
     def repeated(self, names: Sequence[str]) -> list[int]:
-        """Places of names that were seen before, here or earlier; all are seen from now on."""
+        """Return the indices of names that occurred before, and add all names to the set."""
         digests = _digests(names)
         order = np.argsort(digests, kind="stable")
         ordered = digests[order]
@@ -46,6 +47,6 @@ class Seen:
 
 
 def _digests(names: Sequence[str]) -> Digests:
-    """A number of 64 bits for each name: the same in every process, unlike Python's hash."""
+    """Return a 64-bit digest of each name; unlike Python's hash, equal in every process."""
     made = (hashlib.blake2b(name.lower().encode(), digest_size=8).digest() for name in names)
     return np.frombuffer(b"".join(made), dtype="<u8").astype(np.uint64)

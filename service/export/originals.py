@@ -1,4 +1,4 @@
-"""Files that are read more than once and must stay what they were."""
+"""Source files that are read more than once and must not change in between."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
@@ -12,19 +12,24 @@ from service.motion.errors import FileError
 Read = TypeVar("Read")
 
 LONGEST_LINE = 1 << 20
-"""Of a line, characters: a file without line ends is no table, and would not fit into memory."""
+"""Longest line, characters: a file without line ends is not a table and might not fit into
+memory.
+"""
 
 
 @dataclass(frozen=True)
 class Original:
-    """A file as it was first read: SHA-256 of its bytes, its size and when it was written, ns."""
+    """A file at its first reading.
+
+    path: its path. digest: SHA-256 of its bytes. stamp: size in bytes and modification time, ns.
+    """
 
     path: Path
     digest: str
     stamp: tuple[int, int]
 
     def unchanged(self, read: Iterable[Read]) -> Iterator[Read]:
-        """What is read of the file; FileError before the first that may be of another."""
+        """Yield the items read from the file; FileError before the first one after a change."""
         self._compare()
         for each in read:
             self._compare()
@@ -37,7 +42,7 @@ class Original:
 
 
 def meet(path: Path) -> Original:
-    """A file as it is; FileError where it cannot be read."""
+    """Return a file's path, digest and stamp; FileError if it cannot be read."""
     if path.exists() and not path.is_file():
         raise FileError(path, "not a file, expected one: it is read more than once")
     stamp = _stamp(path)
@@ -50,7 +55,7 @@ def meet(path: Path) -> Original:
 
 
 def lines(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
-    """Lines of a file that is open; FileError for one that never ends."""
+    """Yield the lines of an open file; FileError for a line that is too long."""
     for number, line in enumerate(iter(partial(readline, LONGEST_LINE), readline(0)), start=1):
         if len(line) == LONGEST_LINE:
             found = f"a line of {LONGEST_LINE} characters or more"

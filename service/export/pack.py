@@ -1,4 +1,4 @@
-"""The files of many clips one after the other, as an archive takes them, and the manifest last."""
+"""Files of many clips in sequence, as an archive takes them, with the manifest last."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -7,18 +7,23 @@ from service.encode import Encoder
 from service.encode.convention import Convention
 from service.export import manifest
 from service.export.query import Query
+from service.motion import cancel
+from service.motion.answer import ClipAnswer
 from service.synthesis import clips
-from service.synthesis.question import Prospect
+from service.synthesis.clips import Prospect
 from service.synthesis.synthesizer import Synthesizer
 
 MANIFEST = "manifest.jsonl"
 CLIPS, POSES = 16, 4096
-"""How many clips are held at once, and how many poses, but for a clip that alone has more."""
+"""Largest number of clips and poses in memory, except for a single longer clip."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """Clips of one format that have passed the door, and what is known of each."""
+    """Validated clips of one format.
+
+    queries: of the clips. prospects: frames and warnings of each, known before synthesis.
+    """
 
     model: Synthesizer
     encoder: Encoder
@@ -28,8 +33,10 @@ class Order:
 
     @property
     def warnings(self) -> list[str]:
-        """A sentence if some clips are like nothing that was captured, and one if some miss a
-        target; the manifest says which."""
+        """Warnings with the number of clips that extrapolate and of clips that miss a target.
+
+        The manifest has the warnings of each clip.
+        """
         counts = {
             "lie outside what was sampled, or in a gap of it": sum(
                 bool(prospect.warnings) for prospect in self.prospects
@@ -41,12 +48,12 @@ class Order:
 
 
 def members(order: Order) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each clip's file in the order of the queries, then of the manifest.
+    """Yield name and content of each clip's file in the order of the queries, then the manifest.
 
-    A batch is made when its first file is asked for; of those before only lines of the manifest
-    are kept.
+    A batch is made when its first file is requested; of earlier batches only manifest lines remain
+    in memory.
     """
-    # Not a list: what orjson returns has taken a page, whatever its length.
+    # Not a list: each bytes object of orjson occupies a page of memory, whatever its length.
     lines = bytearray()
     for batch in _batches([prospect.frames for prospect in order.prospects]):
         yield from _files(order, order.queries[batch], lines)
@@ -54,7 +61,7 @@ def members(order: Order) -> Iterator[tuple[str, bytes]]:
 
 
 def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator[tuple[str, bytes]]:
-    answers = [clips.clip(order.model, query.question) for query in queries]
+    answers = [_clip(order.model, query) for query in queries]
     contents = order.encoder.write(answers, order.convention)
     for query, answer, content in zip(queries, answers, contents, strict=True):
         file = f"{query.name}.{query.format}"
@@ -62,8 +69,13 @@ def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator
         yield file, content
 
 
+def _clip(model: Synthesizer, query: Query) -> ClipAnswer:
+    cancel.check()
+    return clips.clip(model, query.question)
+
+
 def _batches(frames: Sequence[int]) -> Iterator[slice]:
-    """Clips that are made together, as slices of all."""
+    """Yield slices of clips that are made together."""
     first, poses = 0, 0
     for index, count in enumerate(frames):
         if index > first and (index == first + CLIPS or poses + count > POSES):

@@ -1,6 +1,6 @@
-"""Queries of a Parquet file: columns of numbers and of strings; null says nothing.
+"""Queries of a Parquet file: columns of numbers and strings, null for an empty cell.
 
-Rows are counted from 1. Read batch by batch with pyarrow, which is an extra.
+Rows are counted from 1. The file is read in batches by pyarrow, an optional extra.
 """
 
 from collections.abc import Iterator
@@ -17,18 +17,17 @@ from service.motion.errors import FileError
 
 @dataclass(frozen=True)
 class ParquetFile:
-    """A Parquet file whose columns were understood, and how many rows it has."""
+    """A Parquet file with valid columns, as a source of rows."""
 
     original: Original
     heading: tuple[Column, ...]
-    count: int
 
     def place(self, row: int) -> str:
-        """How a row is named in messages."""
+        """Return the name of a row for messages."""
         return f"{self.original.path} row {row}"
 
     def blocks(self) -> Iterator[Block]:
-        """Rows from the first on."""
+        """Yield the rows in blocks, in order."""
         return self.original.unchanged(self._blocks())
 
     def _blocks(self) -> Iterator[Block]:
@@ -45,21 +44,24 @@ class ParquetFile:
 
 
 def read(original: Original, columns: Columns) -> ParquetFile:
-    """A Parquet file; FileError where its columns are not what is needed, or pyarrow is missing."""
+    """Return a Parquet file.
+
+    Raises FileError if its columns do not fit the model or pyarrow is missing.
+    """
     with _opened(original) as file:
-        schema, rows = file.schema_arrow, file.metadata.num_rows
+        schema = file.schema_arrow
     try:
         heading = columns.heading(schema.names)
         for column, kind in zip(heading, schema.types, strict=True):
             _check_type(column, kind)
     except ValueError as fault:
         raise FileError(original.path, str(fault)) from fault
-    return ParquetFile(original, heading, rows)
+    return ParquetFile(original, heading)
 
 
 @contextmanager
 def _opened(original: Original) -> Iterator[Any]:
-    """The file as pyarrow's; whatever pyarrow finds wrong with it is a FileError."""
+    """Open the file with pyarrow; convert pyarrow's errors to FileError."""
     try:
         import pyarrow
         import pyarrow.parquet
@@ -75,7 +77,7 @@ def _opened(original: Original) -> Iterator[Any]:
 
 
 def _check_type(column: Column, kind: Any) -> None:
-    """ValueError for a column of a type that never holds what its cells should."""
+    """Raise ValueError for a column with a type that does not fit its cells."""
     import pyarrow
 
     types = pyarrow.types
@@ -90,4 +92,4 @@ _TESTS = {
     Whole: ("is_floating", "is_integer"),
     Flag: ("is_boolean",),
 }
-"""Of pyarrow.types, for kinds that are no strings."""
+"""Functions of pyarrow.types by kind, for all kinds except strings."""

@@ -1,8 +1,8 @@
-"""Where the queries of an export come from: a file, a grid or a sampling.
+"""Sources of queries: a file, a grid or a sampling.
 
-A file is a table (CSV, Parquet) or objects (JSON Lines) by its ending. It has a column for each
-control of the model, and any of those of `columns.OPTIONS`; what a row does not say is as the
-command line says. `rows` gives a Query or a Fault for each row, in the source's order.
+A file is a table (CSV, Parquet) or objects (JSON Lines), by its ending. It has a column for each
+control of the model, and optionally those of `columns.OPTIONS`; the defaults of missing values come
+from the command line. `rows` yields a Query or a Fault for each row, in the source's order.
 
     source = queries.source(Asked(path), Defaults("usdc"), model)
     found = source.survey()
@@ -11,11 +11,12 @@ command line says. `rows` gives a Query or a Fault for each row, in the source's
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import orjson
+from msgspec import structs, to_builtins
 
 from service.encode import ENCODERS
 from service.export import columns, grid, jsonl, originals, parquet, sampling, tables
@@ -33,9 +34,10 @@ METHOD, SEED = "latin", 0
 
 @dataclass(frozen=True)
 class Asked:
-    """What the command line says of where queries come from: one of path, grid and sample.
+    """Source options of the command line: exactly one of path, grid and sample.
 
-    grid: NAME=VALUES texts. sample: how many points; method and seed, of a sampling only.
+    path: of a file. grid: NAME=VALUES texts. sample: number of points. method, seed: of a sampling
+    only.
     """
 
     path: Path | None = None
@@ -46,10 +48,8 @@ class Asked:
 
 
 class _Blocks(Protocol):
-    """A source before its rows are read."""
+    """A source of rows that are not yet parsed."""
 
-    @property
-    def count(self) -> int | None: ...
     def place(self, number: int, /) -> str: ...
     def blocks(self) -> Iterator[Block | Broken]: ...
 
@@ -63,20 +63,23 @@ READERS: Mapping[str, Callable[[Original, Columns], _Blocks]] = {
 
 
 def source(asked: Asked, usual: Defaults, model: Synthesizer) -> Source:
-    """Source of the queries that were asked for, where rows say nothing as usual.
+    """Return the source of the queries, with defaults for missing values.
 
-    Raises InvalidField, UnknownFormat and OutsideSamples for what the command line says, FileError
-    for a file that cannot be read or has a heading that does not fit the model.
+    Raises InvalidField, UnknownFormat and OutsideSamples for invalid options, and FileError for a
+    file that cannot be read or has a heading that does not fit the model.
     """
     _check_one(asked)
     _check_usual(usual, model)
     found, spec = _blocks(asked, model)
-    digest = _digest({**spec, "usual": asdict(usual)})
-    return Reading(found.blocks, found.place, model, usual, found.count, digest)
+    digest = _digest({**spec, "format": usual.format, "usual": to_builtins(usual.question)})
+    return Reading(found.blocks, found.place, model, usual, digest)
 
 
 def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
-    """Controls of each row of a file; raises as `source` does, InvalidField for a row at fault."""
+    """Return the controls of each row of a file.
+
+    Raises as `source` does, and InvalidField for an invalid row.
+    """
     rows = source(Asked(path), Defaults("usdc"), model).rows()
     found = []
     for row in rows:
@@ -101,15 +104,15 @@ def _check_one(asked: Asked) -> None:
 
 
 def _check_usual(usual: Defaults, model: Synthesizer) -> None:
-    """What rows do not say must be sound by itself: they are looked at for what they do say."""
+    """Validate the defaults alone; rows are validated only in the values that they have."""
     if usual.format not in ENCODERS:
         raise UnknownFormat("format", f"{usual.format!r}, expected one of {', '.join(ENCODERS)}")
     middle = {control.name: control.default for control in model.session.card.controls}
-    clips.check(model, replace(usual.question, controls=middle))
+    clips.check(model, structs.replace(usual.question, controls=middle))
 
 
 def _blocks(asked: Asked, model: Synthesizer) -> tuple[_Blocks, dict[str, Any]]:
-    """Rows that were asked for, and all that they hang on as plain values."""
+    """Return the unparsed rows of a source, and their parameters as plain values."""
     card = model.session.card
     known = columns.of(card)
     if asked.path:

@@ -1,19 +1,22 @@
-"""One clip of many: what it is called, what is asked for, and where that was said."""
+"""Queries of clips, faults of rows, and the protocol of their sources."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.synthesis.question import ClipQuestion
+from service.question.motion_question import ClipQuestion
 
 KEPT = 20
-"""Faults that a survey keeps of all that it counts."""
+"""Number of faults that a survey keeps."""
 
 
 @dataclass(frozen=True)
 class Query:
-    """A clip to be made: its name, its format and the question; place: where it was read, such as
-    "line 7"."""
+    """A clip to be made.
+
+    name: of the clip. format: of its file. question: its question. place: origin in the source,
+    such as "line 7".
+    """
 
     name: str
     format: str
@@ -23,7 +26,7 @@ class Query:
 
 @dataclass(frozen=True)
 class Fault:
-    """A row that is no query: where it was read and what is wrong with it."""
+    """An invalid row: its origin in the source, and the reason."""
 
     place: str
     message: str
@@ -31,8 +34,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Survey:
-    """What a first look at all rows found: how many there are, how many are no queries, and the
-    first of those."""
+    """Result of the first pass through all rows.
+
+    total: number of rows. faulty: number of invalid ones. faults: the first of those.
+    """
 
     total: int
     faulty: int
@@ -40,21 +45,17 @@ class Survey:
 
 
 class Source(Protocol):
-    """Where queries come from: the same rows in the same order whenever they are read.
+    """Source of queries: the same rows in the same order at every reading.
 
-    Whoever reads holds a few thousand rows, and 8 bytes of each name that was given.
+    A reader holds a few thousand rows in memory, and 8 bytes of each given name.
     """
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all that the queries hang on, but for the model."""
-
-    @property
-    def count(self) -> int | None:
-        """How many rows there are; none where that is known only after they were read."""
+        """SHA-256 of all parameters and data that determine the queries, except the model."""
 
     def rows(self) -> Iterator[Query | Fault]:
-        """Every row. Raises FileError where the rest cannot be read, or has changed since."""
+        """Yield every row; FileError if the rest cannot be read or has changed."""
 
     def survey(self) -> Survey:
-        """Every row looked at and none kept. Raises as `rows` does."""
+        """Validate every row without keeping any; raises as `rows` does."""

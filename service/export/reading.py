@@ -1,18 +1,20 @@
-"""Queries of the rows of a source, whatever it is."""
+"""Parsing and validation of a source's rows to queries."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from msgspec import structs
+
 from service.export import bounds
 from service.export.blocks import Block, Broken
-from service.export.columns import CONTROL, HELD
+from service.export.columns import CONTROL
 from service.export.names import Seen, generated
 from service.export.query import KEPT, Fault, Query, Survey
 from service.motion.errors import QueryError
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips
-from service.synthesis.question import ClipQuestion, Hold
 from service.synthesis.synthesizer import Synthesizer
 
 OWN_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
@@ -20,26 +22,26 @@ OWN_NAME = "expected a name of its own: an earlier row has it, capitals count fo
 
 @dataclass(frozen=True)
 class Defaults:
-    """What holds where a row says nothing; the question's controls are not used."""
+    """Defaults of missing values; the question's controls are not used."""
 
     format: str
-    question: ClipQuestion = field(default_factory=lambda: ClipQuestion({}))
+    question: ClipQuestion = field(default_factory=lambda: ClipQuestion(controls={}))
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of a block that were read, and all right so far: values by field."""
+    """Parsed rows of a block, valid so far: values by field."""
 
     block: Block
     values: dict[str, list[Any]]
 
     def part(self, start: int, stop: int) -> "Table":
-        """Rows from start to before stop."""
+        """Return the rows from `start` to before `stop`."""
         values = {field: column[start:stop] for field, column in self.values.items()}
         return Table(self.block.part(start, stop), values)
 
     def names(self) -> list[str]:
-        """What each row is called."""
+        """Return the name of each row, given or generated."""
         first, size = self.block.first, len(self.block)
         given = self.values.get("name", [None] * size)
         return [name or generated(first + i) for i, name in enumerate(given)]
@@ -47,20 +49,20 @@ class Table:
 
 @dataclass(frozen=True)
 class Reading:
-    """Rows of blocks, for one model.
+    """Queries of the rows of a source, for one model.
 
-    blocks: begins anew. place: how the line or row of that number is named in messages.
+    blocks: yields all blocks anew at each call. place: returns the name of a line or row for
+    messages. usual: defaults of missing values. digest: of the source.
     """
 
     blocks: Callable[[], Iterator[Block | Broken]]
     place: Callable[[int], str]
     model: Synthesizer
     usual: Defaults
-    count: int | None
     digest: str
 
     def rows(self) -> Iterator[Query | Fault]:
-        """Every row."""
+        """Yield a query or a fault for every row."""
         for part in self._parts():
             if isinstance(part, Fault):
                 yield part
@@ -68,7 +70,7 @@ class Reading:
                 yield from self._queries(part)
 
     def survey(self) -> Survey:
-        """Every row looked at and none kept."""
+        """Validate every row without keeping any."""
         total, faulty, faults = 0, 0, []
         for part in self._parts():
             if isinstance(part, Fault):
@@ -78,7 +80,7 @@ class Reading:
         return Survey(total, faulty, tuple(faults))
 
     def _parts(self) -> Iterator[Table | Fault]:
-        """Rows that are all right together, and between them those that are not."""
+        """Yield tables of valid rows, and faults in their place between them."""
         seen = Seen()
         for block in self.blocks():
             if isinstance(block, Broken):
@@ -91,8 +93,10 @@ class Reading:
                     yield from self._apart(part, seen)
 
     def _sound(self, block: Block) -> Iterator[Table | Fault]:
-        """Rows with values that can be asked for: a block with a row that is not like that is
-        halved until that row is alone."""
+        """Yield tables of rows with valid values, and faults.
+
+        A block with an invalid row is halved until that row is alone.
+        """
         if len(block) == 1:
             yield self._alone(block)
             return
@@ -104,7 +108,7 @@ class Reading:
             yield from self._sound(half)
 
     def _together(self, block: Block) -> Table | None:
-        """Rows of a block; none where one of them needs a closer look."""
+        """Return the parsed rows of a block; None if one of them needs validation by itself."""
         try:
             table = Table(block, block.values())
         except ValueError:
@@ -122,7 +126,7 @@ class Reading:
         return table
 
     def _apart(self, table: Table, seen: Seen) -> Iterator[Table | Fault]:
-        """Rows whose names nobody had before."""
+        """Yield the rows with new names, and faults for repeated names."""
         names, start = table.names(), 0
         for place in seen.repeated(names):
             if start < place:
@@ -139,19 +143,12 @@ class Reading:
         ):
             form = said.pop("format", self.usual.format)
             said.pop("name", None)
-            hold = self._hold(said)
             controls = self._controls(said)
-            question = replace(self.usual.question, controls=controls, hold=hold, **said)
+            question = structs.replace(self.usual.question, controls=controls, **said)
             yield Query(name, form, question, self.place(number))
 
-    def _hold(self, said: dict[str, Any]) -> Hold:
-        """What a row is held to, taken out of what it says."""
-        held = {field: said.pop(field) for field in HELD if field in said}
-        usual = self.usual.question.hold
-        return replace(usual, **held) if held else usual
-
     def _controls(self, said: dict[str, Any]) -> dict[str, float]:
-        """Controls of a row, taken out of what it says, in the card's order."""
+        """Return the controls of a row in the card's order, removed from `said`."""
         return {name: said.pop(CONTROL + name) for name in self._names}
 
     @cached_property
@@ -160,12 +157,12 @@ class Reading:
 
 
 def _named(block: Block) -> bool:
-    """Whether rows can say what they are called; names that are generated differ."""
+    """Return whether rows may give names; generated names are unique."""
     return any(column.field == "name" for column in block.columns)
 
 
 def _said(table: Table) -> Iterator[dict[str, Any]]:
-    """What each row says, by field."""
+    """Yield the given values of each row, by field."""
     fields = list(table.values)
     for row in zip(*table.values.values(), strict=True):
         yield {field: value for field, value in zip(fields, row, strict=True) if value is not None}

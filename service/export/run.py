@@ -1,37 +1,41 @@
-"""An export from its queries to its target, in as many goes as it takes."""
+"""One run of an export, from its queries to its target; an export may take several runs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Protocol
 
-from service.export import chunks, crew, fitting, ledger
+from service.encode import ENCODERS
+from service.export import checkpoint, chunks, layouts, pool
+from service.export.checkpoint import Part
 from service.export.chunks import Task
-from service.export.crew import Crew
-from service.export.job import Work
-from service.export.ledger import Part
-from service.export.query import Source
+from service.export.job import Job, Work
+from service.export.pool import Runner
+from service.export.query import KEPT, Fault, Query, Source, Survey
 from service.export.target import STATE, Target, open_target
 from service.motion.errors import FileError, InvalidField
 
 
-class Watch(Protocol):
-    """Whoever looks on: is told how it goes, and says when to stop."""
+class Monitor(Protocol):
+    """Observer of a run, which also decides when to stop it."""
 
     def begin(self, total: int, done: int) -> None:
-        """Of so many rows so many were done before."""
+        """Begin a run; `done` of the `total` rows were finished by earlier runs."""
 
     def advance(self, part: Part) -> None:
-        """A chunk is done."""
+        """Record a finished chunk."""
+
+    def note(self, message: str) -> None:
+        """Report an unexpected event to the user."""
 
     def stopped(self) -> bool:
-        """Whether to put away what was begun, and end."""
+        """Return whether the run should end; chunks in work are finished or abandoned."""
 
 
 @dataclass(frozen=True)
 class Shard:
-    """The chunks whose number leaves `index` when divided by `count`."""
+    """The chunks whose number leaves the remainder `index` when divided by `count`."""
 
     index: int = 0
     count: int = 1
@@ -41,16 +45,16 @@ class Shard:
             raise InvalidField("shard", f"{self.index}/{self.count}, expected 0/N to N-1/N")
 
     @classmethod
-    def of(cls, words: str) -> "Shard":
-        """Shard of I/N."""
-        index, _, count = words.partition("/")
+    def of(cls, text: str) -> "Shard":
+        """Return the shard of the text I/N; InvalidField for any other."""
+        index, _, count = text.partition("/")
         try:
             return cls(int(index), int(count))
         except ValueError as fault:
-            raise InvalidField("shard", f"{words!r}, expected I/N, such as 0/4") from fault
+            raise InvalidField("shard", f"{text!r}, expected I/N, such as 0/4") from fault
 
     def has(self, number: int) -> bool:
-        """Whether a chunk is of it."""
+        """Return whether a chunk belongs to the shard."""
         return number % self.count == self.index
 
 
@@ -59,9 +63,10 @@ WHOLE = Shard()
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run: rows of its shard, and how many of them are done by now.
+    """Result of a run.
 
-    facts: of the whole export, once it is complete; before: whether it was when this run began.
+    rows: of the shard. done: how many of them are finished. facts: of the whole export if it is
+    complete. before: true if it was complete when this run began.
     """
 
     rows: int
@@ -71,24 +76,32 @@ class Outcome:
 
 
 def run(
-    work: Work, source: Source, watch: Watch, by: Crew = crew.alone, shard: Shard = WHOLE
+    work: Work,
+    source: Source,
+    monitor: Monitor,
+    runner: Runner = pool.run_here,
+    shard: Shard = WHOLE,
+    verify: bool = False,
 ) -> Outcome:
-    """Do what is left of a shard of an export, and complete the export if that was all of it.
+    """Make the unfinished chunks of a shard, and complete the export if those were all.
 
-    Raises InvalidField for rows at fault, unless they are skipped, and FileError where the target
-    cannot be used; what is done by then stays, and the next run goes on from there.
+    verify: compare files of finished chunks by checksum, not only by size. Chunks with a file that
+    differs are made again, as is a complete export. Raises InvalidField for invalid rows, unless
+    they are skipped, and FileError if the target cannot be used; finished chunks are kept, and the
+    next run resumes from there.
     """
     target = open_target(work.target)
-    if (facts := ledger.complete(target, work.target, work.job)) is not None:
-        # Whoever completed it may have been killed before this.
+    if (facts := checkpoint.complete(target, work.target, work.job)) is not None:
+        # The run that completed it may have been killed before this.
         target.remove(STATE)
-        if ledger.whole(target):
+        if (path := checkpoint.damaged(target, facts, verify)) is None:
             rows = facts["clips"] + facts["skipped"]
             return Outcome(rows, rows, facts, before=True)
-        ledger.reopen(target, work.job)
-    source = fitting.to(work.job, source)
+        monitor.note(f"{work.target}/{path}: missing or damaged; the export is made again")
+        checkpoint.reopen(target, work.job)
+    source = _fitting(work.job, source)
     total = _survey(source, work.skip)
-    return _go_on(_Run(work, source, target, shard, total), watch, by)
+    return _resume(_Run(work, source, target, shard, total, verify), monitor, runner)
 
 
 @dataclass(frozen=True)
@@ -98,6 +111,7 @@ class _Run:
     target: Target
     shard: Shard
     total: int
+    verify: bool
 
     @property
     def size(self) -> int:
@@ -109,12 +123,21 @@ class _Run:
 
     @property
     def own(self) -> dict[int, int]:
-        """Rows of each chunk of the shard, by its number."""
+        """Number of rows of each chunk of the shard, by the number of the chunk."""
         numbers = filter(self.shard.has, range(self.chunks))
         return {number: min(self.size, self.total - number * self.size) for number in numbers}
 
+    def unfinished(self) -> set[int]:
+        """Return the numbers of the shard's chunks that have to be made."""
+        names = checkpoint.names(self.target)
+        return {
+            number
+            for number in self.own
+            if checkpoint.done(self.target, number, names, self.verify) is None
+        }
+
     def tasks(self, numbers: set[int]) -> Iterator[Task]:
-        """Tasks of the chunks of these numbers, from one pass through the queries."""
+        """Yield the tasks of some chunks, from one pass through the queries."""
         rows = self.source.rows()
         for number in range(max(numbers, default=-1) + 1):
             chunk = tuple(islice(rows, self.size))
@@ -122,34 +145,81 @@ class _Run:
                 yield Task(number, number * self.size, chunk)
 
     def finish(self) -> dict[str, Any] | None:
-        return ledger.finish(self.target, self.work, self.chunks)
+        return checkpoint.finish(self.target, self.work, self.chunks)
 
 
-def _go_on(run: _Run, watch: Watch, by: Crew) -> Outcome:
+def _resume(run: _Run, monitor: Monitor, runner: Runner) -> Outcome:
     own = run.own
     rows = sum(own.values())
     try:
-        ledger.begin(run.target, run.work.target, run.work.job)
-        names = ledger.names(run.target)
-        left = {number for number in own if ledger.done(run.target, number, names) is None}
+        checkpoint.begin(run.target, run.work.target, run.work.job)
+        left = run.unfinished()
         done = rows - sum(own[number] for number in left)
-        watch.begin(rows, done)
-        for part in by(run.work, run.tasks(left), watch.stopped):
+        monitor.begin(rows, done)
+        for part in runner(run.work, run.tasks(left), monitor.stopped):
             done += part.clips + len(part.skipped)
-            watch.advance(part)
+            monitor.advance(part)
     except FileError:
         # Another run of the same export may have completed it meanwhile, or during the survey.
-        if (facts := ledger.complete(run.target, run.work.target, run.work.job)) is None:
+        if (facts := checkpoint.complete(run.target, run.work.target, run.work.job)) is None:
             raise
         return Outcome(rows, rows, facts)
     return Outcome(rows, done, None if done < rows else run.finish())
 
 
 def _survey(source: Source, skip: bool) -> int:
-    """Number of rows; InvalidField where some are at fault and not to be skipped, or none is."""
+    """Return the number of rows.
+
+    Raises InvalidField for faults that are not skipped, or if all rows are faults.
+    """
     found = source.survey()
     if found.faulty and not skip:
         raise chunks.refusal(found.faulty, found.faults)
     if found.faulty == found.total:
         raise InvalidField("queries", "no row that can be answered, expected at least one")
     return found.total
+
+
+def _fitting(job: Job, source: Source) -> Source:
+    """Return the source with faults in place of the queries that the job cannot write."""
+    misfit = layouts.find(job.layout).misfit
+    if misfit is None and (job.unit or job.up):
+        misfit = _unlawful
+    return source if misfit is None else _Fitting(source, job, misfit)
+
+
+def _unlawful(job: Job, query: Query) -> str | None:
+    """Return the reason for which a format cannot have the job's unit and up axis, or None."""
+    try:
+        ENCODERS[query.format].convention(job.unit, job.up)
+    except InvalidField as fault:
+        return str(fault)
+    return None
+
+
+@dataclass(frozen=True)
+class _Fitting:
+    """Rows of a source; those for which `misfit` returns a reason are faults."""
+
+    source: Source
+    job: Job
+    misfit: Callable[[Job, Query], str | None]
+
+    @property
+    def digest(self) -> str:
+        # The reasons depend on the job, which has a digest of its own.
+        return self.source.digest
+
+    def rows(self) -> Iterator[Query | Fault]:
+        for row in self.source.rows():
+            why = self.misfit(self.job, row) if isinstance(row, Query) else None
+            yield row if why is None else Fault(row.place, why)
+
+    def survey(self) -> Survey:
+        total, faulty, faults = 0, 0, []
+        for row in self.rows():
+            total += 1
+            if isinstance(row, Fault):
+                faulty += 1
+                faults += [row] if faulty <= KEPT else []
+        return Survey(total, faulty, tuple(faults))

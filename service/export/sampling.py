@@ -1,7 +1,7 @@
-"""Queries at points drawn at random: `--sample N --method latin|hull --seed S`.
+"""Queries at random points: `--sample N --method latin|hull --seed S`.
 
-Equal seeds give equal points, whatever the machine: only sums, products, sorts and what NumPy
-promises never to change are used.
+Equal seeds give equal points on every machine: only sums, products, sorts and NumPy's guaranteed
+random streams are used.
 """
 
 from collections.abc import Callable, Iterator
@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from service.export import permutation
 from service.export.blocks import SIZE, Block
 from service.export.columns import Column
 from service.motion.card import Control, ModelCard
@@ -18,12 +18,17 @@ from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
 
 MOST = 10**9
-"""Points that can be drawn: more is a slip of the keyboard."""
+"""Largest number of points; a greater one is considered a typing error."""
+
+ROUNDS = 8
+"""Rounds of the Feistel network. Four suffice for large numbers (Luby and Rackoff 1988)."""
+
+Places = NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """Points drawn from a model's controls. method: a key of METHODS."""
+    """Random points of a model's controls. method: a key of METHODS."""
 
     columns: tuple[Column, ...]
     card: ModelCard
@@ -32,15 +37,15 @@ class Drawn:
     seed: int
 
     def place(self, point: int) -> str:
-        """How a point is named in messages."""
+        """Return the name of a point for messages."""
         return f"sample {point}"
 
     def spec(self) -> dict[str, Any]:
-        """All that the points hang on but the model, as plain values."""
+        """Return all parameters that determine the points except the model, as plain values."""
         return {"method": self.method, "count": self.count, "seed": self.seed}
 
     def blocks(self) -> Iterator[Block]:
-        """Points from the first on."""
+        """Yield the points in blocks, in order."""
         readers = [column.kind.values for column in self.columns]
         first = 0
         for points in METHODS[self.method](self.card, self.count, self.seed):
@@ -50,7 +55,7 @@ class Drawn:
 
 
 def check(method: str, count: int, seed: int) -> None:
-    """InvalidField for what nothing can be drawn by."""
+    """Raise InvalidField for an unknown method, a count out of range or a negative seed."""
     if method not in METHODS:
         raise InvalidField("method", f"{method!r}, expected one of {', '.join(METHODS)}")
     if not 1 <= count <= MOST:
@@ -60,35 +65,70 @@ def check(method: str, count: int, seed: int) -> None:
 
 
 def latin(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
-    """Latin hypercube over the sampled ranges, in blocks (n, d).
+    """Yield a Latin hypercube over the sampled ranges, in blocks (n, d).
 
-    Of `count` equal parts of each control's range every one holds one point (McKay et al. 1979). A
-    control of which few values were sampled takes those, in equal shares.
+    Each of `count` equal parts of each control's range contains one point (McKay et al. 1979). A
+    discrete control takes its sampled values in equal shares.
     """
     within = [np.random.default_rng((seed, place)) for place in range(len(card.controls))]
     for first, size in _blocks(count):
         points = np.empty((size, len(card.controls)))
         for place, control in enumerate(card.controls):
             rows = np.arange(first, first + size, dtype=np.uint64)
-            parts = permutation.of(rows, count, (seed, place, 1))
+            parts = permuted(rows, count, (seed, place, 1))
             jitter = within[place].random(size)
             points[:, place] = _spread(control, parts, jitter, count)
         yield points
 
 
-def _spread(control: Control, parts: permutation.Places, jitter: Floats, count: int) -> Floats:
-    """Values (n,) of a control in parts (n,) of `count`; jitter (n,), where in each part."""
+def _spread(control: Control, parts: Places, jitter: Floats, count: int) -> Floats:
+    """Return the values (n,) of a control in parts (n,) of `count`.
+
+    jitter: (n,), position in each part, 0 to 1.
+    """
     if control.values:
         return np.array(control.values)[parts.astype(np.int64) * len(control.values) // count]
     share = (parts + jitter) / count
     return control.minimum + share * (control.maximum - control.minimum)
 
 
-def hull(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
-    """Points in the convex hull of the captured clips' controls, in blocks (n, d).
+def permuted(places: Places, count: int, seed: tuple[int, ...]) -> Places:
+    """Return the images (n,) of places (n,) under a random permutation of 0 to count - 1.
 
-    Each is even in the simplex of d + 1 clips drawn at random: denser where clips are, and never
-    among controls that no clip was near to. Controls of few values are mixed like any other.
+    Each seed has its own permutation, computed place by place. A Feistel network permutes the
+    numbers of an even number of bits; images beyond `count` are permuted again until they are below
+    it (Black and Rogaway 2002), fewer than four times on average.
+    """
+    keys: Places = np.array(np.random.SeedSequence(seed).generate_state(ROUNDS, np.uint64))
+    half = np.uint64(max(1, ((count - 1).bit_length() + 1) // 2))
+    images = _network(places.astype(np.uint64), keys, half)
+    beyond = np.flatnonzero(images >= count)
+    while len(beyond):
+        images[beyond] = _network(images[beyond], keys, half)
+        beyond = beyond[images[beyond] >= count]
+    return images
+
+
+def _network(numbers: Places, keys: Places, half: np.uint64) -> Places:
+    mask = (np.uint64(1) << half) - np.uint64(1)
+    left, right = numbers >> half, numbers & mask
+    for key in keys:
+        left, right = right, left ^ (_mix(right + key) & mask)
+    return (left << half) | right
+
+
+def _mix(numbers: Places) -> Places:
+    """Return numbers scrambled by the finaliser of SplitMix64 (Steele et al. 2014)."""
+    numbers = (numbers ^ (numbers >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    numbers = (numbers ^ (numbers >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return numbers ^ (numbers >> np.uint64(31))
+
+
+def hull(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
+    """Yield points in the convex hull of the captured clips' controls, in blocks (n, d).
+
+    Each point is uniform in the simplex of d + 1 random clips, so points are denser where clips
+    are. Discrete controls are mixed like continuous ones.
     """
     examples = np.array(card.examples)
     corners = examples.shape[1] + 1
@@ -96,7 +136,7 @@ def hull(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
     for _, size in _blocks(count):
         numbers = rng.random((size, 2 * corners - 1))
         drawn = (numbers[:, :corners] * len(examples)).astype(np.int64)
-        # Gaps between sorted numbers are even in the simplex (Devroye 1986, V.2).
+        # Gaps between sorted uniform numbers are uniform in the simplex (Devroye 1986, V.2).
         cuts = np.sort(numbers[:, corners:], axis=1)
         weights = np.diff(cuts, axis=1, prepend=0.0, append=1.0)
         # A sum in a fixed order, unlike a matrix product's.
@@ -110,6 +150,6 @@ METHODS: dict[str, Callable[[ModelCard, int, int], Iterator[Floats]]] = {
 
 
 def _blocks(count: int) -> Iterator[tuple[int, int]]:
-    """First row and size of each block."""
+    """Yield first row and size of each block."""
     for first in range(0, count, SIZE):
         yield first, min(SIZE, count - first)

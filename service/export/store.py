@@ -1,12 +1,13 @@
-"""Files in an object store: S3 and its like, Google's or Azure's, by URL, through obstore.
+"""Object store as a target, by URL, through obstore.
 
-An object is there whole or not at all by itself. Endpoint, region and credentials are what the
-store's own tools take: AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID and the like in the environment.
+These are S3 and compatible stores, Google Cloud Storage and Azure. Stores write objects atomically.
+Endpoint, region and credentials come from the environment variables of the store's own tools, such
+as AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID.
 """
 
 import asyncio
 from collections.abc import AsyncIterator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import obstore
@@ -16,11 +17,11 @@ from service.motion.errors import FileError
 from service.synthesis import objects
 
 PIECE = 8 << 20
-"""Bytes that a large file is sent in; S3 takes 10,000 of them at most, and none below 5 MiB."""
+"""Part size of multipart uploads, bytes; S3 allows 10,000 parts at most, and none below 5 MiB."""
 AT_ONCE = 4
-"""Pieces of one file on their way at once."""
+"""Concurrent parts of one upload."""
 LISTED = 1000
-"""Names asked for at once."""
+"""Objects of one page of a listing."""
 
 
 class Store:
@@ -32,10 +33,10 @@ class Store:
             self._store: Any = objects.connect(self.url)
 
     def prepare(self) -> None:
-        """Nothing: a store has no folders."""
+        """Do nothing: a store has no folders."""
 
     def write(self, files: Iterable[tuple[str, bytes]]) -> None:
-        """Put files, all of them at once: each takes long, and all together little longer."""
+        """Write files concurrently, since latency dominates."""
         asyncio.run(self._write(list(files)))
 
     async def _write(self, files: list[tuple[str, bytes]]) -> None:
@@ -46,12 +47,10 @@ class Store:
                 if isinstance(result, BaseException):
                     raise result
 
-    def stream(self, path: str, pieces: Iterable[bytes]) -> int:
-        """Put one file that comes in pieces; its size in bytes."""
-        sizes: list[int] = []
+    def stream(self, path: str, pieces: Iterable[bytes]) -> None:
+        """Write one file from an iterable of pieces."""
         with _said(self._url(path)):
-            asyncio.run(self._stream(path, _counted(pieces, sizes)))
-        return sum(sizes)
+            asyncio.run(self._stream(path, _in_turn(pieces)))
 
     async def _stream(self, path: str, pieces: AsyncIterator[bytes]) -> None:
         await obstore.put_async(
@@ -64,7 +63,7 @@ class Store:
         )
 
     def create(self, path: str, content: bytes) -> bool:
-        """Put a file where there is none; False, and nothing done, where there is one."""
+        """Write a file if none exists; return whether it was written."""
         with _said(self._url(path)):
             try:
                 obstore.put(self._store, path, content, mode="create")
@@ -73,36 +72,41 @@ class Store:
         return True
 
     def read(self, path: str) -> bytes | None:
-        """Content of a file; None where there is none."""
+        """Return the content of a file; None if it does not exist."""
         with _said(self._url(path)):
             try:
                 return bytes(obstore.get(self._store, path).bytes())
             except FileNotFoundError:
                 return None
 
+    def pieces(self, path: str) -> Iterator[bytes]:
+        """Yield the content of a file in pieces; none if it does not exist."""
+        with _said(self._url(path)), suppress(FileNotFoundError):
+            yield from map(bytes, obstore.get(self._store, path).stream(min_chunk_size=PIECE))
+
     def names(self, folder: str) -> set[str]:
-        """Names of the files in a folder."""
+        """Return the names of the files in a folder."""
         with _said(self._url(folder)):
             batches = obstore.list(self._store, f"{folder}/", chunk_size=LISTED)
             return {meta["path"].rpartition("/")[2] for batch in batches for meta in batch}
 
     def holds(self, path: str, size: int) -> bool:
-        """True: a store keeps what it has acknowledged."""
+        """Return true: a store keeps acknowledged objects."""
         return True
 
     def empty(self, but: str) -> bool:
-        """Whether nothing is here but one folder."""
+        """Return whether the store contains nothing except, possibly, one folder."""
         with _said(self.url):
             found = obstore.list_with_delimiter(self._store)
         return not found["objects"] and set(found["common_prefixes"]) <= {but}
 
     def drop(self, path: str) -> None:
-        """Take away a file, if it is there."""
+        """Remove a file, if it exists."""
         with _said(self._url(path)):
             obstore.delete(self._store, path)
 
     def remove(self, folder: str) -> None:
-        """Take away a folder and all that is in it."""
+        """Remove a folder and its content."""
         with _said(self._url(folder)):
             for batch in obstore.list(self._store, f"{folder}/", chunk_size=LISTED):
                 obstore.delete(self._store, [meta["path"] for meta in batch])
@@ -111,16 +115,15 @@ class Store:
         return f"{self.url}/{path}"
 
 
-async def _counted(pieces: Iterable[bytes], sizes: list[int]) -> AsyncIterator[bytes]:
-    # Taken in the loop of this thread, which may ask the store for other things meanwhile.
+async def _in_turn(pieces: Iterable[bytes]) -> AsyncIterator[bytes]:
+    # Iterated in this thread's event loop: the pieces may come from calls that use the store.
     for piece in pieces:
-        sizes.append(len(piece))
         yield piece
 
 
 @contextmanager
 def _said(url: str) -> Iterator[None]:
-    """Faults of the store as FileError of that object."""
+    """Convert errors of the store to FileError for this object."""
     try:
         yield
     except (BaseError, OSError, ValueError) as fault:

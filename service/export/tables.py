@@ -1,6 +1,6 @@
-"""Queries of a CSV file: UTF-8, a heading, cells separated by commas and quoted where need be.
+"""Queries of a CSV file: UTF-8, with a heading, comma-separated and quoted where necessary.
 
-Blank lines are no rows. An empty cell says nothing. A row is named by the line that it begins in.
+Blank lines are ignored. An empty cell has no value. A row is named by its first line.
 """
 
 import csv
@@ -17,18 +17,17 @@ from service.motion.errors import FileError
 
 @dataclass(frozen=True)
 class CsvFile:
-    """A CSV file whose heading was understood; how many rows it has only its end tells."""
+    """A CSV file with a valid heading, as a source of rows."""
 
     original: Original
     heading: tuple[Column, ...]
-    count: None = None
 
     def place(self, line: int) -> str:
-        """How a row is named in messages."""
+        """Return the name of a row for messages."""
         return f"{self.original.path}:{line}"
 
     def blocks(self) -> Iterator[Block | Broken]:
-        """Rows below the heading."""
+        """Yield the rows below the heading, in blocks."""
         return self.original.unchanged(self._blocks())
 
     def _blocks(self) -> Iterator[Block | Broken]:
@@ -48,7 +47,7 @@ class CsvFile:
 
 
 def read(original: Original, columns: Columns) -> CsvFile:
-    """A CSV file; FileError where its heading does not name what is needed."""
+    """Return a CSV file; FileError if its heading does not fit the model."""
     with _open(original.path) as file:
         first = next(_rows(original.path, file), Broken(1, "empty, expected a heading"))
     if isinstance(first, Broken):
@@ -62,12 +61,12 @@ def read(original: Original, columns: Columns) -> CsvFile:
 
 
 def _open(path: Path) -> TextIO:
-    # What is no UTF-8 shall be found by its line.
+    # Bytes that are not UTF-8 become surrogates, so that a fault names their line.
     return path.open(encoding="utf-8-sig", errors="surrogateescape", newline="")
 
 
 def _rows(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]] | Broken]:
-    """Line and cells of each row, blank ones left out."""
+    """Yield line number and cells of each row, without blank ones."""
     reader = csv.reader(lines(path, file.readline), strict=True, skipinitialspace=True)
     while True:
         line = reader.line_num + 1

@@ -1,1 +1,1 @@
-"""The floor that the service and the training job share: numpy only."""
+"""Code shared by the service and the training job; NumPy and msgspec are its only dependencies."""

@@ -1,4 +1,4 @@
-"""What a model answers: poses or a clip, and how far they may be trusted."""
+"""Results of a query: poses or clips with provenance and uncertainty, sigma grids, reasons."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -16,11 +16,11 @@ Number = TypeVar("Number", bound=np.floating[Any])
 
 @dataclass(frozen=True)
 class Met:
-    """What an answer was held to, and how far it stays from it.
+    """Residual of one constraint: a measured control or a target.
 
-    what: a control's name, or joint and moment of a target. miss: distance of the answer from what
-    was asked for, in `unit`. reached: whether it is met to a
-    millimetre, or a thousandth of its unit.
+    what: a control's name, or joint and moment of a target. miss: distance between the requested
+    and the reached value, in `unit`. reached: whether the miss is at most a millimetre, or a
+    thousandth of the unit.
     """
 
     what: str
@@ -31,19 +31,19 @@ class Met:
 
 @dataclass(frozen=True)
 class Trust:
-    """Where an answer comes from and what it is worth.
+    """Provenance and uncertainty of a result.
 
-    model: name@contenthash. controls: the values that were asked for, in the model's units.
-    duration: natural length of the whole clip at these controls, s. sigma: how far a captured
-    clip at these controls would lie from this one, as a root-mean-square over joints and frames,
-    m. warnings: one sentence for each control outside what was sampled, or one where the controls
-    lie in a gap of it, and one for each target that is not reached. performer: who was asked for;
-    none for somebody who was never seen. level: of detail. supported: whether anything like these
-    controls was captured. performer_seen: whether somebody captured was asked for; none where the
-    model tells nobody apart. inferred: names of the controls that were not given, and chosen as the
-    most typical for those that were. measured: the controls that the recipe says how to measure, as
-    the answer has them. targets: what the answer was held to. joint_sigma (J,), m: sigma of each
-    joint, where it was asked for.
+    model: name@contenthash. controls: requested values in the model's units. duration: natural
+    length of the whole clip at these controls, s. sigma: expected distance between this clip and a
+    captured clip at these controls, root mean square over joints and frames, m. warnings: one
+    sentence for each control outside its sampled range, or one for controls in a gap between the
+    samples, and one for each target that is not reached. performer: requested name; None for an
+    unseen performer. level: of detail. supported: whether clips with similar controls were
+    captured. performer_seen: whether the requested performer was captured; None where the model
+    does not distinguish performers. inferred: names of the controls that were not given and were
+    set to the most typical values for the given ones. measured: values in this result of the
+    controls for which the recipe has a measure. targets: residuals of the constraints. joint_sigma
+    (J,), m: sigma of each joint; empty unless requested.
     """
 
     model: str
@@ -61,8 +61,7 @@ class Trust:
     joint_sigma: tuple[float, ...] = ()
 
     def facts(self) -> dict[str, Any]:
-        """The same as plain values, for formats that carry free metadata; what there is nothing to
-        say of is left out."""
+        """Return the fields that are not empty as plain values, for the metadata of files."""
         return {
             "model": self.model,
             "controls": self.controls,
@@ -88,7 +87,10 @@ class Trust:
 
 @dataclass(frozen=True)
 class PoseAnswer(Generic[Number]):
-    """Poses at times (S,), s: rotations (S, J, 4), root_position (S, 3), bone_offsets (J, 3)."""
+    """Poses at times (S,), s.
+
+    rotations: (S, J, 4). root_position: (S, 3), m. bone_offsets: (J, 3), m.
+    """
 
     times: Floats
     rotations: NDArray[Number]
@@ -107,7 +109,7 @@ class ClipAnswer:
 
 @dataclass(frozen=True)
 class Axis:
-    """A control of a grid and its values (n,), in its unit."""
+    """Axis of a grid: a control and its values (n,), in the control's unit."""
 
     control: Control
     values: Floats
@@ -115,11 +117,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class SigmaGrid:
-    """Sigma (R, C), m, of the finest level, whether all controls lie inside what was sampled,
-    inside (R, C), and whether anything like them was captured, supported (R, C), for the columns
-    of one axis and the rows of another.
+    """Sigma over two controls, at the finest level of detail.
 
-    model: name@contenthash. controls: the values of those that are no axes.
+    across: axis of the C columns. along: axis of the R rows. model: name@contenthash. controls:
+    values of the other controls. sigma (R, C): m. inside (R, C): whether all controls lie within
+    their sampled ranges. supported (R, C): whether clips with similar controls were captured.
     """
 
     model: str
@@ -134,11 +136,11 @@ class SigmaGrid:
 
 @dataclass(frozen=True)
 class Captured:
-    """A captured clip, and what it has to do with an answer.
+    """Captured clip and its contribution to a result.
 
-    source: its file and frames. distance: from the controls asked for, in the model's own metric;
-    at one, the poses of two clips have almost nothing to do with each other. weight: what it
-    counts for in the answer's poses.
+    source: its file and frames. distance: between its controls and the requested ones, in the
+    model's metric; at distance one, at most 5 % of the covariance is left. weight: kriging weight
+    of the clip in the poses of the result.
     """
 
     source: str
@@ -150,11 +152,12 @@ class Captured:
 
 @dataclass(frozen=True)
 class Backing:
-    """Whether anything like some controls was captured, and by what that was told.
+    """Support of a query by the captured clips, and the quantities that decide it.
 
-    beyond: how far each control lies beyond its sampled range, as a share of it, of which `most` is
-    allowed. variance: of a plain field over the controls of the captured clips, from 0 where many
-    are near to 1 where none is. limit: the most at which something like it was captured.
+    beyond: distance of each control beyond its sampled range, as a share of the range; at most
+    `most` is supported. variance: kriging variance of a field over the controls of the captured
+    clips, from 0 where clips are dense to 1 far from all clips. limit: largest variance that is
+    supported.
     """
 
     supported: bool
@@ -166,11 +169,10 @@ class Backing:
 
 @dataclass(frozen=True)
 class Reasons:
-    """Why an answer is as it is: the captured clips nearest to it, the nearest first, and how many
-    others there are, with what all of them count for. All weights add up to one.
+    """Explanation of a result: the nearest captured clips, the nearest first, and their weights.
 
-    model: name@contenthash. warnings: as in Trust. inferred: names of the controls that were not
-    given, as of an answer.
+    model: name@contenthash. warnings, inferred: as in Trust. others, others_weight: count and total
+    weight of the clips that are not listed. All weights sum to one.
     """
 
     model: str
@@ -186,28 +188,29 @@ class Reasons:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A point to capture.
+    """Point in the control space at which to capture the next clip.
 
-    gain: share by which the mean variance over all that may be asked falls if it is. variance: at
-    the point itself, from 0 to 1. nearest: source of the captured clip nearest to it;
-    none for models that do not keep them. lacking: the control in which that differs most, by
-    `gap`, a share of its range.
+    gain: share by which the mean variance over the control space falls once it is captured.
+    variance: at the point itself, from 0 to 1. nearest: source of the nearest captured clip.
+    lacking: the control in which that clip differs most. gap: this difference as a share of the
+    control's range.
     """
 
     controls: dict[str, float]
     gain: float
     variance: float
-    nearest: str | None
+    nearest: str
     lacking: str
     gap: float
 
 
 @dataclass(frozen=True)
 class Suggestions:
-    """Points to capture next, the one that is worth most first; each as if those before it were.
+    """Points to capture next, by descending gain; each gain assumes the points before as captured.
 
-    model: name@contenthash. performer: whose clips alone counted as captured; none for everybody's.
-    candidates: of how many points they were chosen.
+    model: name@contenthash. performer: name of the performer whose clips alone count as captured;
+    None for the clips of all performers. candidates: number of points among which they were
+    selected.
     """
 
     model: str

@@ -1,5 +1,4 @@
-"""Between rows of a table, and from one pose to another of nearly the same: what a switch of level
-of detail goes through."""
+"""Interpolation between rows of a table, and between poses at a switch of level of detail."""
 
 from typing import Any
 
@@ -9,26 +8,30 @@ import numpy.typing as npt
 from service.motion.conventions import Floats
 
 Numbers = npt.NDArray[Any]
-"""Of any precision, which stays what it is."""
+"""Array of any precision; results have the precision of the arguments."""
 
 
 def between(rows: Floats, places: Floats) -> Floats:
-    """Values (..., k) of rows (F, k) at places (...) among them, 0 to F - 1, linear between two."""
+    """Return rows (F, k) interpolated linearly at fractional indices (...) from 0 to F - 1.
+
+    Shape of the result: (..., k).
+    """
     before = np.minimum(places.astype(np.int64), len(rows) - 2)
     share = (places - before)[..., None]
     return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
 def straight(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
-    """Values (N, ...) so much (N,) of the way on a straight line."""
+    """Return linear interpolations (N, ...) from `before` to `after` by shares (N,), 0 to 1."""
     way = shares.reshape(-1, *(1 for _ in before.shape[1:]))
     return before + way * (after - before)
 
 
 def rotations(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
-    """Unit quaternions (N, ..., 4) so much (N,) of the way, the shorter one.
+    """Return unit quaternions (N, ..., 4) interpolated by shares (N,) along the shorter arc.
 
-    Along the chord, which for rotations a few degrees apart is the arc but for a share of 1e-4.
+    Normalised linear interpolation: for rotations a few degrees apart it differs from slerp by a
+    share of 1e-4.
     """
     same = np.sum(before * after, axis=-1, keepdims=True) >= 0.0
     mixed = straight(before, np.where(same, after, -after), shares)
@@ -37,6 +40,6 @@ def rotations(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
 
 
 def eased(shares: Numbers) -> Numbers:
-    """Shares that set out and arrive gently, with no speed at either end."""
+    """Return shares mapped by the smoothstep 3 s² - 2 s³, whose slope is zero at 0 and 1."""
     gentle: Numbers = shares * shares * (3.0 - 2.0 * shares)
     return gentle

@@ -1,4 +1,4 @@
-"""One motion of one skeleton, sampled at a constant rate."""
+"""Clip: one motion of one skeleton, sampled at a constant rate."""
 
 from dataclasses import dataclass
 
@@ -39,21 +39,21 @@ class Clip:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last."""
+        """Return the seconds from the first frame to the last."""
         return (len(self) - 1) / self.rate
 
     @property
     def root_path(self) -> Floats:
-        """Root positions (F, 3), m."""
+        """Return the root positions (F, 3), m."""
         return self.translations[:, 0]
 
     def positions(self) -> Floats:
-        """Joint positions (F, J, 3) in the character's frame, m."""
-        return skeleton.forward(self.skeleton.parents, self.rotations, self.translations)[0]
+        """Return the joint positions (F, J, 3) in the character's frame, m."""
+        return skeleton.positions(self.skeleton.parents, self.rotations, self.translations)
 
 
 def assemble(
     joints: Skeleton, rotations: Floats, root_path: Floats, bone_offsets: Floats, rate: float
 ) -> Clip:
-    """Clip whose bones keep their offsets (J, 3) while the root follows its path (F, 3)."""
+    """Return a clip with constant bone offsets (J, 3), m, whose root follows a path (F, 3), m."""
     return Clip(joints, rotations, skeleton.translations(bone_offsets, root_path), rate)

@@ -1,20 +1,20 @@
-"""Units and axes, said once for the whole project.
+"""Units, axes and array types of the whole project.
 
 Lengths are metres, times seconds, angles radians. Y is up, the frame is right-handed, a character
 that faces straight ahead faces +Z. Quaternions are unit, in the order w x y z, and local to the
 parent joint. Array axes run (..., frames, joints, component); leading axes are free. Other units
-exist only where a file or a wire format is read or written, and the functions there have no
-default for them.
+exist only where a file or a wire format is read or written, and the functions there have no default
+for them.
 """
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-"""Arrays of numbers in Python are float64, but for poses that a model has just answered with."""
+"""Arrays of numbers; float64 except for the poses that a model returns."""
 
 Singles = npt.NDArray[np.float32]
-"""Poses as the model answers them: twice the precision is twice the memory."""
+"""Poses as a model returns them: float64 would double their memory."""
 
 Indices = npt.NDArray[np.int64]
 

@@ -1,5 +1,7 @@
-"""How many cores the numbers of a process take, said to NumPy before it is imported."""
+"""Limit of NumPy's threads per process, set in the environment before NumPy is imported."""
 
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Environment of a process that is one of as many as there are cores: the threads of all would wait
-for each other."""
+"""Environment of a worker process where there is one worker per core.
+
+With more than one BLAS thread each, the threads of all workers would wait for each other.
+"""

@@ -1,4 +1,4 @@
-"""Many characters of one skeleton: where each stands, and what all of them do."""
+"""Crowds: placements, motions and poses of many characters of one skeleton."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from service.motion.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class Placement:
-    """Where each character's own frame stands: positions (N, 3), m, and headings (N,), rad.
+    """Positions and headings of the characters' own frames in the world.
 
-    A heading turns the frame about +Y: a character that faces +Z in its own frame faces +X at a
-    heading of a quarter turn.
+    positions: (N, 3), m. headings: (N,), rad. A heading turns the frame about +Y: a character that
+    faces +Z in its own frame faces +X at a heading of a quarter turn.
     """
 
     positions: Floats
@@ -25,18 +25,22 @@ class Placement:
     def __len__(self) -> int:
         return len(self.headings)
 
+    def of(self, some: Indices) -> "Placement":
+        """Return the placement of the characters of some indices (M,)."""
+        return Placement(self.positions[some], self.headings[some])
+
     @property
     def turns(self) -> Floats:
-        """Quaternions (N, 4) of the headings."""
+        """Return the quaternions (N, 4) of the headings."""
         return quat.about(UP, self.headings)
 
 
 @dataclass(frozen=True)
 class Motions:
-    """Motions of equal length in their characters' own frames.
+    """Motions of equal length, each in its character's own frame.
 
-    rotations (M, F, J, 4) and root_position (M, F, 3), m; bone_offsets (M, J, 3), m. levels (M, F):
-    level of detail that each pose was made at.
+    rotations: (M, F, J, 4). root_position: (M, F, 3), m. bone_offsets: (M, J, 3), m. levels (M, F):
+    level of detail at which each pose was computed.
     """
 
     rotations: Singles
@@ -50,13 +54,13 @@ class Motions:
 
 @dataclass(frozen=True)
 class CrowdPoses:
-    """One pose of each of N characters, where each stands in the world.
+    """One pose of each of N characters, placed in the world.
 
-    model: name@contenthash. rotations (N, J, 4), the root's in the world; root_position (N, 3), m,
-    in the world; bone_offsets (N, J, 3), m. levels (N,): level of detail of each. error_px (N,):
-    pixels that the level's error covers; none where no camera was given. duration (N,), s: of each
-    character's clip. sigma (N,), m, and supported (N,): as in Trust. warnings: sentences
-    on the crowd as a whole.
+    model: name@contenthash. rotations (N, J, 4): local to the parent, the root's in the world.
+    root_position (N, 3): in the world, m. bone_offsets: (N, J, 3), m. levels (N,): level of detail
+    of each character. error_px (N,): projected error of the level, pixels; None without a camera.
+    duration (N,): of each character's clip, s. sigma (N,), m, and supported (N,): as in Trust.
+    warnings: sentences about the crowd as a whole.
     """
 
     model: str
@@ -77,11 +81,11 @@ class CrowdPoses:
 
 @dataclass(frozen=True)
 class CrowdClip:
-    """A moving crowd: N characters that play M motions of so many frames at a rate.
+    """Moving crowd: N characters that play M motions of equal length.
 
-    motion (N,): which motion each character plays. batches: the motions in order, some at a time,
-    made as they are asked for, so that a crowd need never be held whole; it is gone through once.
-    facts: where it comes from, as plain values.
+    frames: of each motion. rate: frames a second. motion (N,): index of the motion that each
+    character plays. batches: the motions in order, several at a time, computed lazily to bound
+    memory; they can be iterated once. facts: provenance as plain values.
     """
 
     skeleton: Skeleton
@@ -94,5 +98,5 @@ class CrowdClip:
 
     @property
     def shared(self) -> bool:
-        """Whether some motion is played by more than one character."""
+        """Return whether any motion is played by more than one character."""
         return len(np.unique(self.motion)) < len(self.motion)

@@ -1,4 +1,4 @@
-"""Every error that this project raises on purpose.
+"""Errors that this project raises.
 
 MotionError
 ├── FileError            a file that cannot be used, with its path and, where known, its line
@@ -6,18 +6,19 @@ MotionError
 │   ├── RecipeError      a recipe or its table of clips
 │   ├── ModelError       an .onnx file that is corrupt, foreign or of an unknown format
 │   └── UsdError         a USD file that does not open
-├── QueryError           a question that has no answer; names the field
+├── QueryError           a query that has no answer; names the field
+│   ├── FormError        text or JSON that is not a valid query
 │   ├── UnknownModel
 │   ├── UnknownFormat
 │   ├── InvalidField     missing, unknown, of a wrong type, or outside the allowed range
-│   ├── OutsideSamples   controls outside what was sampled, when the client asked to refuse them
-│   └── OutOfReach       a target that no captured motion comes near, when the same was asked
-├── ClusterError         a Dask cluster that cannot be reached or worked on
-├── WorkerDied           a process that did a part of the work has gone
-└── TrainingError        samples from which no model can be made
-    └── ExportRefused    the graph does not answer what the reference answers
+│   ├── OutsideSamples   controls outside the sampled ranges, if the client chose to refuse them
+│   └── OutOfReach       a target that the motion cannot meet, if the client chose to refuse it
+├── ClusterError         a Dask cluster that cannot be reached or used
+├── WorkerDied           a worker process that ended before its work was done
+└── TrainingError        samples from which a model cannot be trained
+    └── ExportRefused    the graph's results differ from those of the reference
 
-A message says what was found and what was expected. None of them knows of HTTP:
+A message states the found and the expected value. The errors are independent of HTTP:
 service/web/problems.py maps each class to a status.
 """
 
@@ -25,11 +26,11 @@ from pathlib import Path
 
 
 class MotionError(Exception):
-    """Base of every error that names a fault in what was given."""
+    """Base of all errors that are caused by invalid input or a failed resource."""
 
 
 class FileError(MotionError):
-    """A file that cannot be used; `path` and `line` say where the fault is."""
+    """A file that cannot be used; `path` and `line` locate the error."""
 
     def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
         where = f"{path}:{line}" if line is not None else f"{path}"
@@ -39,7 +40,7 @@ class FileError(MotionError):
         self.message = message
 
     def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None]]:
-        # What is raised in one process is told in another.
+        # Errors of worker processes are pickled with their fields.
         return type(self), (self.path, self.message, self.line)
 
 
@@ -60,18 +61,27 @@ class UsdError(FileError):
 
 
 class QueryError(MotionError):
-    """A question that has no answer; `field` is the path of what is wrong with it, and `index` its
-    place where the field holds many."""
+    """A query that has no answer; `field` is the path of the parameter at fault.
+
+    index: position in a parameter with many values.
+    """
 
     def __init__(self, field: str, message: str, index: int | None = None) -> None:
         where = field if index is None else f"{field}/{index}"
-        super().__init__(f"{where}: {message}")
+        super().__init__(f"{where}: {message}" if where else message)
         self.field = field
         self.message = message
         self.index = index
 
     def __reduce__(self) -> tuple[type["QueryError"], tuple[str, str, int | None]]:
         return type(self), (self.field, self.message, self.index)
+
+
+class FormError(QueryError):
+    """Text or JSON that is not a valid query; field: a JSON pointer without its first slash.
+
+    The field is "" for an error of the whole document.
+    """
 
 
 class UnknownModel(QueryError):
@@ -87,15 +97,18 @@ class InvalidField(QueryError):
 
 
 class OutsideSamples(QueryError):
-    """Controls outside what was sampled, when the client asked for them to be refused."""
+    """Controls outside the sampled ranges, for a client that requested an error in this case."""
 
 
 class OutOfReach(QueryError):
-    """A target that the motion cannot meet, when the client asked for that to be refused."""
+    """A target that the motion cannot meet, for a client that requested an error in this case."""
 
 
 class ClusterError(MotionError):
-    """A Dask cluster that cannot be reached, or whose workers cannot do the work; names it."""
+    """A Dask cluster that cannot be reached, or whose workers cannot do the work.
+
+    address: of its scheduler.
+    """
 
     def __init__(self, address: str, message: str) -> None:
         super().__init__(f"{address}: {message}")
@@ -107,12 +120,12 @@ class ClusterError(MotionError):
 
 
 class WorkerDied(MotionError):
-    """A process that did a part of the work has gone: killed, or out of memory."""
+    """A worker process that ended before its work was done: killed, or out of memory."""
 
 
 class TrainingError(MotionError):
-    """Samples from which no model can be made."""
+    """Samples from which a model cannot be trained."""
 
 
 class ExportRefused(TrainingError):
-    """The exported graph does not answer what the float64 reference answers."""
+    """The exported graph's results differ from those of the float64 reference."""

@@ -1,4 +1,4 @@
-"""Files that are whole or not there."""
+"""Atomic writing of files and folders: either complete or absent."""
 
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -11,31 +11,34 @@ CHUNK = 1 << 20
 
 
 def pieces(path: Path) -> Iterator[bytes]:
-    """A file's bytes, a megabyte at a time."""
+    """Yield the bytes of a file in chunks of a megabyte."""
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):
             yield chunk
 
 
 def write(content: bytes, path: Path) -> None:
-    """Put a whole file in place, or none: it is written beside its place and renamed.
+    """Write a file atomically: to a temporary path beside it, then renamed.
 
-    Raises FileError where it cannot be.
+    Raises FileError if it cannot be written.
     """
     stream([content], path)
 
 
 def stream(chunks: Iterable[bytes], path: Path) -> None:
-    """The same for a file that comes in pieces; none is left where the pieces break off."""
+    """Write a file atomically from chunks; no file remains if their iteration fails.
+
+    Raises FileError if it cannot be written.
+    """
     with replacing(path) as made, made.open("wb") as file:
         file.writelines(chunks)
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path of the same name to write to; the file there then takes the place of `path`.
+    """Yield a temporary path with the name of `path`; on success its file replaces `path`.
 
-    Raises FileError where it cannot.
+    Raises FileError if it cannot be written.
     """
     with _room(path) as room:
         yield room / path.name
@@ -44,10 +47,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def replacing_pair(path: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
-    """A path and an empty folder to fill, which then take the places of `path` and `folder`.
+    """Yield a temporary path and an empty folder, which on success replace `path` and `folder`.
 
-    The folder goes first, so that the file never names what is not there. Where something fails,
-    what was there before stays or comes back. Raises FileError where it cannot be done.
+    The folder is replaced first, so that the file never refers to missing ones. After an error the
+    previous file and folder are kept or restored. Raises FileError if they cannot be written.
     """
     with _room(path) as room:
         new, old = room / "new", room / "old"
@@ -63,7 +66,7 @@ def replacing_pair(path: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
 
 @contextmanager
 def _room(path: Path) -> Iterator[Path]:
-    """A folder beside the path, on the same disk, that does not outlive what is done in it."""
+    """Yield a temporary folder beside the path, on the same disk."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing.") as name:

@@ -1,4 +1,4 @@
-"""Feet on the ground: how fast they slide there."""
+"""Foot skate: sliding of planted feet."""
 
 import numpy as np
 
@@ -9,11 +9,10 @@ PLANTED = 0.02
 
 
 def skate(feet: Floats, rate: float) -> Floats:
-    """Mean horizontal speed (...), m/s, of feet (..., F, K, 3), m, while within 2 cm of their
-    lowest, at so many frames a second.
+    """Return the mean horizontal speed (...) of planted feet (..., F, K, 3), m/s.
 
-    Each motion's own heights say when that is: what the eye takes for a foot on the ground. Zero
-    where no foot ever stays there for two frames.
+    feet: positions, m. rate: frames a second. A foot is planted while it is within 2 cm of the
+    lowest height that it has in the motion. Zero if no foot is planted for two frames in a row.
     """
     heights = feet @ UP
     down = heights < heights.min(axis=-2, keepdims=True) + PLANTED

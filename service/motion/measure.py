@@ -1,7 +1,8 @@
-"""What can be measured of a motion, so that nobody types it by hand and a query can be held to it.
+"""Measures: quantities of a motion that are computed, not entered by hand.
 
-Where a joint is at a moment, how far apart the feet get, how far and how fast a walker goes, how
-large the performer is. The same definitions measure captured clips and answers.
+Position of a joint at a moment, greatest distance between the feet, distance and speed of
+locomotion, body size. The same definitions measure captured clips and results, so that a query can
+constrain them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from service.motion import blend, skeleton
+from service.motion.bounded import Index, Share
 from service.motion.conventions import Floats
 
 Quantity = Literal[
@@ -27,49 +29,51 @@ Quantity = Literal[
 At = Literal["start", "end", "highest", "lowest", "farthest", "landmark"]
 
 AXES = {"left": 0, "height": 1, "forward": 2}
-"""Quantities of a joint's place at a moment, m, and the axis of each, in the frame of the clip."""
+"""Quantities of a joint's position, m, and the axis of each in the frame of the clip."""
 TRAVELLED = ("stride_length", "speed", "turn")
-"""What a whole clip covers: m, m/s, degrees to the left."""
+"""Quantities of a whole clip: m, m/s, degrees to the left."""
 BODILY = ("leg_length", "stature")
-"""Of the performer, not of the motion, m."""
+"""Quantities of the performer, not of the motion, m."""
 UNITS = {"speed": "m/s", "turn": "deg"}
-"""Units of what is not measured in metres."""
+"""Units of the quantities that are not in metres."""
 QUANTITIES: tuple[str, ...] = get_args(Quantity)
 MOMENTS: tuple[str, ...] = get_args(At)
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One quantity.
+    """One quantity of a motion.
 
-    joints: whose middle is looked at for a place, two feet for a step's length (the greatest
-    distance ahead that one gets of the other), the chain from hip to foot for a leg's length;
-    empty for all else. at: the moment of a place; farthest is from the root. share: of canonical
-    time at which the landmark of that moment is.
+    joints: for a position those whose centre is taken; for the step length two feet (the greatest
+    distance of one ahead of the other); for the leg length the chain from hip to foot; otherwise
+    empty. at: moment of a position; "farthest" is from the root. share: canonical time of the
+    landmark, as a share of the clip.
     """
 
     quantity: Quantity
-    joints: tuple[int, ...] = ()
+    joints: tuple[Index, ...] = ()
     at: At | None = None
-    share: float | None = None
+    share: Share | None = None
 
     @property
     def unit(self) -> str:
-        """Unit of its values."""
+        """Return the unit of the values."""
         return UNITS.get(self.quantity, "m")
 
     @property
     def bodily(self) -> bool:
-        """Whether it is the performer's, whom no correction of the motion changes."""
+        """Return whether the quantity is the performer's, independent of the motion."""
         return self.quantity in BODILY
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A motion that is measured: joint positions (F, J, 3), m, evenly in some time, its duration,
-    s, how far it goes (3,): to the left and ahead, m, and the change of heading, rad; bone offsets
-    (J, 3), m, with the joints' parents. landmark: the place among the frames, from 0 to F - 1, of
-    the landmark that is asked for."""
+    """Motion as input of a measure.
+
+    positions: of the joints (F, J, 3), m, at equal steps of time. duration: s. travel (3,): to the
+    left and ahead, m, and change of heading, rad. parents: of the joints. offsets: of the bones (J,
+    3), m. landmark: fractional frame index, 0 to F - 1, of the measure's landmark.
+    """
 
     positions: Floats
     duration: float
@@ -80,7 +84,7 @@ class Seen:
 
 
 def value(measure: Measure, seen: Seen) -> float:
-    """Value of a quantity, in its unit."""
+    """Return the value of a quantity, in its unit."""
     match measure.quantity:
         case "stride_length" | "speed" | "turn":
             return travelled(measure.quantity, seen.travel, seen.duration)
@@ -97,7 +101,10 @@ def value(measure: Measure, seen: Seen) -> float:
 
 
 def travelled(quantity: str, travel: Floats, duration: float) -> float:
-    """Length of the way, m, its speed, m/s, or the change of heading, degrees, of a travel (3,)."""
+    """Return the distance, m, the speed, m/s, or the change of heading, degrees, of a travel (3,).
+
+    duration: s.
+    """
     if quantity == "turn":
         return float(np.degrees(travel[2]))
     way = float(np.hypot(travel[0], travel[1]))
@@ -105,7 +112,10 @@ def travelled(quantity: str, travel: Floats, duration: float) -> float:
 
 
 def moment(measure: Measure, positions: Floats, landmark: float) -> float:
-    """Place among frames (F, J, 3), from 0 to F - 1, at which a quantity is measured."""
+    """Return the fractional frame index, 0 to F - 1, at which a quantity is measured.
+
+    positions: (F, J, 3), m. landmark: fractional frame index of the landmark.
+    """
     last = len(positions) - 1
     match measure.at:
         case "start":
@@ -130,21 +140,21 @@ def _middle(measure: Measure, positions: Floats) -> Floats:
 
 
 def _stride_out(measure: Measure, positions: Floats) -> Floats:
-    """How far ahead the first foot is of the second (F,), m."""
+    """Return the distance (F,) of the first foot ahead of the second, m."""
     first, second = measure.joints
     return positions[:, first, 2] - positions[:, second, 2]
 
 
 def _stature(seen: Seen) -> float:
-    """Height of the highest joint above the lowest, all bones as at rest, m."""
+    """Return the height of the highest joint above the lowest in the rest pose, m."""
     still = np.zeros((len(seen.parents), 4))
     still[:, 0] = 1.0
-    positions, _ = skeleton.forward(seen.parents, still, seen.offsets)
+    positions = skeleton.positions(seen.parents, still, seen.offsets)
     return float(np.ptp(positions[:, 1]))
 
 
 def words(measure: Measure, names: Sequence[str]) -> str:
-    """A measure in words: "height of rhand at end". names: of all joints."""
+    """Return a measure as text: "height of rhand at end". names: of all joints."""
     own = " and ".join(names[joint] for joint in measure.joints)
     of = f" of {own}" if own else ""
     at = f" at {measure.at}" if measure.at else ""
@@ -153,11 +163,11 @@ def words(measure: Measure, names: Sequence[str]) -> str:
 
 
 def plain(measure: Measure) -> dict[str, Any]:
-    """The same as JSON has it."""
+    """Return a measure as plain values for JSON, without empty fields."""
     known = {"joints": list(measure.joints), "at": measure.at, "share": measure.share}
     return {"quantity": measure.quantity, **{k: v for k, v in known.items() if v not in (None, [])}}
 
 
 def parse(found: Mapping[str, Any]) -> Measure:
-    """The measure that `plain` wrote."""
+    """Return the measure of the plain values of `plain`."""
     return Measure(**{**found, "joints": tuple(found.get("joints", ()))})

@@ -1,7 +1,7 @@
-"""What joints are called elsewhere: each convention's name for the part that a joint plays.
+"""Joint names by convention: each convention's name for each role of a joint.
 
-To rename is not to retarget: a skeleton of another convention has other bone axes and lengths, and
-a motion fits it only after both are brought together.
+Renaming is not retargeting: a skeleton of another convention has other bone axes and lengths, so
+that a renamed motion still has to be retargeted.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,7 +13,7 @@ from service.motion.errors import InvalidField
 from service.motion.skeleton import Skeleton
 
 Names = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
-"""Whose names joints have: the motion files' own, or those of a convention."""
+"""Naming convention of joints: the motion files' own names, or those of another tool."""
 
 # Named as the bones of a VRM humanoid; fingers, eyes and jaw are left out.
 Role = Literal[
@@ -42,7 +42,7 @@ Role = Literal[
 ]
 ROLES: tuple[str, ...] = get_args(Role)
 
-# Role; HumanIK, as Mixamo but for the prefix; Unreal's mannequin.
+# Role; HumanIK, which Mixamo uses with a prefix; Unreal's mannequin.
 _TRUNK = (
     ("hips", "Hips", "pelvis"),
     ("spine", "Spine", "spine_01"),
@@ -77,10 +77,11 @@ TABLES: dict[str, dict[str, str]] = {
 
 
 def renamed(skeleton: Skeleton, roles: Mapping[str, str], names: Names) -> Skeleton:
-    """The skeleton with a convention's names for the joints that have a role (role: joint).
+    """Return the skeleton with a convention's names for the joints that have a role.
 
-    Others keep theirs, with the ending _2, _3 and so on where the convention's name for another
-    joint, or a joint before, took it. InvalidField for a convention where no joint has a role.
+    roles: joint name by role. The other joints keep their names, with the ending _2, _3 and so on
+    where the name is taken by a renamed or an earlier joint. Raises InvalidField for a convention
+    if the model has no roles.
     """
     if names == "own":
         return skeleton
@@ -92,18 +93,9 @@ def renamed(skeleton: Skeleton, roles: Mapping[str, str], names: Names) -> Skele
     return replace(skeleton, names=_unique(skeleton.names, said))
 
 
-def check(roles: Mapping[str, str], joints: Iterable[str]) -> None:
-    """Raise ValueError for roles that are none, and for joints that are not there or have two."""
-    unknown = sorted(set(roles) - set(ROLES)) + sorted(set(roles.values()) - set(joints))
-    if unknown:
-        raise ValueError(f"roles {dict(roles)}: {unknown} are neither roles nor joints")
-    if len(set(roles.values())) < len(roles):
-        raise ValueError(f"roles {dict(roles)}: a joint has two of them")
-
-
 def _unique(names: Iterable[str], said: Mapping[str, str]) -> tuple[str, ...]:
     given, taken = list(names), set(said.values())
-    # A name that nothing took keeps its joint, whatever ending another one needs.
+    # Names that are not taken are kept first, so that no ending of another joint takes them.
     taken |= (kept := {name for name in given if name not in said and name not in taken})
     return tuple(said.get(name) or (name if name in kept else _free(name, taken)) for name in given)
 

@@ -1,9 +1,9 @@
-"""Whether anything like some controls was captured, by the controls of the captured clips alone.
+"""Support of a query: whether clips with similar controls were captured.
 
-Sigma says how far a captured clip would lie from an answer, and where it believes in a straight
-line it believes in it far beyond the clips and between clusters of them. This asks what is near,
-and nothing of the motion: how far beyond the range of a control a query lies, and the variance of a
-plain field over the controls, which sees gaps.
+Sigma extrapolates linear trends confidently, far beyond the clips and between clusters of them.
+Support depends on the controls of the captured clips alone, not on the motion: on the distance of a
+query beyond the range of each control, and on the kriging variance of a field over the controls
+with a fixed Gaussian covariance, which detects gaps.
 """
 
 import math
@@ -13,43 +13,48 @@ from functools import cached_property
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.conventions import Floats, Singles, Truths
 from service.motion.field import half_ranges
 
 BEYOND = 0.1
-"""Share of a control's range by which a query may lie beyond it."""
+"""Share of a control's range by which a supported query may lie beyond it."""
 QUANTILE = 0.95
-"""Of the captured clips, each left out: so many lie within the limit of the variance."""
-# The plain field: standard deviation of its covariance in half-ranges, and its nugget in sills.
+"""Share of the captured clips whose leave-one-out variance is within the limit."""
+# The field: standard deviation of its Gaussian covariance in half-ranges, and its nugget in sills.
 SCALE, NUGGET = 1.0, 0.05
 RATE = 0.5 / SCALE**2
-# What single precision may be off by where it says how much is explained.
+# Largest error of a variance in single precision; nearer to the limit it is computed in double.
 DOUBT = 1e-3
-# More rows at a time leave a core's cache between one step and the next.
+# Rows whose intermediate arrays fit the cache of a core.
 BATCH = 512
 
 
 @dataclass(frozen=True)
 class Support:
-    """What was captured: samples (n, d) in half-ranges, and the range, low and high (d,), that they
-    fill. Points are in the controls' own units."""
+    """Captured samples and their range; points are in the controls' own units.
+
+    low, high (d,): range of the samples. samples (n, d): in half-ranges.
+    """
 
     low: Floats
     high: Floats
     samples: Floats
 
     def beyond(self, points: Floats) -> Floats:
-        """How far points (B, d) lie beyond the range of each control (B, d), as shares of it."""
+        """Return how far points lie beyond the range of each control (B, d), as shares of it."""
         return np.maximum(0.5 * (np.abs(self.scaled(points)) - 1.0), 0.0)
 
     def variance(self, points: Floats) -> Floats:
-        """Variance (B,) of the plain field at points (B, d): from 0 where much was captured to 1
-        where nothing was."""
+        """Return the kriging variance (B,) at points (B, d), from 0 to 1.
+
+        Near 0 among dense samples and near 1 far from all samples.
+        """
         near = covariances(self.scaled(points), self.samples)
         return 1.0 - np.sum(near @ self._inverse * near, axis=1)
 
     def holds(self, points: Floats) -> Truths:
-        """Whether something like each of the points (B, d) was captured."""
+        """Return whether each of the points (B, d) is supported, as (B,)."""
         low, high = np.transpose(self._box)
         inside = ((low <= points) & (points <= high)).all(axis=1)
         found = np.zeros(len(points), dtype=bool)
@@ -61,7 +66,7 @@ class Support:
         return found
 
     def held(self, point: Sequence[float]) -> bool:
-        """Whether something like a point (d,) was captured: `holds`, for one at a time."""
+        """Return whether a point (d,) is supported: `holds` for a single point."""
         if not all(a <= x <= b for x, (a, b) in zip(point, self._box, strict=True)):
             return False
         slopes, offsets = self._exponents
@@ -72,12 +77,12 @@ class Support:
 
     @cached_property
     def left_out(self) -> Floats:
-        """Variance (n,) at each sample without it."""
+        """Return the kriging variance (n,) at each sample, computed without it."""
         return 1.0 / np.diagonal(self._inverse) - NUGGET
 
     @cached_property
     def limit(self) -> float:
-        """Largest variance at which something like a point was captured."""
+        """Return the largest variance at which a point is supported."""
         return float(np.quantile(self.left_out, QUANTILE))
 
     @cached_property
@@ -92,15 +97,17 @@ class Support:
 
     @cached_property
     def _scale(self) -> list[tuple[float, float]]:
-        """For each control the factor and the offset that make half-ranges of it."""
+        """Return the factor and the offset of each control that scale it to half-ranges."""
         width = self.high - self.low
         ends = (2.0 / width).tolist(), ((self.low + self.high) / width).tolist()
         return list(zip(*ends, strict=True))
 
     @cached_property
     def _exponents(self) -> tuple[Floats, Floats]:
-        """Slopes (n, d) and offsets (n,): the logarithm of a covariance of a point, but for what
-        hangs on the point alone."""
+        """Return slopes (n, d) and offsets (n,) of the log covariance between samples and a point.
+
+        The term of the point's own square is left out: `held` multiplies by it once.
+        """
         factors, offsets = np.transpose(self._scale)
         slopes = 2.0 * RATE * self.samples
         own = RATE * np.sum(np.square(self.samples), axis=1)
@@ -108,18 +115,19 @@ class Support:
 
     @cached_property
     def _single(self) -> tuple[Singles, Singles, Singles]:
-        """Slopes (d, n) and offsets (n,) of exponents, and the inverse (n, n), all rounded."""
+        """Return in float32 `_exponents` for half-ranges, (d, n) and (n,), and the inverse."""
         own = RATE * np.sum(np.square(self.samples), axis=1)
         parts = (2.0 * RATE * self.samples.T, -own, self._inverse)
         slopes, offsets, inverse = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
         return slopes, offsets, inverse
 
     def _roughly(self, points: Floats) -> Floats:
-        """`variance` (B,) in single precision, of points that are not far away."""
+        """Return `variance` (B,) in single precision, for points near the range."""
         slopes, offsets, inverse = self._single
         scaled = self.scaled(points).astype(np.float32)
         found = np.empty(len(points))
         for rows in (slice(at, at + BATCH) for at in range(0, len(points), BATCH)):
+            cancel.check()
             own = scaled[rows]
             near = own @ slopes
             near += offsets - np.float32(RATE) * np.sum(np.square(own), axis=1)[:, None]
@@ -128,17 +136,17 @@ class Support:
         return found
 
     def scaled(self, points: Floats) -> Floats:
-        """Points (B, d) in half-ranges."""
+        """Return points (B, d) in half-ranges."""
         return half_ranges(points, self.low, self.high)
 
 
 def of(controls: Floats) -> Support:
-    """Support of captured clips' controls (n, d), each with a range."""
+    """Return the support of captured clips' controls (n, d); each control must vary."""
     low, high = controls.min(axis=0), controls.max(axis=0)
     return Support(low, high, half_ranges(controls, low, high))
 
 
 def covariances(a: Floats, b: Floats) -> Floats:
-    """Covariance (A, B) of the plain field between points (A, d) and (B, d) in half-ranges."""
+    """Return the covariances (A, B) between points (A, d) and (B, d) in half-ranges."""
     gaps = a[:, None] - b
     return np.asarray(np.exp(-RATE * np.sum(np.square(gaps), axis=-1)))

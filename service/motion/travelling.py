@@ -1,4 +1,4 @@
-"""A cycle's travel put back into its poses."""
+"""Root travel of a cycle, added back to its poses."""
 
 import numpy as np
 
@@ -7,8 +7,10 @@ from service.motion.conventions import UP, Floats
 
 
 def put_back(rotations: Floats, roots: Floats, gone: Floats) -> tuple[Floats, Floats]:
-    """Rotations (..., J, 4) and root positions (..., 3), m, that have gone (..., 3): to the left
-    and ahead, m, and turned, rad."""
+    """Return rotations (..., J, 4) and root positions (..., 3), m, moved by a travel (..., 3).
+
+    gone: travel to the left and ahead, m, and change of heading, rad.
+    """
     moved = roots + gone[..., :2] @ np.eye(3)[[0, 2]]
     turned = rotations.copy()
     turned[..., 0, :] = quat.mul(quat.about(UP, gone[..., 2]), rotations[..., 0, :])

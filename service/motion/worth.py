@@ -1,35 +1,40 @@
-"""What one more captured clip would be worth, by the controls of those there are.
+"""Acquisition function: expected variance reduction by one more captured clip.
 
-What counts is the mean variance, over all that may be asked, of the plain field by which the
-support flag tells gaps. It hangs on the controls alone, so that each next point is found as if the
-ones before had been captured already.
+The criterion is the mean kriging variance, over the candidates, of the field that decides support.
+It depends on the controls alone, so that each next point is selected as if the points before had
+been captured already.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.conventions import Floats, Indices
 from service.motion.support import NUGGET, covariances
 
 ASKED = 500
-"""Of the candidates, over so many the variance is averaged."""
+"""Number of candidates over which the variance is averaged."""
 
 
 @dataclass(frozen=True)
 class Worth:
-    """What a point is worth: by which share the mean variance falls, and the variance there."""
+    """Value of a point: the share by which the mean variance falls, and the variance there."""
 
     gain: float
     variance: float
 
 
 def rank(candidates: Floats, samples: Floats, count: int) -> list[tuple[int, Worth]]:
-    """Candidates (C, d), in half-ranges like the samples (n, d), that are worth most, by index, the
-    first first; each as if those before it were captured."""
+    """Return the candidates (C, d) of the largest gains, by index, in greedy order.
+
+    samples (n, d): captured, in half-ranges like the candidates. Each gain assumes the candidates
+    before it as captured.
+    """
     known = _Field.of(candidates, samples)
     found: list[tuple[int, Worth]] = []
     for _ in range(min(count, len(candidates))):
+        cancel.check()
         gains = known.gains()
         gains[[at for at, _ in found]] = -1.0
         at = int(np.argmax(gains))
@@ -40,10 +45,11 @@ def rank(candidates: Floats, samples: Floats, count: int) -> list[tuple[int, Wor
 
 @dataclass
 class _Field:
-    """The plain field over candidates (C, d), as far as it is known by what was captured.
+    """Kriging field over candidates (C, d), conditioned on the captured points.
 
-    known (k, C): what each thing captured says of each candidate; variances (C,): what is left;
-    toward (C, G): covariances with those of the candidates over which the variance is averaged.
+    known: k rows (C,), the whitened covariances of each captured point with the candidates.
+    variances (C,): remaining variances. toward (C, G): remaining covariances with the candidates
+    over which the variance is averaged, `averaged`.
     """
 
     candidates: Floats
@@ -54,7 +60,7 @@ class _Field:
 
     @classmethod
     def of(cls, candidates: Floats, samples: Floats) -> "_Field":
-        """Field that samples (n, d) are known of."""
+        """Return the field conditioned on samples (n, d)."""
         averaged = np.unique(np.linspace(0, len(candidates) - 1, ASKED).astype(np.int64))
         own = covariances(samples, samples) + NUGGET * np.eye(len(samples))
         known = np.linalg.solve(np.linalg.cholesky(own), covariances(samples, candidates))
@@ -63,12 +69,12 @@ class _Field:
         return cls(candidates, list(known), left, toward, averaged)
 
     def gains(self) -> Floats:
-        """Share by which the mean variance falls where each candidate (C,) is captured."""
+        """Return the share by which the mean variance falls if each candidate (C,) is captured."""
         falls = np.mean(np.square(self.toward), axis=1) / (self.variances + NUGGET)
         return np.asarray(falls / self.variances[self.averaged].mean())
 
     def capture(self, at: int) -> None:
-        """Know one of the candidates, too."""
+        """Condition the field on one of the candidates as well."""
         known = np.stack(self.known)
         own = covariances(self.candidates, self.candidates[[at]])[:, 0] - known.T @ known[:, at]
         said = own / np.sqrt(self.variances[at] + NUGGET)

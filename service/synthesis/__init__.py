@@ -1,1 +1,1 @@
-"""A model file to poses and clips."""
+"""Models opened from files, and their answers: poses, clips, crowds, sigma and suggestions."""

@@ -1,6 +1,6 @@
-"""Clips of a model, and what is known of one before it is synthesised."""
+"""Synthesis of clips, and their frame count, warnings and solver cost before synthesis."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,26 +9,44 @@ from service.motion.clip import assemble
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
 from service.motion.skeleton import Skeleton
+from service.question.motion_question import ClipQuestion
 from service.synthesis import course
 from service.synthesis.door import Question
 from service.synthesis.exact import strides
 from service.synthesis.exact.goals import NOTHING, Goals
 from service.synthesis.poses import ANSWERED
-from service.synthesis.question import ClipQuestion, Prospect
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import stride
 from service.synthesis.walk.stride import Strides
 
+OPEN_COST, PIN_COST = 4, 4
+"""Cost of a target of a clip with open controls, and of pinned feet, relative to the cost of a
+target.
+"""
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """Properties of a clip that are known before its synthesis.
+
+    frames: number of frames. warnings: as in the answer. missed: true if the clip misses a target.
+    """
+
+    frames: int
+    warnings: tuple[str, ...]
+    missed: bool = False
+
 
 def clip(model: Synthesizer, asked: ClipQuestion, most: int = course.MOST_POSES) -> ClipAnswer:
-    """Clip of the question, of at most so many frames; frame i is the pose at start + i / fps.
+    """Return the clip of a question; frame i is the pose at start + i / fps.
 
-    The N steps of a loop share the duration evenly, but are played at fps. Raises as `poses.pose`
-    does, and InvalidField for a loop of what is no cycle and names that no role leads to.
+    most: largest number of frames. The N steps of a loop share the duration evenly, but are played
+    at fps. Raises as `poses.pose` does, and InvalidField for a loop of a model that is not cyclic,
+    for joint names without roles and for more than `most` frames.
     """
     question = model.question(asked)
     joints = _joints(model, asked)
-    goals = model.keeper.goals(question, asked.hold)
+    goals = model.keeper.goals(question, asked)
     if goals:
         answer = _held(model, question, goals, asked, most)
     else:
@@ -38,33 +56,43 @@ def clip(model: Synthesizer, asked: ClipQuestion, most: int = course.MOST_POSES)
 
 
 def check(model: Synthesizer, asked: ClipQuestion) -> None:
-    """Raise what `clip` would, as far as it can be said before anything is synthesised: how long
-    the clip takes is not known yet."""
-    model.keeper.goals(model.question(asked), asked.hold)
+    """Raise the errors of `clip` that are known before the duration of the clip is."""
+    model.keeper.goals(model.question(asked), asked)
     _joints(model, asked)
     course.window(asked, model.durations[1])
 
 
-def prospect(model: Synthesizer, asked: ClipQuestion) -> Prospect:
-    """What `clip` would answer with, before it is synthesised.
+def prospect(model: Synthesizer, asked: ClipQuestion, most: int = course.MOST_POSES) -> Prospect:
+    """Return frame count, warnings and misses of a clip, without synthesising its frames.
 
-    Asked for one by one, as there: how long clips take differs in the last digit where many are
-    asked for at once, and a question whose end is the clip's own would pass here and be refused
-    later. Raises as `clip` does.
+    The duration comes from a call with this question alone, as in `clip`: in a batch it differs in
+    the last digit, and a question that ends with the clip could pass here and be refused later.
+    Raises as `clip` does.
     """
     question = model.question(asked)
     _joints(model, asked)
     duration, misses = _outlook(model, question, asked)
-    times = course.times(asked, duration)
+    times = course.times(asked, duration, most)
     # A loop ends with its first frame again.
     return Prospect(len(times) + asked.loop, question.warnings, misses)
 
 
+def solver_cost(model: Synthesizer, asked: ClipQuestion) -> int:
+    """Return the cost of solving the targets of a clip, in units of a plain target.
+
+    Open controls and pinned feet cost several units each (decision 0028).
+    """
+    targets, controls = len(asked.targets), len(model.session.card.controls)
+    each = OPEN_COST if len(asked.controls) < controls else 1
+    return each * targets + PIN_COST * asked.pin_feet
+
+
 def _joints(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
-    """The skeleton with the names asked for; InvalidField for names that no role leads to, for a
-    loop of what is no cycle, and for sigma by joint of a model that cannot say."""
-    if asked.joint_sigma:
-        model.shares()
+    """Return the skeleton with the requested names.
+
+    Raises InvalidField for names of a convention without roles, and for a loop of a model that is
+    not cyclic.
+    """
     if asked.loop and not model.session.card.cyclic:
         raise InvalidField(
             "loop", "true, expected false: this model's last pose does not lead into its first"
@@ -75,7 +103,7 @@ def _joints(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
 def _plain(
     model: Synthesizer, question: Question, asked: ClipQuestion, most: int
 ) -> PoseAnswer[np.float64]:
-    """Frames of a clip that is held to nothing."""
+    """Return the frames of a clip without constraints."""
     when = course.times(asked, _duration(model, question), most)
     answer = _answer(model, question, asked, when)
     if model.keeper.measures:
@@ -93,7 +121,7 @@ def _plain(
 def _held(
     model: Synthesizer, question: Question, goals: Goals, asked: ClipQuestion, most: int
 ) -> PoseAnswer[np.float64]:
-    """Frames of a clip that is held to something."""
+    """Return the frames of a clip that meets constraints."""
     held = model.meeting(question, goals, asked.extrapolate)
     when = course.times(asked, model.sensible(held.duration), most)
     trust = model.held_trust(asked, question, held)
@@ -103,9 +131,11 @@ def _held(
 
 
 def _outlook(model: Synthesizer, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
-    """Seconds that a clip takes, which a speed that it is held to changes, and whether it misses
-    some target."""
-    goals = model.keeper.goals(question, asked.hold)
+    """Return the duration of a clip, s, and whether it misses a target.
+
+    Constraints can change the duration, as a target speed does.
+    """
+    goals = model.keeper.goals(question, asked)
     strict = asked.extrapolate == "refuse" or model.session.card.cyclic
     if not (goals.targets or (goals and strict)):
         return _duration(model, question), False
@@ -116,7 +146,7 @@ def _outlook(model: Synthesizer, question: Question, asked: ClipQuestion) -> tup
 
 
 def _duration(model: Synthesizer, question: Question) -> float:
-    """Seconds that the clip takes; OutsideSamples where extrapolation has lost all sense."""
+    """Return the duration of the clip, s; OutsideSamples if extrapolation makes it implausible."""
     durations = model.session.durations(question.point, question.labels, question.level)
     return model.sensible(float(durations[0]))
 
@@ -124,7 +154,7 @@ def _duration(model: Synthesizer, question: Question) -> float:
 def _routed(
     model: Synthesizer, answer: PoseAnswer[np.float64], way: Strides, asked: ClipQuestion
 ) -> PoseAnswer[np.float64]:
-    """The answer in place, or closed, as asked for."""
+    """Return the answer in place, or closed to a loop, as the question requests."""
     stays = asked.root == "in_place" and model.session.card.root == "travelling"
     answer = course.in_place(answer, way) if stays else answer
     return course.closed(answer, None if stays else way) if asked.loop else answer

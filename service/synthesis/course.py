@@ -1,4 +1,4 @@
-"""The course of a clip: at which times its frames are, and where its root goes meanwhile."""
+"""Frame times of a clip, and the path of its root in place or in a loop."""
 
 import math
 from dataclasses import replace
@@ -8,8 +8,8 @@ import numpy as np
 from service.motion.answer import PoseAnswer
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
-from service.synthesis import limits
-from service.synthesis.question import ClipQuestion
+from service.question import validation
+from service.question.motion_question import ClipQuestion
 from service.synthesis.walk import plane, stride
 from service.synthesis.walk.stride import Strides
 
@@ -18,13 +18,18 @@ MOST_POSES = 10_000
 
 
 def window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
-    """Frames a second, start and end, s, of a clip that takes `duration` at most."""
-    rate = limits.number("fps", asked.fps)
-    limits.within("fps", rate, *RATES, "frames a second")
-    last = duration if asked.end is None else limits.number("end", asked.end)
-    limits.within("end", last, 0.0, duration, "s")
-    start = limits.number("start", asked.start)
-    limits.within("start", start, 0.0, last, "s")
+    """Return frames a second, start (s) and end (s) of a clip of at most `duration` seconds.
+
+    Raises InvalidField for values out of range, and for a loop with a start or an end.
+    """
+    rate = validation.number("fps", asked.fps)
+    validation.within("fps", rate, *RATES, "frames a second")
+    last = duration
+    if asked.end is not None:
+        end = validation.number("end", asked.end)
+        last = validation.rounded_within("end", end, 0.0, duration, "s")
+    start = validation.number("start", asked.start)
+    start = validation.rounded_within("start", start, 0.0, last, "s")
     if asked.loop and (start > 0.0 or asked.end is not None):
         field, value = ("start", start) if start > 0.0 else ("end", last)
         raise InvalidField(field, f"{value:g} s with loop, expected none: a loop is a whole cycle")
@@ -32,31 +37,31 @@ def window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
 
 
 def times(asked: ClipQuestion, duration: float, most: int = MOST_POSES) -> Floats:
-    """Times (F,) of the frames asked for, s, of a clip that takes `duration`; InvalidField for more
-    frames than `most`.
+    """Return the times (F,), s, of the requested frames of a clip that lasts `duration` seconds.
 
-    Those of a loop lack the last frame, which is the first again.
+    A loop's times lack the last frame, which equals the first. Raises InvalidField for more frames
+    than `most`.
     """
     rate, start, last = window(asked, duration)
     if asked.loop:
         steps = max(1, round(duration * rate))
         _check_count(steps + 1, most)
         return np.arange(steps) * duration / steps
-    # A millionth of a frame forgives the rounding of duration * rate.
+    # Tolerance of a millionth of a frame for the rounding of duration * rate.
     frames = math.floor((last - start) * rate + 1e-6) + 1
     _check_count(frames, most)
     return np.minimum(start + np.arange(frames) / rate, duration)
 
 
 def in_place(answer: PoseAnswer[np.float64], way: Strides) -> PoseAnswer[np.float64]:
-    """The poses in the frame that goes along the way, which stays where the clip begins."""
+    """Return the poses in the frame that travels along the way, placed at the start of the clip."""
     poses = stride.beside(way, answer.times / way.durations, answer.rotations, answer.root_position)
     root = plane.at_height(way.starts + poses.places, poses.heights)
     return replace(answer, rotations=poses.rotations, root_position=root)
 
 
 def closed(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswer[np.float64]:
-    """The poses and the first of them again, carried along the way if there is one."""
+    """Return the poses with the first one appended, moved by the cycle's travel if any."""
     rotations, root = answer.rotations[:1], answer.root_position[:1]
     if way is not None:
         rotations = plane.turned(rotations, way.turns)

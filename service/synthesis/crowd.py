@@ -1,7 +1,6 @@
-"""One pose of each of many characters, in a few large calls of the graph for each level of detail.
+"""Poses of many characters at one time each, in a few large calls of the graph per level of detail.
 
-Nothing here goes from character to character: what is wrong with one of them is found in whole
-columns, and named by its index.
+All work is on whole columns, without a loop over characters. Errors name the index of a character.
 """
 
 import os
@@ -11,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.motion import blend
+from service.motion import blend, cancel
 from service.motion.conventions import Floats, Indices, Singles
 from service.motion.crowd import CrowdPoses, Placement
 from service.synthesis import crowd_door, crowd_question, view
@@ -19,23 +18,23 @@ from service.synthesis.crowd_question import Blending, CrowdQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Ladder, View
 
-# Poses of a call. With fewer, calls cost more than poses; more leave a core's cache between one
-# operator and the next. In between, so many calls that cores share them evenly: not as many as
-# there are cores, on which the rounding of answers would hang.
+# Poses of one call: the fewest, the most, and the number of calls to aim for in between. Smaller
+# calls are dominated by their overhead; larger ones exceed a core's cache between operators. The
+# number of calls is fixed, not the number of cores: rounding depends on it.
 FEWEST, BATCH, CALLS = 256, 1536, 8
-# Of a clip's duration: what float32 makes of a time that was read from an answer.
+# Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
 SLACK = 1e-5
-# Levels differ in how long a clip takes, and who lets a view choose, or mixes two, cannot know by
-# which one his time will be judged.
+# Durations differ between levels, and a client does not know the level that its time is checked
+# against where a view chooses levels or two levels are blended.
 COARSE_SLACK = 0.1
 
-# onnxruntime and NumPy let go of the interpreter while they work.
+# Threads suffice: onnxruntime and NumPy release the interpreter lock while they compute.
 _WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
 
 
 @dataclass(frozen=True)
 class _Asked:
-    """Rows for the graph: controls (N, d), times (N, 1), labels (N, p)."""
+    """Inputs of the graph: controls (N, d), times (N, 1) and labels (N, p)."""
 
     controls: Singles
     times: Singles
@@ -45,13 +44,13 @@ class _Asked:
         return len(self.times)
 
     def rows(self, which: Indices) -> "_Asked":
-        """Some of them."""
+        """Return the rows at these indices."""
         return _Asked(*(column[which] for column in vars(self).values()))
 
 
 @dataclass(frozen=True)
 class _Block:
-    """What the graph answers for N characters, in their own frames, row by row."""
+    """Outputs of the graph for N characters, each in the frame of its own clip."""
 
     rotations: Singles
     root_position: Singles
@@ -62,11 +61,11 @@ class _Block:
 
 
 def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
-    """Poses of a crowd where its characters stand.
+    """Return the poses of a crowd, placed where its characters stand.
 
-    With a view, distances are those to where the characters were placed. Raises InvalidField and
-    OutsideSamples, with the index of the first character at fault, as `poses.pose` does for
-    one.
+    With a view, distances are measured to the characters' placements. Raises InvalidField and
+    OutsideSamples as `poses.pose` does for one character, with the index of the first character at
+    fault.
     """
     card = model.session.card
     controls, supported, said = crowd_door.controls(card, model.door.support, question)
@@ -81,8 +80,8 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         _blend(model, asked, block, levels, question.blending)
     crowd_door.check_durations(card, block.duration)
     exact = (levels == 0) & (not isinstance(question.detail, View)) & (question.blending is None)
-    late = question.times > block.duration * (1.0 + np.where(exact, SLACK, COARSE_SLACK))
-    crowd_door.refuse("time", question.times, late, "s, later than the end of the clip")
+    slack = np.where(exact, SLACK, COARSE_SLACK)
+    crowd_door.check_times(question.times, block.duration, slack)
     if question.root == "in_place":
         _stay(block)
     _place(block, question.placement)
@@ -104,7 +103,7 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
 def _levels(
     model: Synthesizer, question: CrowdQuestion
 ) -> tuple[Indices, Singles | None, tuple[str, ...]]:
-    """Levels (N,), the pixels (N,) that their errors cover, and what is to be said of them."""
+    """Return levels (N,), the pixels (N,) of their errors (None without a view), and warnings."""
     if not isinstance(question.detail, View):
         return question.detail, None, ()
     ladder, asked = model.ladder, question.detail
@@ -121,8 +120,11 @@ def _levels(
 def _held(
     ladder: Ladder, scale: Floats, asked: View, previous: Indices, blending: Blending
 ) -> tuple[Indices, tuple[str, ...]]:
-    """Levels where some are still on the way from one to another: they go to no third, and what
-    their two poses cost is no longer there for the others."""
+    """Return levels (N,) and warnings where some characters are in a transition between two levels.
+
+    Characters in transition keep their level; the costs of their two poses are subtracted from the
+    budget of the others.
+    """
     free = blending.shares >= 1.0
     levels, budget = previous.copy(), asked.budget
     if budget is not None:
@@ -148,15 +150,15 @@ def _answers(model: Synthesizer, asked: _Asked, levels: Indices) -> _Block:
         for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
             whole[rows] = answer[:, 0] if name in _TIMED else answer
 
-    # A list first: making parts must not hold workers up. Taking results lets their errors out.
-    list(_WORKERS.map(fill, list(_parts(levels))))
+    # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
+    list(_WORKERS.map(cancel.carried(fill), list(_parts(levels))))
     return block
 
 
 def _blend(
     model: Synthesizer, asked: _Asked, block: _Block, levels: Indices, blending: Blending
 ) -> None:
-    """Mix into the poses, in place, those of the levels that characters are on their way from."""
+    """Blend poses of the previous levels into those of characters in transition, in place."""
     rows = np.flatnonzero((blending.shares < 1.0) & (blending.levels != levels))
     if len(rows):
         before = _answers(model, asked.rows(rows), blending.levels[rows])
@@ -170,7 +172,7 @@ _TIMED = ("rotations", "root_position", "travel")
 
 
 def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
-    """A level and rows of it, for every call: rows that follow one another as a slice."""
+    """Yield the level and rows of each call; contiguous rows as a slice."""
     most = min(max(len(levels) // CALLS, FEWEST), BATCH)
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
@@ -180,14 +182,14 @@ def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
 
 
 def _stay(block: _Block) -> None:
-    """Take out of the poses, in place, how far each cycle has got."""
+    """Subtract the travel within the cycle from the poses, in place."""
     block.root_position[:, [0, 2]] -= block.travel[:, :2]
     _turn_roots(block, -block.travel[:, 2])
 
 
 def _place(block: _Block, placement: Placement) -> None:
-    """Put the poses, in place, where the characters stand."""
-    # Within a turn, where float32 still tells small angles apart.
+    """Move the poses to the characters' positions and headings, in place."""
+    # Within one turn, where float32 still resolves small angles.
     angles = np.remainder(placement.headings, 2.0 * np.pi).astype(np.float32)
     _turn_roots(block, angles)
     _turn_paths(block, angles)
@@ -195,16 +197,16 @@ def _place(block: _Block, placement: Placement) -> None:
 
 
 def _turn_paths(block: _Block, angles: Singles) -> None:
-    """Turn where the roots are, in place, about the vertical through each origin."""
+    """Rotate the root positions about the vertical through each origin, in place."""
     cos, sin = np.cos(angles), np.sin(angles)
     x, z = block.root_position[:, 0].copy(), block.root_position[:, 2].copy()
     block.root_position[:, 0], block.root_position[:, 2] = cos * x + sin * z, cos * z - sin * x
 
 
 def _turn_roots(block: _Block, angles: Singles) -> None:
-    """Turn the roots themselves, in place, about the vertical."""
+    """Rotate the root orientations about the vertical, in place."""
     cos, sin = np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None]
     root = block.rotations[:, 0]
-    # The product of (cos, 0, sin, 0) with w x y z.
+    # The quaternion product of (cos, 0, sin, 0) with (w, x, y, z).
     across = np.stack([-root[:, 2], root[:, 3], root[:, 0], -root[:, 1]], axis=1)
     block.rotations[:, 0] = cos * root + sin * across

@@ -1,4 +1,4 @@
-"""What a model is asked for a crowd, checked in columns; a fault names the first character."""
+"""Validation of a crowd's controls, times and durations, column by column."""
 
 import numpy as np
 
@@ -13,10 +13,11 @@ from service.synthesis.crowd_question import CrowdQuestion
 def controls(
     card: ModelCard, support: Support, question: CrowdQuestion
 ) -> tuple[Floats, Truths, tuple[str, ...]]:
-    """Controls (N, d) in the card's order, whether anything like each was captured (N,), and a
-    sentence for each control that some go beyond, and for those in a gap.
+    """Return controls (N, d) in the card's order, the support flags (N,), and warnings.
 
-    OutsideSamples where that is refused.
+    Warnings name each control with values outside the sampled range, and points in a gap between
+    samples. Raises InvalidField for unknown, missing or unusable controls, and OutsideSamples where
+    `extrapolate` is "refuse".
     """
     limits.check_names(card, question.controls)
     columns = [_column(control, question) for control in card.controls]
@@ -46,7 +47,10 @@ def _column(control: Control, question: CrowdQuestion) -> Floats:
 
 
 def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str | None:
-    """What to say of a control that some go beyond; OutsideSamples where that is refused."""
+    """Return the warning for values of a control outside the sampled range, or None.
+
+    Raises OutsideSamples instead where `extrapolate` is "refuse".
+    """
     low, high = limits.sampled(control)
     beyond = (values < low) | (values > high)
     if not beyond.any():
@@ -65,8 +69,11 @@ def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str |
 def _gap(
     card: ModelCard, support: Support, question: CrowdQuestion, points: Floats, who: Indices
 ) -> str | None:
-    """What to say of those at points (U, d) between the captured clips; OutsideSamples where that
-    is refused."""
+    """Return the warning for unsupported points (U, d) within the sampled ranges, or None.
+
+    who: their characters' indices (U,). Raises OutsideSamples instead where `extrapolate` is
+    "refuse".
+    """
     low, high = np.transpose([limits.sampled(control) for control in card.controls])
     inside = np.all((points >= low) & (points <= high), axis=1)
     if not inside.any():
@@ -81,14 +88,26 @@ def _gap(
 
 
 def refuse(field: str, values: Floats, bad: Truths, expected: str) -> None:
-    """InvalidField for the first character of whom something is bad."""
+    """Raise InvalidField for the first character whose entry of `bad` (N,) is true."""
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidField(field, f"{values[first]:g} {expected}", first)
+        raise InvalidField(field, f"{values[first]:.9g} {expected}", first)
+
+
+def check_times(times: Floats, durations: Singles, slack: Floats) -> None:
+    """Raise InvalidField for the first character whose time (s) is after the end of its clip.
+
+    slack (N,): tolerated excess as a share of the duration.
+    """
+    late = times > durations * (1.0 + slack)
+    if late.any():
+        first = int(np.argmax(late))
+        expected = f"expected 0 to {durations[first]:.9g} s"
+        raise InvalidField("time", f"{times[first]:.9g} s, {expected}", first)
 
 
 def check_durations(card: ModelCard, durations: Singles) -> None:
-    """Refuse controls so far outside that extrapolation has lost all sense."""
+    """Raise OutsideSamples for the first character with an implausible duration, s."""
     low, high = limits.durations(card)
     senseless = ~((durations >= low) & (durations <= high))
     if senseless.any():

@@ -1,4 +1,4 @@
-"""What is asked of a crowd: a row a character, checked where it is made."""
+"""Question for a crowd: one row per character, validated on construction."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ import numpy as np
 from service.motion.conventions import Floats, Indices, Singles, Truths
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField
+from service.question.motion_question import Policy, Root
 from service.synthesis import limits
-from service.synthesis.question import Policy, Root
 from service.synthesis.view import FARTHEST, View
 
 
 @dataclass(frozen=True)
 class Blending:
-    """Levels (N,) that characters are on their way from, and how much of it (N,) is behind them."""
+    """Transitions between levels: previous levels (N,) and completed shares (N,), 0 to 1."""
 
     levels: Indices
     shares: Floats
@@ -23,16 +23,15 @@ class Blending:
 
 @dataclass(frozen=True)
 class CrowdQuestion:
-    """One pose of each of N characters.
+    """Question for one pose of each of N characters.
 
-    controls: (N,) by name, in their units. times (N,): s from the start of each character's clip.
-    performers: who is asked for, each once, None for somebody who was never seen; performer (N,):
-    which of them each character is. detail: levels of detail (N,), or the view to choose them by.
-    extrapolate: what to do with controls like which nothing was captured. blending: of levels that
-    characters are on their way from, where they are.
+    controls: (N,) by name, in their units. times: (N,), s from the start of each character's clip.
+    performers: the distinct performers, None for an unseen performer. performer: (N,), index into
+    `performers`. detail: levels of detail (N,), or the view that chooses them. extrapolate: policy
+    for controls without similar captured clips. blending: transitions between levels, None without.
 
-    Raises InvalidField, with the index of the first character at fault, for rows that are missing
-    or too many, numbers that are not finite, and places farther than float32 can tell.
+    Raises InvalidField, with the index of the first character at fault, for columns of different
+    lengths, numbers that are not finite, and positions beyond the precision of float32.
     """
 
     controls: Mapping[str, Floats]
@@ -75,7 +74,7 @@ class CrowdQuestion:
 
 
 def check_levels(question: CrowdQuestion, count: int) -> None:
-    """InvalidField for the first character at a level that a model of so many does not have."""
+    """Raise InvalidField for the first character with a level outside 0 to count - 1."""
     if isinstance(question.detail, View):
         field, levels = "previous_level", question.detail.previous
     else:
@@ -89,8 +88,11 @@ def check_levels(question: CrowdQuestion, count: int) -> None:
 
 
 def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
-    """Labels (N, p) of the performers asked for, of those that a model knows: all zero for nobody
-    that was seen. InvalidField for the first character of whom it knows nothing."""
+    """Return the labels (N, p) of the characters' performers; zeros for an unseen performer.
+
+    known: performers of the model. Raises InvalidField for the first character with an unknown
+    performer.
+    """
     for index, name in enumerate(question.performers):
         if name is not None and name not in known:
             first = int(np.argmax(question.performer == index))
@@ -100,7 +102,7 @@ def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
 
 
 def _check(field: str, column: Floats | Indices, good: Truths, expected: str) -> None:
-    """InvalidField for the first character of whom not everything is good."""
+    """Raise InvalidField for the first character with an entry of `good` (N, ...) that is false."""
     bad = np.flatnonzero(~good.reshape(len(column), -1).all(axis=1))
     if len(bad):
         first = int(bad[0])

@@ -1,4 +1,4 @@
-"""What a model can be asked: questions checked once, and trusted afterwards."""
+"""Validation of questions for one character: controls, performer, level and policy."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,17 +10,21 @@ from service.motion import support
 from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField, OutsideSamples
+from service.question import validation
+from service.question.motion_question import Policy
 from service.synthesis import limits
-from service.synthesis.question import Policy
 from service.synthesis.typical import Chooser
 
 
 @dataclass(frozen=True)
 class Question:
-    """What has passed the door: all controls, in the card's order, and performer as they were
-    given, and as the graph takes them, point (1, d) and labels (1, p); what is warned of; whether
-    anything like these controls was captured. inferred: names of the controls that were not given,
-    and are the most typical for those that were."""
+    """A validated question.
+
+    controls: all controls in the card's order. performer: name, None for an unseen performer.
+    point: the controls as the graph's input, (1, d). labels: the performer as the graph's input,
+    (1, p). warnings: of extrapolation. supported: true if similar clips were captured. inferred:
+    names of the controls that were not given and are conditional means.
+    """
 
     controls: dict[str, float]
     performer: str | None
@@ -33,7 +37,7 @@ class Question:
 
 
 class Door:
-    """The door of one model."""
+    """Validation of the questions to one model."""
 
     def __init__(self, card: ModelCard) -> None:
         self._card = card
@@ -45,11 +49,11 @@ class Door:
     def question(
         self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
     ) -> Question:
-        """The question, if it has an answer. Controls that are not given are the most typical for
-        those that are, and for the performer.
+        """Return the validated question; controls that are not given are the conditional mean.
 
-        Raises InvalidField for a control, performer or level that cannot be used, OutsideSamples
-        where `extrapolate` is "refuse" and nothing like the controls was captured.
+        The mean is conditional on the given controls and the performer. Raises InvalidField for a
+        control, performer or level that cannot be used, and OutsideSamples where `extrapolate` is
+        "refuse" and no similar clips were captured.
         """
         if not controls.keys() <= self._names:
             limits.check_names(self._card, controls)
@@ -59,8 +63,8 @@ class Door:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         plain = self._plain(controls)
         every = controls if plain else self._every(controls, own)
-        # However they are put: the same question has the same bytes.
-        given = {name: float(every[name]) for name, _, _ in self._ranges}
+        # Equal questions have equal bytes: controls in the card's order, and 0 for -0.
+        given = {name: float(every[name]) + 0.0 for name, _, _ in self._ranges}
         point = list(given.values())
         found = () if plain else outside(self._card.controls, point)
         supported = self.support.held(point)
@@ -70,14 +74,14 @@ class Door:
         return Question(given, performer, level, array, own, warnings, supported, inferred)
 
     def _plain(self, controls: Mapping[str, float]) -> bool:
-        """Whether there is nothing to say of the controls, as of nearly all that are asked for."""
+        """Return whether all controls are floats within the sampled ranges: the fast path."""
         if controls.keys() != self._names:
             return False
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
     def _every(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
-        """All controls, as they were given or as is typical."""
+        """Return all controls: the given ones checked, the others as conditional means."""
         given = {
             control.name: checked(control, controls[control.name])
             for control in self._card.controls
@@ -87,14 +91,16 @@ class Door:
 
     @cached_property
     def chooser(self) -> Chooser:
-        """What chooses controls that are not given."""
+        """Conditional means for controls that are not given."""
         return Chooser(self._card)
 
     def _said(
         self, extrapolate: Policy, found: tuple[str, ...], point: Sequence[float]
     ) -> tuple[str, ...]:
-        """What to warn of where something lies outside, or in a gap; OutsideSamples where that is
-        refused."""
+        """Return warnings for controls outside the sampled ranges or in a gap between samples.
+
+        found: warnings for the ranges. Raises OutsideSamples where `extrapolate` is "refuse".
+        """
         said = found or (self._gap(point),)
         if extrapolate == "refuse":
             raise OutsideSamples("controls", "; ".join(said))
@@ -106,28 +112,38 @@ class Door:
 
 
 def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
-    """Labels (1, p) of the performer asked for: all zero for nobody that was seen."""
+    """Return the labels (1, p) of a performer: all zero for None, an unseen performer.
+
+    Raises InvalidField for a name that is not among the performers.
+    """
     if asked is not None and asked not in performers:
         raise InvalidField("performer", f"{asked!r}, expected {limits.known(performers)}")
     return np.array([[float(name == asked) for name in performers]])
 
 
 def checked(control: Control, given: float) -> float:
-    """Value of a control; InvalidField for one that could not be answered."""
+    """Return the value of a control; InvalidField if it is not a number or out of range."""
     field = f"controls/{control.name}"
-    value = limits.number(field, given)
-    limits.within(field, value, *limits.reach(control), control.unit)
+    value = validation.number(field, given)
+    validation.within(field, value, *limits.reach(control), control.unit)
     return value
 
 
 def outside(controls: Sequence[Control], point: Sequence[float]) -> tuple[str, ...]:
-    """A sentence for each control whose value (d,) lies outside its sampled range."""
+    """Return a warning for each control whose value is outside its sampled range.
+
+    point: values (d,) in the order of the controls.
+    """
     found = (_outside(control, value) for control, value in zip(controls, point, strict=True))
     return tuple(filter(None, found))
 
 
 def gap(who: str, variance: float, limit: float) -> str:
-    """What to say of controls between the captured clips, by the variance of a plain field."""
+    """Return the warning for controls in a gap between the captured clips.
+
+    who: subject of the sentence. variance, limit: kriging variance there, and its largest value
+    with support.
+    """
     return (
         f"{who} in a gap of what was sampled: nothing like it was captured "
         f"(variance {variance:.2g}, expected at most {limit:.2g})"

@@ -1,56 +1,28 @@
-"""How far answers may be trusted over two controls: sigma and support on a grid of them."""
+"""Sigma and support on a grid of two controls."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.answer import Axis, SigmaGrid
 from service.motion.card import ModelCard
-from service.motion.conventions import Floats, Truths
+from service.motion.conventions import Floats, Singles, Truths
 from service.motion.errors import InvalidField
+from service.question.model_question import SigmaQuestion
 from service.synthesis import door, limits
 from service.synthesis.synthesizer import Synthesizer
 
-STEPS = 32
-WIDEST = 1.0
-"""Shares of a control's range that a grid may go beyond it on either side."""
-FEWEST, MOST = 2, 1024
-# More rows in a call leave a core's cache between one operator and the next: half as much again.
+# Larger batches exceed a core's cache between operators and take 1.5 times as long per row.
 BATCH = 1024
 
 
-@dataclass(frozen=True)
-class GridQuestion:
-    """Which grid: `columns` values of the control `across` by `rows` of the control `along`.
+def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
+    """Return the grid of sigma and support.
 
-    controls: values of the others, of which those not given are at the card's default. performer:
-    who moves, nobody that was seen for none. margin: share of a control's sampled range by which
-    the grid goes beyond it on either side.
+    Raises InvalidField for an unknown control or performer, and for a value too far outside the
+    sampled range.
     """
-
-    across: str
-    along: str
-    columns: int
-    rows: int
-    controls: Mapping[str, float]
-    performer: str | None
-    margin: float
-
-    def __post_init__(self) -> None:
-        if self.across == self.along:
-            raise InvalidField("along", f"{self.along!r}, expected another control than across")
-        for name in ("columns", "rows"):
-            limits.within(name, getattr(self, name), FEWEST, MOST, "values")
-        limits.within("margin", self.margin, 0.0, WIDEST, "of the range")
-
-    def __len__(self) -> int:
-        return self.columns * self.rows
-
-
-def grid(model: Synthesizer, asked: GridQuestion) -> SigmaGrid:
-    """Grid of the question; InvalidField for a control or performer that there is not, and a value
-    out of reach."""
     card = model.session.card
     limits.check_names(card, asked.controls)
     labels = door.labels(card.performers, asked.performer)
@@ -58,9 +30,7 @@ def grid(model: Synthesizer, asked: GridQuestion) -> SigmaGrid:
     along = _axis(card, "along", asked.along, asked.rows, asked)
     fixed = _fixed(card, asked)
     points = _points(card, across, along, fixed)
-    sigma = np.concatenate(
-        [model.session.sigmas(points[i : i + BATCH], labels) for i in range(0, len(points), BATCH)]
-    )
+    sigma = _sigmas(model, points, labels)
     shape = asked.rows, asked.columns
     return SigmaGrid(
         model.identity,
@@ -74,7 +44,16 @@ def grid(model: Synthesizer, asked: GridQuestion) -> SigmaGrid:
     )
 
 
-def _axis(card: ModelCard, field: str, name: str, count: int, asked: GridQuestion) -> Axis:
+def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
+    """Return sigma (B,), m, at points (B, d)."""
+    found = []
+    for first in range(0, len(points), BATCH):
+        cancel.check()
+        found.append(model.session.sigmas(points[first : first + BATCH], labels))
+    return np.concatenate(found)
+
+
+def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> Axis:
     control = card.control(name)
     if control is None:
         known = ", ".join(c.name for c in card.controls)
@@ -85,8 +64,8 @@ def _axis(card: ModelCard, field: str, name: str, count: int, asked: GridQuestio
     return Axis(control, np.linspace(control.minimum - room, control.maximum + room, count))
 
 
-def _fixed(card: ModelCard, asked: GridQuestion) -> dict[str, float]:
-    """Values of the controls that are no axes, in the card's order."""
+def _fixed(card: ModelCard, asked: SigmaQuestion) -> dict[str, float]:
+    """Return the values of the controls that are not axes, in the card's order."""
     usual = {control.name: control.default for control in card.controls} | dict(asked.controls)
     return {
         control.name: door.checked(control, usual[control.name])
@@ -96,7 +75,7 @@ def _fixed(card: ModelCard, asked: GridQuestion) -> dict[str, float]:
 
 
 def _points(card: ModelCard, across: Axis, along: Axis, fixed: Mapping[str, float]) -> Floats:
-    """Controls (R C, d) in the card's order, row by row."""
+    """Return the controls (R C, d) of the grid points in the card's order, row by row."""
     right, up = np.meshgrid(across.values, along.values)
     columns = {across.control.name: right.ravel(), along.control.name: up.ravel()}
     full = (columns.get(c.name, np.full(right.size, fixed.get(c.name))) for c in card.controls)

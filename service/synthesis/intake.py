@@ -1,47 +1,62 @@
-"""Model files taken in from their sources, look by look: opened once settled, once a content."""
+"""Intake of model files from their sources: opens new files once they have settled."""
 
+import logging
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from weakref import WeakValueDictionary
 
 from service.motion.errors import ModelError
-from service.synthesis import session, sources
+from service.synthesis import model_file, session, sources
+from service.synthesis.runtime import first_line
 from service.synthesis.sources import Found, Source
 from service.synthesis.synthesizer import Synthesizer
+from service.synthesis.trial import LIMITS, Limits
+
+log = logging.getLogger(__name__)
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a model, or a whole source where there is no name, is not what lies there now."""
+    """Reason for which a model file, or a source (name is empty), cannot be used."""
 
     name: str
     version: str
     error: ModelError
 
 
-def opened(name: str, place: str | Path, content: bytes) -> Synthesizer:
-    """Model of a file that has been read; ModelError for a file that cannot be served, and for a
-    name that cannot stand in a URL."""
+def opened(name: str, place: str | Path, content: bytes, limits: Limits = LIMITS) -> Synthesizer:
+    """Return the model of a file that has been read.
+
+    Raises ModelError for a file that cannot be served and a name that cannot stand in a URL.
+    """
     if not NAME.fullmatch(name):
         raise ModelError(place, f"name {name!r}, expected {NAME.pattern}")
-    return Synthesizer(name, session.open_bytes(content, str(place)))
+    return Synthesizer(name, session.load_bytes(content, str(place), limits))
 
 
 class Intake:
-    """Models that the sources hold, as far as they can be used.
+    """Usable models of the sources, and faults of the other files.
 
-    A file that is new or has changed is read when two looks in a row find it the same, and gone
-    when two find it missing: it may be half copied, or about to be replaced. Where it cannot be
-    used, what its place held before stays. The first look takes everything as it is.
-    faults: what is wrong now, by place. opened, failed: how often so far, a fault that stays once.
+    A new or changed file is opened when two consecutive looks find the same signature, and a
+    missing file's model is removed when two looks miss it: the file may be half copied, or about to
+    be replaced. A file that cannot be used leaves the previous model of its place, and is retried
+    only after it changes; other files are not affected. The first look opens every file at once.
+    faults: by place, as of the last look. opened, failed: counts since the start; a fault that
+    stays counts once.
     """
 
-    def __init__(self, places: Iterable[str | Path], most: int) -> None:
-        """most: how many versions of a name are opened, the newest."""
+    def __init__(self, places: Iterable[str | Path], most: int, limits: Limits = LIMITS) -> None:
+        """Prepare to look at files, folders and URLs.
+
+        most: largest number of versions of a name that are open, the newest. limits: of each file's
+        trial.
+        """
+        self._limits = limits
         self._sources = {str(place): sources.source(place) for place in places}
         self._most = most
         self._listed: dict[str, list[Found]] = {}
@@ -54,7 +69,7 @@ class Intake:
         self.opened = self.failed = 0
 
     def look(self) -> bool:
-        """Take in what the sources hold now; False where something has just changed."""
+        """Update the models from the sources; return False while a file is changing."""
         known, self.faults = self.faults, {}
         wanted = self._wanted(known)
         moving = self._moving()
@@ -70,7 +85,7 @@ class Intake:
         return not moving
 
     def _is_due(self, found: Found, versions: list[Found]) -> bool:
-        """Whether to read a file: it is new, or was released and is the newest now."""
+        """Return whether to read a file: new, changed, or released and now the newest."""
         if self._read.get(found.place) != found.signature:
             return True
         newest = next((f for f in versions if f.place in self._held.keys() | self._released), found)
@@ -82,29 +97,29 @@ class Intake:
         del self._read[place]
 
     def release(self, held: Collection[str]) -> None:
-        """Hold no other models than of these identities."""
+        """Release all models except those with these identities."""
         for place, (_, model) in [*self._held.items()]:
             if model.identity not in held:
                 del self._held[place]
                 self._released.add(place)
 
     def versions(self) -> dict[str, list[Synthesizer]]:
-        """Models by name, the newest version of each first."""
+        """Return models by name, the newest version of each first."""
         grouped = sources.by_name(found for found, _ in self._held.values())
         return {name: [self._held[f.place][1] for f in found] for name, found in grouped.items()}
 
     def check(self) -> None:
-        """Raise the first of the faults, if there is any."""
+        """Raise the error of the first fault, if there is one."""
         for fault in self.faults.values():
             raise fault.error
 
     def _wanted(self, known: dict[str, Fault]) -> list[list[Found]]:
-        """The files to be held: of each name the newest few, the newest first."""
+        """Return the files to keep open: the newest few of each name, the newest first."""
         owners: dict[str, tuple[str, bool]] = {}
         wanted = []
         for place, source in self._sources.items():
             for name, versions in sources.by_name(self._look(place, source, known)).items():
-                # A file NAME.onnx and a folder NAME of versions are two places, too.
+                # A file NAME.onnx and a folder NAME of versions count as two places.
                 owner = owners.setdefault(name, (place, versions[0].version == ""))
                 own = [found for found in versions if (place, found.version == "") == owner]
                 for found in versions:
@@ -115,38 +130,57 @@ class Intake:
         return wanted
 
     def _look(self, place: str, source: Source, known: dict[str, Fault]) -> list[Found]:
-        """What a source holds; what it held, where it cannot say."""
-        try:
+        """Return the files of a source; those of its last look if this one fails."""
+        with self._failing(place, "", "", known):
             self._listed[place] = source.look()
-        except ModelError as error:
-            self._fail(place, Fault("", "", error), known)
         return self._listed.get(place, [])
 
     def _moving(self) -> set[str]:
-        """Places that this look finds otherwise than the one before."""
+        """Return the places whose signature differs from the previous look."""
         now = {found.place: found.signature for files in self._listed.values() for found in files}
         before = now if self._signatures is None else self._signatures
         self._signatures = now
         return {p for p in now.keys() | before.keys() if now.get(p) != before.get(p)}
 
     def _take(self, found: Found, known: dict[str, Fault]) -> None:
-        try:
+        """Open a file, or record the fault that prevents it."""
+        with self._failing(found.place, found.name, found.version, known):
             content = found.read()
-            # What could be read and not be used is not tried again before it changes.
+            # A file that could be read but not used is retried only after it changes.
             self._read[found.place] = found.signature
-            self._held[found.place] = found, self._opened(found, content)
+            try:
+                self._held[found.place] = found, self._opened(found, content)
+            except OSError as error:
+                # The child process failed, not the file: the next look tries again.
+                del self._read[found.place]
+                reason = f"no process to try it in: {error.strerror}"
+                raise ModelError(found.place, reason) from error
             self._released.discard(found.place)
-        except ModelError as error:
-            self._fail(found.place, Fault(found.name, found.version, error), known)
 
     def _opened(self, found: Found, content: bytes) -> Synthesizer:
-        """Model of a content, the one that is open if there is one."""
-        identity = f"{found.name}@{session.digest(content)}"
+        """Return the model with this content; an open one is reused."""
+        identity = f"{found.name}@{model_file.digest(content)}"
         model = self._alive.get(identity)
         if model is None:
-            model = self._alive[identity] = opened(found.name, found.place, content)
+            model = opened(found.name, found.place, content, self._limits)
+            self._alive[identity] = model
             self.opened += 1
         return model
+
+    @contextmanager
+    def _failing(
+        self, place: str, name: str, version: str, known: dict[str, Fault]
+    ) -> Iterator[None]:
+        """Record any error as a fault of the place, so that other places are processed."""
+        try:
+            yield
+        except ModelError as error:
+            self._fail(place, Fault(name, version, error), known)
+        except Exception as error:
+            if place not in known:
+                log.exception("%s: an error that no check foresees", place)
+            said = f"cannot be used: {type(error).__name__}: {first_line(error)}"
+            self._fail(place, Fault(name, version, ModelError(place, said)), known)
 
     def _fail(self, place: str, fault: Fault, known: dict[str, Fault]) -> None:
         self.faults[place] = fault

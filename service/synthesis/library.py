@@ -1,4 +1,4 @@
-"""The models a service answers for: an immutable whole, which another may take the place of."""
+"""Set of the models that a service answers for; immutable, and replaced as a whole."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,14 +13,20 @@ from service.synthesis.synthesizer import Synthesizer
 
 @dataclass(frozen=True)
 class Library:
-    """The newest model of each name, and the older versions that still answer under their hash,
-    those of a name from newer to older."""
+    """Models of a service by name, and older versions.
+
+    models: the newest model of each name. older: versions that still answer under name@contenthash,
+    those of one name from newer to older.
+    """
 
     models: dict[str, Synthesizer]
     older: tuple[Synthesizer, ...] = ()
 
     def find(self, key: str) -> Synthesizer:
-        """Newest model of a name, or the one of a name@contenthash; UnknownModel if not here."""
+        """Return the newest model of a name, or the model of a name@contenthash.
+
+        Raises UnknownModel, with the available identities, for any other key.
+        """
         model = self._by_key.get(key)
         if model is None:
             name = key.partition("@")[0]
@@ -30,18 +36,18 @@ class Library:
         return model
 
     def versions(self, name: str) -> tuple[Synthesizer, ...]:
-        """All versions of a name that are here, the newest first; none for a name unknown."""
+        """Return all versions of a name, the newest first; empty for an unknown name."""
         newest = self.models.get(name)
         return (newest, *(m for m in self.older if m.name == name)) if newest else ()
 
     def of(self, may_read: Callable[[str], bool]) -> "Library":
-        """The models of some names alone."""
+        """Return the library reduced to the names for which `may_read` is true."""
         models = {name: model for name, model in self.models.items() if may_read(name)}
         return Library(models, tuple(model for model in self.older if may_read(model.name)))
 
     @property
     def identities(self) -> tuple[str, ...]:
-        """Of the newest, and then of the older ones."""
+        """Identities of the newest models, then of the older ones."""
         return tuple(model.identity for model in chain(self.models.values(), self.older))
 
     @cached_property
@@ -52,18 +58,21 @@ class Library:
 
 @dataclass(frozen=True)
 class Bounds:
-    """How many older versions of a name are held, and how many bytes all of them may take."""
+    """Limits on older versions.
+
+    older: versions of a name beside the newest. memory: bytes of all older versions together.
+    """
 
     older: int = 2
     memory: int = 64 << 20
 
 
 def load(places: Iterable[str | Path]) -> Library:
-    """Library of .onnx files, of folders of them, and of URLs of object stores: the newest version
-    of each name, which is the file's stem or the folder that the versions are in.
+    """Return the library of .onnx files, folders of them and URLs of object stores.
 
-    Raises ModelError for a place with no model, a file that cannot be served, a name that cannot
-    stand in a URL, and two places of one name.
+    It has the newest version of each name; the name is the file's stem or the folder of the
+    versions. Raises ModelError for a place without a model, a file that cannot be served, a name
+    that cannot stand in a URL, and two places with one name.
     """
     intake = Intake(places, most=1)
     intake.look()
@@ -74,9 +83,11 @@ def load(places: Iterable[str | Path]) -> Library:
 def arranged(
     declared: Mapping[str, Sequence[Synthesizer]], before: Library, bounds: Bounds
 ) -> Library:
-    """Library of the versions that each name has now, the newest first, and of those that answered
-    before, as far as the bounds leave room: what has answered stays longest, and what is furthest
-    from the newest goes first."""
+    """Return the library of the versions declared now, and of older ones within the bounds.
+
+    declared: versions by name, the newest first. Versions of `before` rank ahead of those that
+    never answered; the versions that rank furthest from the newest are dropped first.
+    """
     models: dict[str, Synthesizer] = {}
     ranked: list[tuple[int, Synthesizer]] = []
     for name, versions in declared.items():

@@ -1,17 +1,16 @@
-"""What a model can be asked at all: the same for one character and for a crowd of them."""
+"""Limits of a model's inputs, shared by questions for one character and for crowds."""
 
-import math
 from collections.abc import Iterable
 
 from service.motion.card import Control, ModelCard
 from service.motion.errors import InvalidField
 
-# A clip this many times longer or shorter than any that was captured is no motion any more.
+# A clip this many times longer or shorter than any captured one is no plausible motion.
 FARTHEST = 10.0
 
 
 def check_names(card: ModelCard, names: Iterable[str]) -> None:
-    """InvalidField for the first control that a model does not have."""
+    """Raise InvalidField for the first name that is not a control of the model."""
     for name in names:
         if card.control(name) is None:
             known = ", ".join(c.name for c in card.controls)
@@ -19,26 +18,32 @@ def check_names(card: ModelCard, names: Iterable[str]) -> None:
 
 
 def reach(control: Control) -> tuple[float, float]:
-    """Lowest and highest value that is answered: beyond, float32 would overflow."""
+    """Return the lowest and the highest accepted value of a control.
+
+    The limits prevent overflow of float32.
+    """
     room = 100.0 * (control.maximum - control.minimum)
     return control.minimum - room, control.maximum + room
 
 
 def sampled(control: Control) -> tuple[float, float]:
-    """Lowest and highest value that was sampled, within the width of a rounding error in what a
-    client read from the card."""
+    """Return the lowest and the highest sampled value of a control.
+
+    A slack of a millionth of the range allows for rounding of values that a client read from the
+    card.
+    """
     slack = 1e-6 * (control.maximum - control.minimum)
     return control.minimum - slack, control.maximum + slack
 
 
 def durations(card: ModelCard) -> tuple[float, float]:
-    """Shortest and longest clip, s, that extrapolation has not lost all sense in."""
+    """Return the shortest and the longest plausible duration of a clip, s."""
     low, high = card.durations
     return low / FARTHEST, high * FARTHEST
 
 
 def senseless(card: ModelCard, duration: float) -> str:
-    """What to say of controls by which a clip would last so long, s."""
+    """Return the message for controls that lead to an implausible duration, s."""
     low, high = card.durations
     return (
         f"so far outside what was sampled that the clip would last {duration:.3g} s; "
@@ -47,24 +52,5 @@ def senseless(card: ModelCard, duration: float) -> str:
 
 
 def known(performers: tuple[str, ...]) -> str:
-    """Who may be asked for."""
+    """Return the accepted performers as text for a message."""
     return f"one of {', '.join(performers)}" if performers else "none: this model knows none"
-
-
-def number(field: str, value: object) -> float:
-    """Finite number; InvalidField where the value is none."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidField(field, f"{value!r}, expected a number")
-    try:
-        found = float(value)
-    except OverflowError:
-        found = math.inf
-    if not math.isfinite(found):
-        raise InvalidField(field, f"{found}, expected a finite number")
-    return found
-
-
-def within(field: str, value: float, low: float, high: float, unit: str) -> None:
-    """InvalidField for a value that is not from low to high."""
-    if not low <= value <= high:
-        raise InvalidField(field, f"{value:g} {unit}, expected {low:g} to {high:g} {unit}")

@@ -1,7 +1,7 @@
-"""Object stores by URL, through obstore: S3 and its like, Google's and Azure's.
+"""Object stores by URL, through obstore: S3 and compatible stores, Google Cloud Storage and Azure.
 
-Endpoint, region and credentials are what the store's own tools take: AWS_ENDPOINT_URL,
-AWS_ACCESS_KEY_ID and the like in the environment.
+Endpoint, region and credentials come from the environment variables of the store's own tools, such
+as AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID.
 """
 
 import os
@@ -12,21 +12,25 @@ from obstore.exceptions import BaseError
 from obstore.store import from_url
 
 from service.motion.errors import ModelError
+from service.synthesis import model_file
 from service.synthesis.sources import ENDING, Found, named
 
 LISTED = 1000
-"""Names asked for at once."""
+"""Objects of one page of a listing."""
 
 
 def connect(url: str) -> Any:
-    """Store of the objects under the path of a URL; raises what obstore does."""
-    # Servers of one's own often speak plain HTTP.
+    """Return the store of the objects under the path of a URL; raises obstore's errors."""
+    # Self-hosted servers often speak plain HTTP.
     plain = os.environ.get("AWS_ENDPOINT_URL", "").startswith("http://")
     return from_url(url, client_options={"allow_http": plain})
 
 
 class Objects:
-    """Models under a URL, laid out as in a folder, or the one that a URL ending in .onnx names."""
+    """Source of models under a URL, laid out as in a folder.
+
+    A URL that ends in .onnx is the source of one model.
+    """
 
     def __init__(self, url: str) -> None:
         self.url = url.rstrip("/")
@@ -38,7 +42,7 @@ class Objects:
             raise _refusal(self.url, fault) from fault
 
     def look(self) -> list[Found]:
-        """The objects that are models."""
+        """Return the model files; ModelError if there are none or the store fails."""
         try:
             found = [self._alone()] if self._one else self._listed()
         except (BaseError, OSError, ValueError) as fault:
@@ -64,10 +68,11 @@ class Objects:
         return Found(place, name, version, signature, lambda: self._read(meta["path"], signature))
 
     def _read(self, path: str, signature: str) -> bytes:
-        """Content of an object, if it is still the same."""
+        """Return the content of an object; ModelError if its signature has changed."""
         place = f"{self._base}/{path}"
         try:
             got = obstore.get(self._store, path)
+            model_file.check_size(got.meta["size"], place)
             content, read = bytes(got.bytes()), _signature(got.meta)
         except (BaseError, OSError, ValueError) as fault:
             raise _refusal(place, fault) from fault

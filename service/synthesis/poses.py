@@ -1,4 +1,4 @@
-"""Poses of a model: one question at a time, or as many together as give the same bytes."""
+"""Poses of a model, of one question or of a batch that gives each question the same bytes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,26 +9,33 @@ import numpy as np
 from service.motion.answer import PoseAnswer
 from service.motion.conventions import Floats, Singles
 from service.motion.errors import InvalidField
-from service.synthesis import course, limits
+from service.question import validation
+from service.question.motion_question import PoseQuestion
+from service.synthesis import course
 from service.synthesis.door import Question
 from service.synthesis.exact.goals import Goals
-from service.synthesis.question import PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
-"""What the graph is asked for."""
+"""Outputs that poses are made of."""
 
 Row = tuple[Singles, ...]
-"""ANSWERED of one question: (S, J, 4), (S, 3), (J, 3), and two numbers."""
+"""Values of ANSWERED for one question: (S, J, 4), (S, 3), (J, 3), and two numbers."""
 
 SAMPLE = 17
-"""Questions that show whether answers depend on others: odd, and more than rows of a kernel."""
+"""Number of questions that show whether a row depends on its batch: odd, and more than a kernel's
+rows.
+"""
 
 
 @dataclass(frozen=True)
 class Moments:
-    """A question for poses, and what has passed the door of it, its times (S,), s, as they were
-    given and as the graph is asked, and the earliest and the latest of them."""
+    """A question for poses with its validated part and its times.
+
+    given: the question as received. question: its validated part. when: times (S,), s, as given.
+    asked: times (S,), s, limited to the longest plausible clip, as the graph's input. first, last:
+    the smallest and the largest time given.
+    """
 
     given: PoseQuestion
     question: Question
@@ -44,29 +51,30 @@ class Moments:
 
 
 def pose(model: Synthesizer, asked: PoseQuestion) -> PoseAnswer[Any]:
-    """Poses (S,) of the question, as a performer of the card moves, or somebody who was never seen,
-    at a level of detail, of a motion that is held to something.
+    """Return the poses (S,) of the question, constrained where it has targets.
 
-    Raises InvalidField for a control, time, performer or level that cannot be used, for what the
-    motion cannot be held to, and for sigma by joint of a model that cannot say; where `extrapolate`
-    is "refuse", OutsideSamples where nothing like the controls was captured and OutOfReach for a
-    goal that is missed.
+    Raises InvalidField for a control, time, performer or level that cannot be used, and for
+    constraints that do not fit the model. Where `extrapolate` is "refuse", raises OutsideSamples
+    for controls without similar captured clips and OutOfReach for a missed target.
     """
     checked = moments(model, asked)
-    goals = model.keeper.goals(checked.question, asked.hold)
+    goals = model.keeper.goals(checked.question, asked)
     if goals:
         return held(model, checked, goals)
     return posed(model, checked, rows(model, [checked])[0])
 
 
 def moments(model: Synthesizer, asked: PoseQuestion) -> Moments:
-    """The question of `pose` as far as it can be checked before the model is asked."""
+    """Return the question of `pose` after the validation that needs no call of the model.
+
+    Raises InvalidField and OutsideSamples.
+    """
     question, times = model.question(asked), asked.times
     if not 1 <= len(times) <= course.MOST_POSES:
         raise InvalidField("times", f"{len(times)} times, expected 1 to {course.MOST_POSES}")
-    when = [limits.number(f"times/{i}", value) for i, value in enumerate(times)]
-    # Whether a time is within the clip shows when the graph has said how long that is; what is
-    # within none of them might be more than a float32 holds.
+    when = [validation.number(f"times/{i}", value) for i, value in enumerate(times)]
+    # The duration is known only after the call of the graph; times beyond the longest plausible
+    # clip are limited because they may overflow float32.
     longest = model.durations[1]
     first, last, given = min(when), max(when), np.array(when)
     fits = 0.0 <= first and last <= longest
@@ -75,22 +83,23 @@ def moments(model: Synthesizer, asked: PoseQuestion) -> Moments:
 
 
 def held(model: Synthesizer, asked: Moments, goals: Goals) -> PoseAnswer[np.float64]:
-    """Poses of a motion that is held to something; raises as `pose`."""
+    """Return the poses of a motion that meets constraints; raises as `pose` does."""
     question, given = asked.question, asked.given
     found = model.meeting(question, goals, given.extrapolate)
-    _check_times(asked, model.sensible(found.duration))
+    when = _times(asked, model.sensible(found.duration))
     trust = model.held_trust(given, question, found)
-    return model.keeper.poses(question, found, asked.when, trust)
+    return model.keeper.poses(question, found, when, trust)
 
 
 def rows(model: Synthesizer, asked: Sequence[Moments]) -> list[Row]:
-    """What the graph says to questions of as many times and of one level, in one call.
+    """Return the graph's outputs for questions of one level and equal numbers of times.
 
-    Where `exact`, a question gets the same bytes whatever it is asked with.
+    One call of the graph. Where `exact` is true, a question's bytes do not depend on the others in
+    the call.
     """
     first = asked[0].question
     if len(asked) == 1 and len(asked[0].when) == 1:
-        # A product with one row is summed in another order: nobody is asked for alone.
+        # A matrix product with one row sums in another order, so a single question is duplicated.
         arrays = (first.point, first.labels, asked[0].asked[None])
         points, labels, when = (array.repeat(2, axis=0) for array in arrays)
     else:
@@ -102,17 +111,21 @@ def rows(model: Synthesizer, asked: Sequence[Moments]) -> list[Row]:
 
 
 def posed(model: Synthesizer, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
-    """The answer that one of `rows` is; raises as `pose` for a time outside the clip."""
+    """Return the answer of one row of `rows`; raises as `pose` does for a time outside the clip."""
     rotations, root, offsets, length, sigma = row
     duration = model.sensible(float(length))
-    _check_times(asked, duration)
+    # The graph limits times to the end of the clip.
+    when = _times(asked, duration)
     trust = model.trust(asked.given, asked.question, duration, float(sigma))
-    return PoseAnswer(asked.when, rotations, root, offsets, trust)
+    return PoseAnswer(when, rotations, root, offsets, trust)
 
 
 def exact(model: Synthesizer, level: int) -> bool:
-    """Whether `rows` gives each of many questions the bytes that it gets alone, as a sample of
-    questions says; files of old versions sum by where a question stands among others."""
+    """Return whether `rows` gives each question of a batch the bytes that it gets alone.
+
+    Measured once per level with a sample of questions: graphs of earlier versions sum in an order
+    that depends on the row's position.
+    """
     known = model.exact_levels
     if level not in known:
         asked = [_sample(model, share, level) for share in np.linspace(0.0, 1.0, SAMPLE)]
@@ -125,13 +138,22 @@ def exact(model: Synthesizer, level: int) -> bool:
 
 
 def _sample(model: Synthesizer, share: float, level: int) -> Moments:
-    """A question at a share of each control's range, and of the shortest clip."""
+    """Return a question at a share of each control's range and of the shortest clip."""
     card = model.session.card
     controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
-    return moments(model, PoseQuestion(controls, [share * card.durations[0]], "ok", level=level))
+    return moments(
+        model,
+        PoseQuestion(
+            controls=controls, times=[share * card.durations[0]], extrapolate="ok", level=level
+        ),
+    )
 
 
-def _check_times(asked: Moments, duration: float) -> None:
-    if not (asked.first >= 0.0 and asked.last <= duration):
-        for index, value in enumerate(asked.when):
-            limits.within(f"times/{index}", value, 0.0, duration, "s")
+def _times(asked: Moments, duration: float) -> Floats:
+    """Return the times (S,), s; InvalidField for a time outside a clip of this duration."""
+    if asked.first >= 0.0 and asked.last <= duration:
+        return asked.when
+    times = enumerate(asked.when.tolist())
+    return np.array(
+        [validation.rounded_within(f"times/{i}", t, 0.0, duration, "s") for i, t in times]
+    )

@@ -1,6 +1,5 @@
-"""A model file opened in onnxruntime, checked once so that it can be trusted afterwards."""
+"""A checked model file opened in onnxruntime."""
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as field_of
@@ -9,25 +8,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 
-from service.motion import card as cards
 from service.motion import field
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Singles
-from service.motion.errors import ModelError
 from service.motion.field import Weigher
-from service.synthesis import freeze, ports
+from service.synthesis import freeze, model_file, ports, runtime
 from service.synthesis.ports import OUTPUTS, PERFORMER
+from service.synthesis.runtime import Runtimes
+from service.synthesis.trial import LIMITS, Limits
 
-# A model of 114 kB with four levels, all asked, takes 3.1 MB: twelve sessions, each with weights.
+# Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
+# with weights.
 OWN_MEMORY, COPIES = 2 << 20, 12
 
 
 @dataclass(frozen=True)
 class State:
-    """What poses are made of, of one question: sample coefficients (r3,), canonical frames (S,) of
-    its times, the travel (3,) of a cycle, bone offsets (J, 3), m, duration, s, and sigma, m."""
+    """Intermediate values of the graph from which the poses of one question are computed.
+
+    coefficients: sample coefficients (r3,). frames: canonical frames (S,) of the question's times.
+    way: travel (3,) of a cycle. bones: bone offsets (J, 3), m. duration: s. sigma: m.
+    """
 
     coefficients: Floats
     frames: Floats
@@ -37,35 +39,14 @@ class State:
     sigma: float
 
 
-class Runtimes(Sequence[Any]):
-    """onnxruntime's sessions, one for each level of detail, each opened when it is first wanted.
-
-    Two threads that want one at once open two, of which one stays.
-    """
-
-    def __init__(self, opened: Callable[[int], Any], count: int) -> None:
-        self._opened = opened
-        self._held: list[Any] = [None] * count
-
-    def __len__(self) -> int:
-        return len(self._held)
-
-    # Of one level at a time: nobody slices them.
-    def __getitem__(self, level: Any) -> Any:
-        held = self._held[level]
-        if held is None:
-            held = self._held[level] = self._opened(level)
-        return held
-
-
 @dataclass(frozen=True)
 class Session:
-    """An open model: `run` asks the graph, `card` tells what it is, `digest` names its bytes.
+    """An open model.
 
-    runtimes: onnxruntime's sessions, one for each level of detail; clocks: the same of the graphs
-    that tell the duration alone, gauges of the one that tells the finest level's sigma, and states
-    of those that tell what poses are made of. size: of the file, bytes. content: the file. golden:
-    what it answers in the middle.
+    card: its metadata. digest: identifies the file's bytes. runtimes: onnxruntime sessions, one for
+    each level of detail. clocks: sessions that compute only the duration. gauges: the session that
+    computes only sigma, at the finest level. states: sessions that compute a State. size: of the
+    file, bytes. content: the file. golden: the answer at the default controls.
     """
 
     card: ModelCard
@@ -86,10 +67,9 @@ class Session:
         labels: Floats | Singles | None = None,
         level: int = 0,
     ) -> list[Any]:
-        """Outputs of the graph for controls (B, d) and times (B, S), in the order asked for.
+        """Return the graph's outputs, in their order, for controls (B, d) and times (B, S).
 
-        labels (B or 1, p): who moves, of the card's performers; nobody that was seen, if not said.
-        level: of the card's levels of detail.
+        labels (B or 1, p): performers; an unseen performer if None. level: level of detail.
         """
         feed = self._feed(controls, labels)
         feed["time"] = time.astype(np.float32, copy=False)
@@ -99,14 +79,14 @@ class Session:
     def durations(
         self, controls: Floats | Singles, labels: Floats | Singles | None = None, level: int = 0
     ) -> Singles:
-        """Durations (B,), s, as `run` gives them, in a quarter of its time."""
+        """Return the durations (B,), s, of `run`, in a quarter of its time."""
         answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
         return answers[0]
 
     def state(
         self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
     ) -> State:
-        """What the poses of one question, controls (1, d) and times (S,), are made of."""
+        """Return the intermediate values for one question: controls (1, d), times (S,)."""
         feed = self._feed(controls, labels)
         feed["time"] = time[None].astype(np.float32, copy=False)
         found = self.states[level].run(list(self._parts), feed)
@@ -116,39 +96,29 @@ class Session:
         return State(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
 
     @property
-    def correctable(self) -> bool:
-        """Whether the file tells what poses are made of, and what the captured clips count for; in
-        files older than this it does not."""
-        card = self.card
-        told = card.kriging is not None and len(card.left_out) == len(card.examples)
-        beside = bool(card.beside) or not card.cyclic
-        return told and beside and freeze.makes(self.content, "coefficients")
-
-    @property
     def _parts(self) -> tuple[str, ...]:
         return parts(self.card)
 
     def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
-        """Sigmas (B,), m, as `run` gives them at level 0, in half of its time."""
+        """Return the sigmas (B,), m, of `run` at level 0, in half of its time."""
         answers: list[Singles] = self.gauges[0].run(["sigma"], self._feed(controls, labels))
         return answers[0]
 
     @cached_property
     def weigher(self) -> Weigher:
-        """What the captured clips count for; only of a card that says what that hangs on."""
+        """Kriging weights of the captured clips."""
         own = self.card
-        assert own.kriging is not None
         low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
         points = field.half_ranges(np.array(own.examples), low, high)
         return Weigher(own.kriging, np.hstack([points, own.labels]))
 
     @property
     def memory(self) -> int:
-        """Bytes that this takes about, with all levels open."""
+        """Estimated memory in bytes with all levels open."""
         return OWN_MEMORY + COPIES * self.size
 
     def trial(self) -> bytes:
-        """Answer in the middle of the controls, asked anew: always `golden` of a sound model."""
+        """Return the answer at the default controls; equals `golden` for a sound model."""
         answers = self.run(ports.middle(self.card), np.zeros((1, 1)), *OUTPUTS)
         return b"".join(
             answer.tobytes() for answer in (*answers, self.durations(ports.middle(self.card)))
@@ -164,76 +134,53 @@ class Session:
 
 
 def parts(card: ModelCard) -> tuple[str, ...]:
-    """Values of the graph that a State holds."""
+    """Return the names of the graph's values that a State holds."""
     own = ("coefficients", "frame", "bone_offsets", "duration", "sigma")
     return (*own, "way") if card.cyclic else own
 
 
 def load(path: Path) -> Session:
-    """Session on one thread; ModelError says why a file cannot be served."""
-    return open_bytes(read(path), str(path))
+    """Return a session on a model file; ModelError if it cannot be served."""
+    return load_bytes(model_file.read(path), str(path))
 
 
-def read(path: Path) -> bytes:
-    """Content of a model file; ModelError where it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError as fault:
-        raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
+def load_bytes(content: bytes, source: str, limits: Limits = LIMITS) -> Session:
+    """Return a session on untrusted bytes, which a child process opens first.
 
-
-def sha256(content: bytes) -> str:
-    """SHA-256 of a model file, in hexadecimal digits."""
-    return hashlib.sha256(content).hexdigest()
-
-
-def digest(content: bytes) -> str:
-    """What a model file is told by."""
-    return sha256(content)[:16]
+    source: path or URL for messages. Raises ModelError for a file that cannot be served.
+    """
+    limits.check(content, source)
+    return of(content, model_file.checked(content, source), source)
 
 
 def open_bytes(content: bytes, source: str) -> Session:
-    """Session on the bytes of a model; `source` names them in errors."""
-    runtime = _start(content, source)
-    try:
-        card = cards.load(runtime.get_modelmeta().custom_metadata_map)
-    except ValueError as fault:
-        raise ModelError(source, str(fault)) from fault
-    ports.check(runtime, card, source)
-    return _levelled(card, content, source)
+    """Return a session on bytes that this program wrote, checked without a child process."""
+    card = model_file.checked(content, source)
+    ports.check(runtime.start(content, source), card, source)
+    return of(content, card, source)
 
 
-def _levelled(card: ModelCard, content: bytes, source: str) -> Session:
-    """Session of a file that has been checked, with what most questions need already open."""
+def of(content: bytes, card: ModelCard, source: str) -> Session:
+    """Return a session on a checked file, with the finest level and its clock open."""
 
-    def level(number: int) -> bytes:
-        try:
-            return freeze.at_level(content, number)
-        except (ValueError, LookupError) as fault:
-            raise ModelError(source, f"no protocol buffer: {fault}") from fault
+    def whole(level: int) -> Any:
+        return runtime.start(freeze.at_level(content, level), source)
 
     def telling(*outputs: str) -> Callable[[int], Any]:
-        return lambda number: _start(freeze.for_outputs(level(number), *outputs), source)
+        return lambda level: runtime.start(
+            freeze.for_outputs(freeze.at_level(content, level), *outputs), source
+        )
 
     count = len(card.levels)
-    runtimes = Runtimes(lambda number: _start(level(number), source), count)
-    clocks, gauges = Runtimes(telling("duration"), count), Runtimes(telling("sigma"), 1)
-    states = Runtimes(telling(*parts(card)), count)
-    own = (runtimes, clocks, gauges, len(content), states, content)
-    session = Session(card, digest(content), *own)
-    # Asks the finest level and its clock, and so opens them.
+    session = Session(
+        card,
+        model_file.digest(content),
+        runtimes=Runtimes(whole, count),
+        clocks=Runtimes(telling("duration"), count),
+        gauges=Runtimes(telling("sigma"), 1),
+        size=len(content),
+        states=Runtimes(telling(*parts(card)), count),
+        content=content,
+    )
+    # The trial runs the finest level and its clock, which opens them.
     return replace(session, golden=session.trial())
-
-
-def _start(content: bytes, source: str) -> Any:
-    options = onnxruntime.SessionOptions()
-    # A pose takes microseconds: threads would cost more than they bring.
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    # An arena keeps what the longest clip took, for each session, and gains no time on one thread.
-    options.enable_cpu_mem_arena = False
-    try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as fault:  # onnxruntime's exceptions share no base of their own
-        first_line = str(fault).strip().splitlines()[0]
-        raise ModelError(source, f"onnxruntime cannot load it: {first_line}") from fault

@@ -1,5 +1,8 @@
-"""A library that follows its sources: what is new there is opened and checked beside what answers,
-and takes its place in one step."""
+"""Model library that follows its sources.
+
+New files are opened and checked while the present models answer, then the library is replaced in
+one step.
+"""
 
 import logging
 import threading
@@ -13,20 +16,21 @@ from typing import Protocol
 from service.synthesis import library
 from service.synthesis.intake import Fault, Intake
 from service.synthesis.library import Bounds, Library
+from service.synthesis.trial import LIMITS, Limits
 
 log = logging.getLogger(__name__)
 
 SETTLING = 0.5
-"""Seconds until what has just changed is looked at again."""
+"""Seconds until a changing file is looked at again."""
 
 
 @dataclass(frozen=True)
 class Reloads:
-    """What has become of looking at the sources: looks, versions that were opened and attempts that
-    failed since the start, and what is wrong now.
+    """Statistics of looking at the sources.
 
-    changed: when the library last changed, seconds since 1970. last_error: of the last failure,
-    whether or not that has been put right.
+    looks: number of looks. opened, failed: versions opened and failed attempts since the start.
+    faults: present faults. changed: time of the last change of the library, seconds since 1970.
+    last_error: message of the last failure, kept after its repair.
     """
 
     looks: int = 0
@@ -38,19 +42,19 @@ class Reloads:
 
 
 class Models(Protocol):
-    """Models that may be others at the next look at `library`: take it once a request."""
+    """Models that may be replaced: read `library` once per request."""
 
     @property
     def library(self) -> Library:
-        """What there is now."""
+        """Current library."""
 
     @property
     def reloads(self) -> Reloads:
-        """What became of looking for others."""
+        """Statistics of looking at the sources."""
 
 
 class Fixed:
-    """Models that stay what they are."""
+    """Models that are never replaced."""
 
     reloads = Reloads()
 
@@ -59,33 +63,38 @@ class Fixed:
 
 
 class Shelf:
-    """Models of places, of which `library` is what they were when last looked at.
+    """Models of places; `library` is their state at the last look.
 
-    Whatever cannot be used leaves in place what was there: a file that is broken, a source that
-    cannot be reached or holds no model at all. A name that its source no longer has goes, with all
-    its versions; a version that it no longer has is an older one.
+    A file that cannot be used, and a source that cannot be reached or contains no model, leave the
+    models as they were. A name that its source no longer lists is removed with all its versions; a
+    version that its source no longer lists becomes an older one.
     """
 
-    def __init__(self, places: Iterable[str | Path], bounds: Bounds) -> None:
-        """Open everything that can be; `check` says what could not."""
+    def __init__(
+        self, places: Iterable[str | Path], bounds: Bounds, limits: Limits = LIMITS
+    ) -> None:
+        """Open everything that can be opened within the limits; `check` raises the first fault."""
         self.library = Library({})
         self.reloads = Reloads()
         self._bounds = bounds
-        self._intake = Intake(places, most=1 + bounds.older)
+        self._intake = Intake(places, 1 + bounds.older, limits)
+        self._logged: set[str] = set()
         self._take()
 
     def check(self) -> None:
-        """Raise ModelError as `library.load` does, for what could not be opened."""
+        """Raise ModelError for the first place that could not be opened."""
         self._intake.check()
 
     def look(self) -> bool:
-        """Take what the sources hold now; False where something has just changed and must be looked
-        at once more. For one thread at a time."""
-        known = {str(fault.error) for fault in self.reloads.faults}
+        """Update the library from the sources, and log each new fault.
+
+        Returns False while a file is changing, so that another look must follow. Not thread-safe.
+        """
         settled = self._take()
-        for fault in self.reloads.faults:
-            if str(fault.error) not in known:
-                log.warning("%s", fault.error)
+        found = {str(fault.error) for fault in self.reloads.faults}
+        for message in sorted(found - self._logged):
+            log.warning("%s", message)
+        self._logged = found
         return settled
 
     def _take(self) -> bool:
@@ -111,7 +120,7 @@ class Shelf:
 
     @contextmanager
     def watched(self, seconds: float) -> Iterator[None]:
-        """Look every so many seconds, or never for none, in a thread, for as long as this lasts."""
+        """Look every `seconds` in a thread while the context lasts; never if `seconds` is 0."""
         ended = threading.Event()
         thread = threading.Thread(target=self._watch, args=(seconds, ended), daemon=True)
         if seconds:
@@ -131,5 +140,6 @@ class Shelf:
 
 
 def _until_next(seconds: float) -> float:
-    # By the clock, so that several processes look at the same moment and agree on what is newest.
+    # Aligned to the clock, so that several processes look at the same moment and agree on the
+    # newest.
     return seconds - time.time() % seconds

@@ -1,7 +1,7 @@
-"""Where models come from: files, folders of them, and object stores, looked at again and again.
+"""Sources of models: files, folders of them, and object stores, listed repeatedly.
 
-A folder holds NAME.onnx, or NAME/VERSION.onnx, or NAME/VERSION/model.onnx, as model servers have
-it. What begins with a point is somebody's temporary file.
+A folder contains NAME.onnx, NAME/VERSION.onnx or NAME/VERSION/model.onnx, as model servers lay them
+out. Names that begin with a dot are ignored as temporary files.
 """
 
 import re
@@ -13,7 +13,7 @@ from typing import Protocol
 from urllib.parse import unquote, urlsplit
 
 from service.motion.errors import ModelError
-from service.synthesis import session
+from service.synthesis import model_file
 
 ENDING = ".onnx"
 INNERMOST = f"model{ENDING}"
@@ -24,10 +24,11 @@ Order = tuple[tuple[str | int, ...], str]
 
 @dataclass(frozen=True)
 class Found:
-    """A model file as a look at its source found it.
+    """A model file as its source listed it.
 
-    place: its path or URL. version: what its name says besides the model's, empty for the only one.
-    signature: differs whenever the content does. read: gives the content, or raises ModelError.
+    place: its path or URL. name: of the model. version: the part of the path that names the
+    version, empty without versions. signature: differs whenever the content does. read: returns the
+    content, or raises ModelError.
     """
 
     place: str
@@ -38,37 +39,37 @@ class Found:
 
     @property
     def order(self) -> Order:
-        """What versions are sorted by, the newest last: numbers in them count as numbers."""
+        """Sort key of versions, the newest last; digits compare as numbers."""
         parts = re.split(r"(\d+)", self.version)
         return tuple(int(p) if i % 2 else p for i, p in enumerate(parts)), self.version
 
 
 class Source(Protocol):
-    """A place of model files."""
+    """Source of model files."""
 
     def look(self) -> list[Found]:
-        """What is there now, at least one; ModelError where it is not what it should be."""
+        """Return the present files; ModelError if there are none or the source fails."""
 
 
 @dataclass(frozen=True)
 class File:
-    """One model file."""
+    """Source of one model file."""
 
     path: Path
 
     def look(self) -> list[Found]:
-        """The file."""
+        """Return the file."""
         return [_found(self.path, self.path.stem, "")]
 
 
 @dataclass(frozen=True)
 class Folder:
-    """A folder of model files and of folders with versions of one model each."""
+    """Folder of model files and of folders with versions of one model each."""
 
     path: Path
 
     def look(self) -> list[Found]:
-        """The files of models in it."""
+        """Return the model files in the folder; ModelError if there are none."""
         patterns = ("", "*/", "*/*/")
         paths = [p for deep in patterns for p in sorted(self.path.glob(f"{deep}*{ENDING}"))]
         placed = [(p, named(p.relative_to(self.path).as_posix())) for p in paths]
@@ -79,12 +80,12 @@ class Folder:
 
 
 def source(place: str | Path) -> Source:
-    """Source of a path, of a file:/// URL or, through obstore, of an object store's URL."""
+    """Return the source of a path, a file:/// URL or, through obstore, an object store's URL."""
     text = str(place)
     if URL.match(text):
         url = urlsplit(text)
         if url.scheme != "file":
-            # An extra: most services read a disk.
+            # Imported here because obstore is an optional extra.
             from service.synthesis.objects import Objects
 
             return Objects(text)
@@ -94,7 +95,7 @@ def source(place: str | Path) -> Source:
 
 
 def named(path: str) -> tuple[str, str] | None:
-    """Name and version of a file by its path in a folder of models; none if it is no model's."""
+    """Return the name and version of a model file by its path in a folder, else None."""
     parts = PurePosixPath(path).parts
     if any(part.startswith(".") for part in parts) or not path.endswith(ENDING):
         return None
@@ -106,7 +107,7 @@ def named(path: str) -> tuple[str, str] | None:
 
 
 def by_name(found: Iterable[Found]) -> dict[str, list[Found]]:
-    """Versions of each name, the newest first."""
+    """Return the versions of each name, the newest first."""
     grouped: dict[str, list[Found]] = {}
     for one in found:
         grouped.setdefault(one.name, []).append(one)
@@ -121,6 +122,6 @@ def _found(path: Path, name: str, version: str) -> Found:
         facts = path.stat()
     except OSError as fault:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
-    # Renaming onto a file changes its inode, writing into it its time.
+    # Replacing a file by renaming changes its inode; writing into it changes its time.
     signature = f"{facts.st_ino} {facts.st_size} {facts.st_mtime_ns}"
-    return Found(str(path), name, version, signature, partial(session.read, path))
+    return Found(str(path), name, version, signature, partial(model_file.read, path))

@@ -1,7 +1,6 @@
-"""Controls that nobody gave: the most typical for those that were, of the captured clips.
+"""Imputation of controls by the conditional mean of a Gaussian fitted to the captured clips.
 
-Samples are taken for draws of a Gaussian, whose conditional mean is what is typical. Nothing of it
-knows what the columns are: controls, and labels of who moved beside them.
+The columns are the controls and the performer labels; the fit does not distinguish them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,17 +12,18 @@ from service.motion.card import Control, ModelCard
 from service.motion.conventions import Floats
 
 SHRUNK = 0.1
-"""Share of what columns have in common that is not believed: few samples agree by chance. Left-out
-samples of three families are met best at 0.1 to 0.4, and hardly worse at any other share."""
+"""Shrinkage of the correlations: few samples correlate by chance. On left-out samples of three
+families, the best shares are 0.1 to 0.4, and the error hardly depends on the share.
+"""
 DIGITS = 6
-"""What is chosen is a number that people can read and ask for again."""
+"""Significant digits of imputed controls, so that they can be read and requested again."""
 
 
 @dataclass(frozen=True)
 class Typical:
-    """The Gaussian of samples, in units of each column's deviation.
+    """Gaussian fitted to samples, in units of each column's standard deviation.
 
-    mean, deviation (k,), correlation (k, k) of all columns.
+    mean, deviation: (k,). correlation: (k, k).
     """
 
     mean: Floats
@@ -31,7 +31,7 @@ class Typical:
     correlation: Floats
 
     def __call__(self, given: Mapping[int, float]) -> Floats:
-        """The most typical row (k,) for values of some columns, which stand in it as they are."""
+        """Return the conditional mean row (k,), with the given columns unchanged."""
         known = sorted(given)
         values = np.array([given[column] for column in known])
         away = (values - self.mean[known]) / self.deviation[known]
@@ -43,19 +43,19 @@ class Typical:
 
 
 def fit(samples: Floats, shrunk: float = SHRUNK) -> Typical:
-    """The Gaussian of samples (n, k), a share of what columns have in common left out."""
+    """Return the Gaussian of samples (n, k), with off-diagonal correlations reduced by `shrunk`."""
     mean = samples.mean(axis=0)
     deviation = samples.std(axis=0)
     deviation[deviation == 0.0] = 1.0
     apart = (samples - mean) / deviation
     correlation = (1.0 - shrunk) * (apart.T @ apart) / len(samples)
-    # One that never varies is of no use to any other, and no hindrance.
+    # A constant column must neither inform other columns nor make the matrix singular.
     np.fill_diagonal(correlation, 1.0)
     return Typical(mean, deviation, correlation)
 
 
 class Chooser:
-    """Chooses the controls that a question leaves open, for one model."""
+    """Imputation of a model's controls that a question leaves open."""
 
     def __init__(self, card: ModelCard) -> None:
         self._controls = card.controls
@@ -65,19 +65,21 @@ class Chooser:
     def fill_seen(
         self, given: Mapping[str, float], labels: Floats, seen: Floats, wanted: Floats
     ) -> dict[str, float]:
-        """All controls as `fill` has them, the most typical too for something else of which the
-        captured clips have values (n, m), and which is wanted to be (m,)."""
+        """Return all controls as `fill` does, conditional also on further measured quantities.
+
+        seen: their values for the captured clips (n, m). wanted: their target values (m,).
+        """
         start = self._samples.shape[1]
         typical = fit(np.hstack([self._samples, seen]))
         beside = {start + i: float(value) for i, value in enumerate(wanted)}
         return self._fill(typical, given, labels, beside)
 
     def fill(self, given: Mapping[str, float], labels: Floats) -> dict[str, float]:
-        """All controls, in the card's order: those given, and the most typical of the others for
-        them and, where one is named, for the performer of labels (1, p).
+        """Return all controls in the card's order, those not given as their conditional mean.
 
-        A control of few values takes the nearest sampled one, before the others are chosen; none
-        leaves what was sampled.
+        labels (1, p): of the performer, on whom the mean is conditional as well; all zero for none.
+        A discrete control takes the nearest sampled value before the others are computed; every
+        imputed control is limited to its sampled range.
         """
         return self._fill(self._typical, given, labels, {})
 
@@ -107,6 +109,6 @@ def _nearest(values: Sequence[float], value: float) -> float:
 
 
 def _within(control: Control, value: float) -> float:
-    """The value in few digits, and within what was sampled."""
+    """Return the value rounded to DIGITS and limited to the sampled range."""
     short = float(f"{value:.{DIGITS}g}")
     return min(max(short, control.minimum), control.maximum)

@@ -1,11 +1,11 @@
-"""Levels of detail by what a viewer would notice: how many pixels an error covers.
+"""Choice of levels of detail by the number of pixels that their errors cover.
 
-A camera is a place and a lens, without a direction. So a character behind it, or one that the image
-cuts off, counts by its distance like any other: a mirror or a shadow may show it. What is nobody's
-to see is the client's to leave out.
+A camera has a position and a lens, but no direction: a character behind it or outside the image
+counts by its distance, since a mirror or a shadow may show it. Clients leave out characters that
+cannot be seen.
 
-Who trembles about a threshold must not flicker. The service remembers nothing, so the client hands
-back the levels of the last answer, and a character goes coarser only where there is room to spare.
+The service stores no state between requests. Against flicker at a threshold, the client sends the
+levels of the last answer, and a character becomes coarser only with a margin (HYSTERESIS).
 """
 
 import math
@@ -18,16 +18,21 @@ from service.motion.conventions import Floats, Indices, Singles
 from service.motion.errors import InvalidField
 
 HYSTERESIS = 0.2
-"""A coarser level than that held is taken where its error is below the limit by this share."""
+"""A coarser level than the previous one is chosen if its error is below the limit by this share."""
 FARTHEST = 1e6
-"""Metres from the origin along an axis: float32, in which poses travel, keeps 6 cm out there."""
+"""Largest coordinate, m: the float32 of poses resolves 6 cm at this distance."""
 NARROWEST, TALLEST = 1e-6, 1e6
-"""Field of view, rad, and image, pixels: beyond, a pixel has no size that a float could hold."""
+"""Smallest field of view, rad, and tallest image, pixels, for which the size of a pixel is
+finite.
+"""
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where one looks from, position (3,), m; vertical field of view, rad; image height, pixels."""
+    """Camera without direction.
+
+    position: (3,), m. fov: vertical field of view, rad. height: height of the image, pixels.
+    """
 
     position: Floats
     fov: float
@@ -47,16 +52,16 @@ class Camera:
 
     @property
     def pixels(self) -> float:
-        """Pixels that a metre covers at a metre's distance, in the middle of the image."""
+        """Pixels that a metre covers at a distance of a metre, in the middle of the image."""
         return self.height / (2.0 * math.tan(self.fov / 2.0))
 
 
 @dataclass(frozen=True)
 class View:
-    """What is wanted of a level of detail: errors of at most so many pixels to a camera.
+    """Limits by which levels of detail are chosen.
 
-    budget: seconds that all poses together may take; where that is too little, the limit grows
-    until they fit. previous (N,): levels of the last answer.
+    pixels: largest error as seen by the camera. budget: seconds that all poses together may take;
+    the pixel limit grows until they fit. previous (N,): levels of the last answer.
     """
 
     camera: Camera
@@ -67,9 +72,10 @@ class View:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Levels of detail, finest first: errors (L,), m, and costs (L,), seconds a pose.
+    """Levels of detail, finest first: errors (L,), m, and costs (L,), seconds per pose.
 
-    Costs never grow from a level to the next. A level counts as no better than any finer one.
+    Costs never increase from a level to the next. The error of a level counts as at least that of
+    any finer one.
     """
 
     errors: Floats
@@ -78,20 +84,22 @@ class Ladder:
 
 @dataclass(frozen=True)
 class Choice:
-    """Levels (N,), and the limit in pixels that they keep: none where the coarsest level is not
-    cheap enough for the budget, and everything is at the coarsest."""
+    """Chosen levels (N,), and the pixel limit that they meet.
+
+    limit: None if even the coarsest level exceeds the budget; all characters are then at the
+    coarsest.
+    """
 
     levels: Indices
     limit: float | None
 
 
 def pixels_per_metre(camera: Camera, centres: Floats, radius: float) -> Floats:
-    """Pixels (N,) that a metre covers on each character, bodies of a radius, m, round centres
-    (N, 3), m.
+    """Return the pixels (N,) that a metre covers on each character.
 
-    Measured where a body is nearest, and as in the middle of the image: toward its edge
-    perspective stretches further, by 1 / cos² of the angle. InvalidField names a character that
-    the camera is in.
+    centres: (N, 3), m. radius: of each body, m. Measured at the nearest point of a body, as in the
+    middle of the image; toward the edges, perspective stretches by 1 / cos² of the angle. Raises
+    InvalidField with the index of a character that contains the camera.
     """
     distances = np.linalg.norm(centres - camera.position, axis=-1) - radius
     inside = np.flatnonzero(distances <= 0.0)
@@ -105,8 +113,10 @@ def pixels_per_metre(camera: Camera, centres: Floats, radius: float) -> Floats:
 
 
 def see(ladder: Ladder, scale: Floats, view: View) -> Choice:
-    """Levels for characters on which a metre covers so many pixels (N,): the coarsest that the
-    view allows, or, where those do not fit into its budget, the best that do."""
+    """Return the coarsest levels within the view's limit; within its budget, if that is tighter.
+
+    scale: pixels (N,) that a metre covers on each character.
+    """
     levels = choose(ladder.errors, scale, view.pixels, view.previous)
     if view.budget is None or _seconds(levels, ladder) <= view.budget:
         return Choice(levels, view.pixels)
@@ -114,7 +124,7 @@ def see(ladder: Ladder, scale: Floats, view: View) -> Choice:
 
 
 def warnings(choice: Choice, ladder: Ladder, view: View) -> tuple[str, ...]:
-    """A sentence where the budget decided, and not the pixels that were asked for."""
+    """Return a warning if the budget, not the requested pixels, determined the levels."""
     if view.budget is None or choice.limit == view.pixels:
         return ()
     budget = f"the budget of {1e3 * view.budget:g} ms"
@@ -125,19 +135,19 @@ def warnings(choice: Choice, ladder: Ladder, view: View) -> tuple[str, ...]:
 
 
 def choose(errors: Floats, scale: Floats, limit: float, previous: Indices | None = None) -> Indices:
-    """Coarsest levels (N,) whose errors (L,), m, cover at most `limit` pixels at a scale (N,),
-    pixels a metre; the finest where none does.
+    """Return the coarsest levels (N,) whose errors cover at most `limit` pixels; else the finest.
 
-    With the levels held before, (N,), a coarser one must keep `limit` less HYSTERESIS of it.
+    errors: (L,), m. scale: (N,), pixels per metre. previous: (N,); a coarser level than these must
+    meet `limit` reduced by HYSTERESIS.
     """
     return _levels(_thresholds(errors, scale, previous), limit)
 
 
 def fit(ladder: Ladder, scale: Floats, budget: float, previous: Indices | None = None) -> Choice:
-    """Levels at the smallest limit at which all poses together take at most `budget` seconds.
+    """Return the levels at the smallest limit whose poses take at most `budget` seconds.
 
-    Exact, hysteresis included. The limit is that of some character's step to some level: steps to
-    one level are sorted, and each row is searched in log N trials.
+    Exact, including hysteresis: the limit is one of the thresholds at which a character changes
+    level. The thresholds of each level are sorted and searched by bisection.
     """
     thresholds = _thresholds(ladder.errors, scale, previous)
     steps = np.sort(thresholds, axis=1)
@@ -156,8 +166,10 @@ def fit(ladder: Ladder, scale: Floats, budget: float, previous: Indices | None =
 
 
 def _thresholds(errors: Floats, scale: Floats, previous: Indices | None) -> Floats:
-    """Smallest limits (L - 1, N), pixels, at which each character may be at level 1, 2, ... or
-    coarser: they never fall from a level to the next."""
+    """Return the smallest limits (L - 1, N), pixels, for level 1, 2, ... or coarser.
+
+    They never decrease from a level to the next.
+    """
     limits = np.maximum.accumulate(errors)[1:, None] * scale
     if previous is not None:
         levels = np.arange(1, len(errors))[:, None]
@@ -175,10 +187,10 @@ def _seconds(levels: Indices, ladder: Ladder) -> float:
 
 
 def _total(reached: Indices, ladder: Ladder) -> float:
-    """Seconds of all poses where so many characters (L,) are at each level or coarser."""
+    """Return the seconds of all poses for counts (L,) of characters at each level or coarser."""
     return float((reached - np.append(reached[1:], 0)) @ ladder.costs)
 
 
 def error_pixels(errors: Floats, scale: Floats, levels: Indices) -> Singles:
-    """Pixels (N,) that the errors of the chosen levels cover."""
+    """Return the pixels (N,) that the errors of the chosen levels cover."""
     return (errors[levels] * scale).astype(np.float32)

@@ -1,11 +1,8 @@
-"""Why an answer is as it is: which captured clips are near, and what each counts for.
+"""Explanation of answers: the nearest captured clips and their kriging weights.
 
 The poses of the finest level are a weighted sum of the captured clips in the coordinates of the
-motion tensor, with weights that hang on the controls and the performer alone, not on the time.
+motion tensor; the weights depend on the controls and the performer, not on the time.
 """
-
-from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,39 +10,19 @@ from service.motion import field, support
 from service.motion.answer import Backing, Captured, Reasons
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats
-from service.motion.errors import InvalidField
-from service.synthesis import limits
+from service.question.model_question import WhyQuestion
 from service.synthesis.door import Door, Question
-from service.synthesis.question import Policy
 from service.synthesis.synthesizer import Synthesizer
 
 NEAREST, MOST = 10, 10_000
-OLD = "expected one that says what its weights hang on; train it again"
-
-
-@dataclass(frozen=True)
-class WhyQuestion:
-    """Which answer: control values and who moves, nobody that was seen for none; nearest: how many
-    captured clips are listed."""
-
-    controls: Mapping[str, float]
-    extrapolate: Policy
-    performer: str | None = None
-    nearest: int = NEAREST
-
-    def __post_init__(self) -> None:
-        limits.within("nearest", self.nearest, 1, MOST, "clips")
 
 
 def why(model: Synthesizer, asked: WhyQuestion) -> Reasons:
-    """Reasons for the answer at these controls.
+    """Return the nearest captured clips, their weights and the support of an answer.
 
-    Raises as `poses.pose` does, and InvalidField for a model that was trained before cards
-    said what weights hang on.
+    Raises InvalidField and OutsideSamples as the validation of questions does.
     """
     card = model.session.card
-    if card.kriging is None:
-        raise InvalidField("model", f"{model.identity}, {OLD}")
     question = model.door.question(asked.controls, asked.extrapolate, asked.performer, level=0)
     point = _point(card, question)
     distances = model.session.weigher.distances(point)[0]
@@ -68,7 +45,7 @@ def _backing(door: Door, question: Question) -> Backing:
 
 
 def _point(card: ModelCard, question: Question) -> Floats:
-    """Point (1, d + p) of the field."""
+    """Return the point (1, d + p) of the kriging model."""
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
     return np.hstack([field.half_ranges(question.point, low, high), question.labels])
 

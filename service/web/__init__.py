@@ -1,1 +1,1 @@
-"""HTTP: the contract, its operations and the process that serves them."""
+"""HTTP layer: the API contract, its operations and the server process."""

@@ -1,4 +1,4 @@
-"""Answers as they travel: JSON documents, and the headers that say how far a clip is trusted."""
+"""Responses of operations: JSON documents, and files with headers for the facts of trust."""
 
 import json
 from collections.abc import AsyncIterator, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 import orjson
 from starlette.responses import Response, StreamingResponse
 
-from service.encode import Encoder
+from service.encode.media import Format
 from service.motion import card as cards
 from service.motion.answer import Trust
 from service.synthesis.library import Library
@@ -15,12 +15,12 @@ from service.synthesis.synthesizer import Synthesizer
 
 
 def document(content: Any) -> Response:
-    """JSON answer of plain values."""
+    """Return a JSON response of plain values."""
     return Response(orjson.dumps(content), media_type="application/json")
 
 
 def models(library: Library) -> dict[str, Any]:
-    """Schema ModelList of the contract."""
+    """Return the ModelList (schema of the contract) of a library."""
     return {"models": [_summary(library.versions(name)) for name in library.models]}
 
 
@@ -35,32 +35,35 @@ def _summary(versions: Sequence[Synthesizer]) -> dict[str, Any]:
 
 
 def card(model: Synthesizer) -> dict[str, Any]:
-    """Schema ModelCard of the contract."""
+    """Return the ModelCard (schema of the contract) of a model."""
     return {"identity": model.identity, **cards.plain_values(model.session.card)}
 
 
-def attachment(content: bytes, media_type: str, name: str) -> Response:
-    """A file to save."""
-    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return Response(content, headers=headers, media_type=media_type)
+def attachment(content: bytes, form: Format, model: str) -> Response:
+    """Return a response with a file to download, named after the model."""
+    return Response(content, headers=_disposition(form, model), media_type=form.media_type)
 
 
 def streamed(
-    pieces: AsyncIterator[bytes], media_type: str, name: str, model: str, warnings: Sequence[str]
+    pieces: AsyncIterator[bytes], form: Format, model: Synthesizer, warnings: Sequence[str]
 ) -> Response:
-    """A file to save, sent while it is made."""
-    headers = {
-        "Content-Disposition": f'attachment; filename="{name}"',
-        "Posefield-Model": model,
-    }
-    return _warning(StreamingResponse(pieces, headers=headers, media_type=media_type), warnings)
+    """Return a response that streams a file to download.
+
+    warnings: sent as headers.
+    """
+    headers = {**_disposition(form, model.name), "Posefield-Model": model.identity}
+    sent = StreamingResponse(pieces, headers=headers, media_type=form.media_type)
+    return _warning(sent, warnings)
 
 
-def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
-    """A clip as a file to save; what its format cannot carry travels in headers."""
-    name = trust.model.partition("@")[0]
+def _disposition(form: Format, model: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{model}.{form.extension}"'}
+
+
+def file(content: bytes, form: Format, trust: Trust) -> Response:
+    """Return a response with a clip to download; headers hold its trust for all formats."""
     headers = {
-        "Content-Disposition": f'attachment; filename="{name}.{encoder.extension}"',
+        **_disposition(form, trust.model.partition("@")[0]),
         "Posefield-Model": trust.model,
         "Posefield-Sigma": repr(trust.sigma),
         "Posefield-Duration": repr(trust.duration),
@@ -69,7 +72,7 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
     if trust.inferred:
         chosen = {name: trust.controls[name] for name in trust.inferred}
         headers["Posefield-Inferred"] = json.dumps(chosen)
-    made = Response(content, headers=headers, media_type=encoder.media_type)
+    made = Response(content, headers=headers, media_type=form.media_type)
     for met in trust.targets:
         if not met.reached:
             said = {"what": met.what, "miss": met.miss, "unit": met.unit}
@@ -79,6 +82,6 @@ def file(content: bytes, encoder: Encoder, trust: Trust) -> Response:
 
 def _warning(response: Response, warnings: Sequence[str]) -> Response:
     for warning in warnings:
-        # A JSON string is plain ASCII and can hold the commas that join header lines.
+        # A JSON string is ASCII, and its quotes protect commas, which separate joined headers.
         response.headers.append("Posefield-Warning", json.dumps(warning))
     return response

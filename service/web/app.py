@@ -1,44 +1,46 @@
-"""The application: the contract's operations at their paths, as ASGI."""
+"""ASGI application of the contract's operations."""
 
-import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, nullcontext
 from functools import partial
 
 from starlette.types import Receive, Scope, Send
 
-from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS, crowd
-from service.encode.grids import GRID_ENCODERS
-from service.encode.packs import PACKS
 from service.motion.errors import UnknownFormat
 from service.synthesis.library import Library
 from service.synthesis.shelf import Fixed
-from service.web import contract, cors, pages, problems
+from service.web import contract, cors, pages, problems, request_head
 from service.web.access import policy
 from service.web.contract import Contract, Operation
 from service.web.exchange import Exchange, Site
-from service.web.negotiation import Negotiated
 from service.web.operations import OPERATIONS
 from service.web.problems import RequestFault
 from service.web.readiness import Readiness
+from service.web.request_head import HeadLimits
 from service.web.routing import Map, Route
-from service.web.service import Handler, Service
+from service.web.service import Formatted, Handler, Service
 from service.web.settings import PREFIX, Settings
 from service.web.telling import SILENT, Telling
 
-FORMAT_PATH = re.compile(r"/v1/models/[^/]+/(pose|clip|clips|crowd|sigma)\.([^/]+)")
-FORMATS = {
-    "pose": [*POSE_ENCODERS],
-    "clip": [*ENCODERS],
-    "clips": [*PACKS],
-    "crowd": [*CROWD_ENCODERS, *crowd.STREAMS],
-    "sigma": [*GRID_ENCODERS],
-}
+Lifespan = Callable[[Site], AbstractAsyncContextManager[None]]
 
 
-def create_app(models: Library | Readiness, settings: Settings, telling: Telling = SILENT) -> "App":
-    """Application that answers for the models of a library, or for those of a shelf, that may be
-    told to turn requests away; telling: where it tells of requests."""
-    return build(contract.load(), OPERATIONS, models, settings, telling)
+def alone(site: Site) -> AbstractAsyncContextManager[None]:
+    """Return a lifespan without background tasks."""
+    return nullcontext()
+
+
+def create_app(
+    models: Library | Readiness,
+    settings: Settings,
+    telling: Telling = SILENT,
+    lifespan: Lifespan = alone,
+) -> "App":
+    """Return the application of the contract for some models.
+
+    telling: log and traces of requests. lifespan: context of the background tasks of the server.
+    """
+    return build(contract.load(), OPERATIONS, models, settings, telling, lifespan)
 
 
 def build(
@@ -47,11 +49,13 @@ def build(
     models: Library | Readiness,
     settings: Settings,
     telling: Telling = SILENT,
+    lifespan: Lifespan = alone,
 ) -> "App":
-    """Application of a contract and the handlers of its operations.
+    """Return the application of a contract and the handlers of its operations.
 
-    Raises ValueError for an operation without a handler and a handler without an operation, and
-    InvalidField or FileError for settings that would let in whom they should not, or nobody.
+    handlers: by operationId. Raises ValueError for an operation without a handler, a handler
+    without an operation and formats that differ from the handler's, and InvalidField or FileError
+    for invalid settings of access, origins or hosts.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
     readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
@@ -61,33 +65,52 @@ def build(
     service = Service(
         readiness, settings, agreed.version, pages.made(agreed), rules, origins, telling
     )
-    routes = [_route(operation, handlers[operation.id], service) for operation in agreed.operations]
-    return App(Site(Map(routes), service, _missing))
+    places = Map(
+        route
+        for operation in agreed.operations
+        for route in _routes(operation, handlers[operation.id], service)
+    )
+    hosts = request_head.names(settings.hosts, f"{PREFIX}HOSTS")
+    limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
+    return App(Site(places, service, partial(_missing, places), limits), lifespan)
 
 
-def _route(operation: Operation, handler: Handler, service: Service) -> Route:
-    offers = handler.offers if isinstance(handler, Negotiated) else ()
-    return Route(operation, partial(handler, service), offers)
+def _routes(operation: Operation, handler: Handler, service: Service) -> Iterator[Route]:
+    """Yield the routes of an operation: one per format if its path ends in `{format}`, else one."""
+    endpoint = partial(handler, service)
+    formats = handler.formats if isinstance(handler, Formatted) else {}
+    offers = tuple((name, each.media_type) for name, each in formats.items())
+    _check_formats(operation, dict(offers))
+    if not operation.formats:
+        yield Route(operation, endpoint, offers=offers)
+    for name in operation.formats:
+        yield Route(operation, endpoint, name)
+
+
+def _check_formats(operation: Operation, encoders: Mapping[str, str]) -> None:
+    """Raise ValueError unless the contract lists the handler's formats and media types."""
+    agreed = dict(operation.formats), {*operation.media_types}
+    made = dict(encoders if operation.formats else {}), {*encoders.values()}
+    if (operation.formats or encoders) and agreed != made:
+        raise ValueError(f"{operation.id}: the contract has {agreed}, its handler {made}")
 
 
 class App:
-    """ASGI: each request is an exchange of its own."""
+    """ASGI application; runs an Exchange for each request."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, lifespan: Lifespan) -> None:
         self.site = site
+        self._lifespan = lifespan
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
             await Exchange(self.site, scope, receive, send).run()
         elif scope["type"] == "lifespan":
-            await _live(receive, send)
-
-
-async def _live(receive: Receive, send: Send) -> None:
-    """There is nothing to start or to end, but servers ask."""
-    for moment in ("startup", "shutdown"):
-        await receive()
-        await send({"type": f"lifespan.{moment}.complete"})
+            await receive()
+            async with self._lifespan(self.site):
+                await send({"type": "lifespan.startup.complete"})
+                await receive()
+            await send({"type": "lifespan.shutdown.complete"})
 
 
 def _check_complete(agreed: set[str], handled: set[str]) -> None:
@@ -98,9 +121,9 @@ def _check_complete(agreed: set[str], handled: set[str]) -> None:
         )
 
 
-def _missing(path: str) -> Exception:
-    """The fault of a path that the contract does not have."""
-    if asked := FORMAT_PATH.fullmatch(path):
-        message = f"no format {asked[2]!r}; there are {', '.join(FORMATS[asked[1]])}"
-        return UnknownFormat("format", message)
+def _missing(places: Map, path: str) -> Exception:
+    """Return the error of a path that is not in the contract."""
+    if found := places.other_formats(path):
+        asked, known = found
+        return UnknownFormat("format", f"no format {asked!r}; there are {', '.join(known)}")
     return RequestFault(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")

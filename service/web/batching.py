@@ -1,7 +1,7 @@
-"""Questions for poses that arrive together, answered by one call of the graph.
+"""Batching of concurrent pose requests into one inference call.
 
-There is no timer: what has arrived when the event loop turns is asked together. Whoever asks alone
-is answered at once.
+There is no timer: a batch holds the requests of one iteration of the event loop. A single request
+is evaluated immediately.
 """
 
 import asyncio
@@ -13,20 +13,24 @@ from service.synthesis.synthesizer import Synthesizer
 from service.web import metrics
 
 MOST = 64
-"""Poses of one call: beyond, a pose costs no less."""
+"""Maximum size of a batch: larger ones do not reduce the cost per pose."""
 
 Waiting = list[tuple[Moments, "Future[Row]"]]
 
 
 class Batcher:
-    """What was asked in this turn of an event loop."""
+    """Batches of the current iteration of an event loop."""
 
     def __init__(self) -> None:
         self._waiting: dict[tuple[str, int], tuple[Synthesizer, Waiting]] = {}
         self._arrived = self._before = 0
 
     async def row(self, model: Synthesizer, asked: Moments) -> Row:
-        """What the model's graph says to a question; the same bytes whoever else asks."""
+        """Return the graph's output for a question; the batch does not affect its bytes.
+
+        A question is batched if it is for one time, the model's level is exact in batches, and the
+        previous iteration had at least two questions.
+        """
         self._arrive()
         if self._before < 2 or len(asked.when) > 1 or not poses.exact(model, asked.level):
             metrics.batched(1)
@@ -34,7 +38,7 @@ class Batcher:
         return await self._together(model, asked)
 
     def _arrive(self) -> None:
-        """Count the questions of a turn: many in one let expect many in the next."""
+        """Count the questions of an iteration, which predict the number in the next one."""
         if not self._arrived:
             asyncio.get_running_loop().call_soon(self._turn)
         self._arrived += 1
@@ -46,7 +50,7 @@ class Batcher:
         loop = asyncio.get_running_loop()
         if not self._waiting:
             loop.call_soon(self._answer)
-        # Two versions of a model may be asked in one turn: each has an identity of its own.
+        # Keyed by identity: requests may be for two versions of a model at the same time.
         key = model.identity, asked.level
         future: Future[Row] = loop.create_future()
         self._waiting.setdefault(key, (model, []))[1].append((asked, future))

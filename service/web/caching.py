@@ -1,7 +1,7 @@
-"""HTTP caching: what an answer is called before it is made, and how long that holds.
+"""HTTP caching: entity tags, computed before the response, and lifetimes.
 
-An answer to a GET follows from the model's file, the request's line, the code, and how this machine
-rounds. A digest of all of them is its strong entity tag, and takes two microseconds.
+The response to a GET depends only on the model file, the request line, the code and the rounding of
+this machine. Their digest is its strong entity tag; computing it takes two microseconds.
 """
 
 import platform
@@ -17,15 +17,18 @@ AGAIN = b"no-cache"
 PUBLIC = b"public, "
 
 LIBRARIES = ("backports.zstd", "msgspec", "nanoarrow", "numpy", "onnxruntime", "orjson", "usd-core")
-"""Those that have a say in an answer's bytes."""
+"""Libraries whose versions can affect the bytes of a response."""
 
 
 class NotModified(Exception):
-    """The client has the answer already."""
+    """The client's cached response is current (304)."""
 
 
 def code() -> bytes:
-    """Digest of all that answers are made by but the model: sources, libraries, machine."""
+    """Return a digest of the sources, the library versions and the machine type.
+
+    Responses depend on these, on the model and on the request.
+    """
     digest = blake2b(digest_size=16)
     root = Path(service.__file__).parent
     for source in sorted([*root.rglob("*.py"), *root.rglob("*.yaml")]):
@@ -38,21 +41,31 @@ def code() -> bytes:
 
 
 def tag(*parts: bytes, coding: str | None = None) -> str:
-    """Strong entity tag of what follows from the parts, in a content coding."""
+    """Return the strong entity tag of a response that depends only on `parts`.
+
+    coding: content coding of the response, if any.
+    """
     digest = blake2b(b"\0".join(parts), digest_size=16).hexdigest()
     return f'"{digest}-{coding}"' if coding else f'"{digest}"'
 
 
 def held(given: str, own: str) -> bool:
-    """Whether an If-None-Match header names an entity tag; weakly, as RFC 9110 13.1.2 says."""
+    """Return True if an If-None-Match header matches an entity tag.
+
+    The comparison is weak (RFC 9110, 13.1.2). given: the header. own: the tag.
+    """
     if given == own:
         return True
     return given.strip() == "*" or own in (t.strip().removeprefix("W/") for t in given.split(","))
 
 
 def lifetime(model: str, alias_seconds: int, closed: bool) -> bytes:
-    """How long an answer may be used unasked: for ever under a model's hash, under its name alone
-    for so many seconds. closed: by whoever asked and had to say who they are, not by others."""
+    """Return the Cache-Control of a response of a model.
+
+    model: key in the path; with a hash the response is immutable, with the name alone it stays
+    fresh for `alias_seconds`, and must be revalidated for 0. closed: the service needs credentials,
+    so only private caches may store the response.
+    """
     whose = b"private, " if closed else PUBLIC
     if "@" in model:
         return whose + FOR_EVER

@@ -1,59 +1,38 @@
-"""Questions for many clips as they travel: a JSON body to clips that have passed the door."""
+"""Requests for many clips: decoding and validation of the JSON body."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated
 
-import msgspec
-
-from service.encode import Encoder
-from service.encode.convention import Unit, Up
+from service.encode import Encoder, poses_within
 from service.export import names
-from service.export.cells import LEGAL_NAME
 from service.export.pack import Order
 from service.export.query import Query
-from service.motion.errors import InvalidField, QueryError
+from service.motion import cancel
+from service.motion.errors import FormError, InvalidField, QueryError
+from service.question import body as bodies
+from service.question.body import pointer
+from service.question.motion_question import ClipsQuestion, NamedClipQuestion
 from service.synthesis import clips
-from service.synthesis.question import Prospect
+from service.synthesis.clips import Prospect
+from service.synthesis.course import MOST_POSES
 from service.synthesis.synthesizer import Synthesizer
-from service.web import decoding, problems, query
-from service.web.problems import pointer
-from service.web.query import ClipBody
+from service.web import problems
 from service.web.settings import Settings
 
-Name = Annotated[str, msgspec.Meta(pattern=rf"^{LEGAL_NAME.pattern}\Z")]
 OWN_NAME = "expected a name of its own: an earlier clip has it, capitals count for nothing"
-
-
-class NamedClipBody(ClipBody, frozen=True):
-    """Schema NamedClipQuestion of the contract."""
-
-    name: Name | None = None
-
-
-class ClipsBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Schema ClipsQuestion of the contract."""
-
-    format: str
-    clips: list[NamedClipBody]
-    unit: Unit | None = None
-    up: Up | None = None
-
-
-_CLIPS = msgspec.json.Decoder(ClipsBody)
 
 
 def order(
     model: Synthesizer, encoders: Mapping[str, Encoder], content: bytes, settings: Settings
 ) -> Order:
-    """What a JSON body asks of a model, checked so far that nothing of it can be refused later.
+    """Return the validated order of a JSON body, which later steps do not refuse.
 
-    RequestFault where it breaks the contract's form or one clip has no answer, InvalidField where
-    it asks for too much.
+    Raises FormError for a malformed body, RequestFault for an invalid clip and InvalidField for a
+    request beyond the limits.
     """
-    body = decoding.decoded(_CLIPS, content)
+    body = bodies.question(ClipsQuestion, content)
     if body.format not in encoders:
         detail = f"{body.format!r}, expected one of {', '.join(encoders)}"
-        raise decoding.bad_body(detail, pointer("format"))
+        raise FormError("format", detail)
     if not 1 <= len(body.clips) <= settings.clips_limit:
         expected = f"expected 1 to {settings.clips_limit}"
         raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
@@ -61,14 +40,18 @@ def order(
     convention = encoder.convention(body.unit, body.up)
     queries = [_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
     _check_names(queries)
-    prospects = _prospects(model, queries, settings.clips_poses)
+    _check_targets(model, queries, settings.clips_targets)
+    within = poses_within(
+        settings.output_limit, len(model.session.card.skeleton), encoder.per_joint
+    )
+    prospects = _prospects(model, queries, min(within, MOST_POSES), settings.clips_poses)
     return Order(model, encoder, convention, queries, prospects)
 
 
-def _query(index: int, body: NamedClipBody, extension: str) -> Query:
-    within = "clips", str(index)
-    name = names.generated(index) if body.name is None else body.name
-    return Query(name, extension, query.clip_of(body, *within), pointer(*within))
+def _query(index: int, asked: NamedClipQuestion, extension: str) -> Query:
+    cancel.check()
+    name = names.generated(index) if asked.name is None else asked.name
+    return Query(name, extension, asked, pointer("clips", str(index)))
 
 
 def _check_names(queries: Sequence[Query]) -> None:
@@ -78,11 +61,28 @@ def _check_names(queries: Sequence[Query]) -> None:
         raise problems.within(error, queries[index].place)
 
 
-def _prospects(model: Synthesizer, queries: Sequence[Query], most: int) -> list[Prospect]:
+def _check_targets(model: Synthesizer, queries: Sequence[Query], most: int) -> None:
+    cost = sum(clips.solver_cost(model, each.question) for each in queries)
+    if cost > most:
+        raise InvalidField(
+            "clips",
+            f"targets of all clips cost {cost}, expected at most {most}; a target counts as one, "
+            f"as {clips.OPEN_COST} where controls are left open, pinned feet as {clips.PIN_COST}",
+        )
+
+
+def _prospects(
+    model: Synthesizer, queries: Sequence[Query], longest: int, most: int
+) -> list[Prospect]:
+    """Return the prospect of each clip.
+
+    longest: maximum frames of one clip. most: maximum frames of all clips.
+    """
     found, poses = [], 0
     for each in queries:
+        cancel.check()
         try:
-            found.append(clips.prospect(model, each.question))
+            found.append(clips.prospect(model, each.question, longest))
         except QueryError as error:
             raise problems.within(error, each.place) from None
         poses += found[-1].frames

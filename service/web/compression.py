@@ -1,4 +1,4 @@
-"""Content codings: which a client prefers, and for which content they pay."""
+"""Content codings: negotiation by Accept-Encoding, and compression of responses."""
 
 import gzip
 import zlib
@@ -6,15 +6,14 @@ from collections.abc import AsyncIterator, Callable
 from functools import lru_cache, partial
 from typing import Any
 
-from anyio import to_thread
 from backports import zstd
 from starlette.datastructures import MutableHeaders
 from starlette.responses import Response, StreamingResponse
 
-from service.web import preferences
+from service.web import preferences, threads
 
 CODINGS = ("zstd", "gzip")
-"""What is offered, the best first: zstd takes a tenth of gzip's time for the same size."""
+"""Supported codings, the preferred first: zstd takes a tenth of gzip's time at the same size."""
 
 PAYS = frozenset(
     {
@@ -28,20 +27,20 @@ PAYS = frozenset(
         "text/css",
     }
 )
-"""Media types of text. Binary numbers shrink by a twelfth at most, packages not at all."""
+"""Compressed media types, all text: binary numbers shrink by a twelfth at most, zip files not."""
 
 LEAST = 1000
-"""Bytes below which the answer fits in a packet anyway."""
+"""Minimum bytes of a compressed response: smaller ones fit in one packet."""
 
 AT_ONCE = 1 << 18
-"""Bytes that are compressed in less than the time that a change of threads is worth."""
+"""Maximum bytes that are compressed in the event loop rather than in a thread."""
 
 ZSTD_LEVEL, GZIP_LEVEL = 3, 6
 
 
 @lru_cache(256)
 def preferred(accepted: bytes) -> str | None:
-    """The coding to use by an Accept-Encoding header; none for the content as it is."""
+    """Return the coding that an Accept-Encoding header prefers; None for no coding."""
     weights = dict(reversed(preferences.weighted(accepted.decode("latin-1"))))
     anything = weights.get("*", 0.0)
     found = max(CODINGS, key=lambda coding: weights.get(coding, anything))
@@ -50,12 +49,12 @@ def preferred(accepted: bytes) -> str | None:
 
 
 def pays(media_type: str | None) -> bool:
-    """Whether content of that type gets much smaller."""
+    """Return True if responses of a media type are compressed."""
     return (media_type or "").partition(";")[0] in PAYS
 
 
 async def apply(response: Response, coding: str) -> None:
-    """Compress what pays of an answer that is not compressed yet."""
+    """Compress a response in place, if its type and size are worth it and it is not yet encoded."""
     if not pays(response.headers.get("content-type")) or "content-encoding" in response.headers:
         return
     if isinstance(response, StreamingResponse):
@@ -69,7 +68,7 @@ async def _whole(response: Response, coding: str) -> None:
     content = bytes(response.body)
     quick = len(content) <= AT_ONCE
     compress = _COMPRESS[coding]
-    response.body = compress(content) if quick else await to_thread.run_sync(compress, content)
+    response.body = compress(content) if quick else await threads.run(compress, content)
     headers: MutableHeaders = response.headers
     headers["Content-Encoding"] = coding
     headers["Content-Length"] = str(len(response.body))
@@ -80,7 +79,7 @@ def _zstd(content: bytes) -> bytes:
 
 
 def _gzip(content: bytes) -> bytes:
-    # No time of day in the header: the same content has the same bytes.
+    # mtime=0: equal content gives equal bytes.
     return gzip.compress(content, GZIP_LEVEL, mtime=0)
 
 
@@ -88,10 +87,13 @@ _COMPRESS: dict[str, Callable[[bytes], bytes]] = {"zstd": _zstd, "gzip": _gzip}
 
 
 async def _pieces(pieces: AsyncIterator[bytes], coding: str) -> AsyncIterator[bytes]:
-    """One stream: browsers read no second frame or member of a body."""
+    """Yield the compressed pieces as one stream.
+
+    Browsers decode only the first frame or member of a body.
+    """
     stream = _STREAMS[coding]()
     async for piece in pieces:
-        if packed := await to_thread.run_sync(stream.compress, piece):
+        if packed := await threads.run(stream.compress, piece):
             yield packed
     yield stream.flush()
 
@@ -100,4 +102,4 @@ _STREAMS: dict[str, Callable[[], Any]] = {
     "zstd": partial(zstd.ZstdCompressor, ZSTD_LEVEL),
     "gzip": partial(zlib.compressobj, GZIP_LEVEL, zlib.DEFLATED, 16 + zlib.MAX_WBITS),
 }
-"""`16 +` is zlib's word for gzip's header."""
+"""Compressor factories; `16 +` selects the gzip format in zlib."""

@@ -1,7 +1,7 @@
-"""The contract: api/openapi.yaml as the service reads it."""
+"""The API contract (api/openapi.yaml) and its operations."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,10 @@ METHODS = ("get", "put", "post", "delete", "options", "head", "patch", "trace")
 class Operation:
     """One operation of the contract.
 
-    query: names of its query parameters. open_query: whether the query may hold other names too,
-    because an exploded object (the controls of a model) stands among the parameters. media_types:
-    of what it answers with when all is well. responses: statuses.
-    scope: what a key must allow, where the service asks for keys; None where it never does.
+    query: names of its query parameters. open_query: other names are allowed too, since one
+    parameter is an exploded object (the controls of a model). media_types: of successful responses.
+    formats: media types by format; empty for a path without `{format}`. responses: status codes.
+    scope: scope that a key or token needs; None for an operation that needs no credentials.
     """
 
     id: str
@@ -28,23 +28,27 @@ class Operation:
     query: frozenset[str]
     open_query: bool
     media_types: tuple[str, ...] = ()
+    formats: Mapping[str, str] = field(default_factory=dict)
     responses: frozenset[str] = frozenset()
     scope: str | None = None
 
     @cached_property
     def sheds(self) -> bool:
-        """Whether it is refused when there is too much to do; what watches the service is not."""
+        """True if it is refused under overload; monitoring operations are not."""
         return self.scope == "read"
 
     @cached_property
     def pure(self) -> bool:
-        """Whether its answer follows from the model and the request's line alone."""
+        """True if its response depends only on the model and the request line (cacheable)."""
         return "304" in self.responses
 
 
 @dataclass(frozen=True)
 class Contract:
-    """The contract's bytes, to be served as they are, what they say, and its operations."""
+    """A parsed contract.
+
+    source: bytes of the YAML file. document: the parsed file.
+    """
 
     source: bytes
     document: Mapping[str, Any]
@@ -52,27 +56,28 @@ class Contract:
 
     @property
     def version(self) -> str:
-        """Of the contract, not of the service."""
+        """Version of the contract (the service has another)."""
         return str(self.document["info"]["version"])
 
 
 def load() -> Contract:
-    """Contract that lies beside this module."""
+    """Return the contract in openapi.yaml beside this module."""
     source = Path(__file__).with_name("openapi.yaml").read_bytes()
     return parse(source)
 
 
 def parse(source: bytes) -> Contract:
-    """Contract of a document's bytes."""
+    """Return the contract of a YAML document."""
     document = yaml.load(source, yaml.CSafeLoader)
     return Contract(source, document, tuple(_operations(document)))
 
 
 def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
     for path, item in document["paths"].items():
-        for method in (m for m in METHODS if m in item):
-            given = [*item.get("parameters", []), *item[method].get("parameters", [])]
-            query = [p for p in (resolve(document, g) for g in given) if p["in"] == "query"]
+        for method in (m for m in item if m in METHODS):
+            listed = [*item.get("parameters", []), *item[method].get("parameters", [])]
+            given = [resolve(document, node) for node in listed]
+            query = [p for p in given if p["in"] == "query"]
             exploded = [p["name"] for p in query if p["schema"].get("type") == "object"]
             yield Operation(
                 id=item[method]["operationId"],
@@ -81,6 +86,7 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 query=frozenset(p["name"] for p in query) - set(exploded),
                 open_query=bool(exploded),
                 media_types=_media_types(document, item[method]["responses"]),
+                formats=_formats(path, given),
                 responses=frozenset(item[method]["responses"]),
                 scope=scope_of(item[method].get("security", document.get("security", []))),
             )
@@ -91,8 +97,24 @@ def _media_types(document: Mapping[str, Any], responses: Mapping[str, Any]) -> t
     return tuple(name for node in well for name in node.get("content", ()))
 
 
+def _formats(path: str, parameters: Sequence[Mapping[str, Any]]) -> Mapping[str, str]:
+    """Return the media types by format.
+
+    Raises ValueError if `enum` and `x-media-types` list different formats.
+    """
+    for given in (p for p in parameters if (p["in"], p["name"]) == ("path", "format")):
+        listed, media_types = given["schema"]["enum"], given["x-media-types"]
+        if listed != [*media_types]:
+            raise ValueError(f"{path}: formats {listed}, x-media-types of {[*media_types]}")
+        return dict(media_types)
+    return {}
+
+
 def scope_of(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
-    """The one scope of a security requirement; its other alternative is a service without keys."""
+    """Return the scope of a security requirement, None without one.
+
+    Raises ValueError for more than one scope.
+    """
     scopes = [scope for alternative in security for of in alternative.values() for scope in of]
     if len(scopes) > 1:
         raise ValueError(f"scopes {scopes}, expected one at most")
@@ -100,7 +122,7 @@ def scope_of(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
 
 
 def resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The node itself, or what its local $ref points to."""
+    """Return a node with its local $ref resolved."""
     found: Any = node
     while "$ref" in found:
         target, found = found["$ref"], document

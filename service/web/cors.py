@@ -1,7 +1,7 @@
-"""Which pages of other origins may read answers (CORS, the Fetch standard): none, if not told.
+"""CORS (Fetch standard): headers that allow pages of other origins to read responses.
 
-Credentials of a browser (cookies) are never allowed: who may ask is said by a header that the page
-sets itself, so that no page can ask in the name of whoever looks at it.
+The default allows no other origin. Browser credentials (cookies) are never allowed: clients
+authenticate by a header that the page sets, so a page cannot act with its visitor's identity.
 """
 
 import re
@@ -13,31 +13,34 @@ Headers = list[tuple[bytes, bytes]]
 
 EVERY = frozenset({b"*"})
 
-# Scheme, host in lower case, and the port where it is not the scheme's own: as browsers write it.
+# As browsers serialise it: scheme, host in lower case, and the port unless it is the default.
 _ORIGIN = re.compile(r"https?://([a-z0-9.-]+|\[[0-9a-f:]+\])(:[0-9]{1,5})?")
 
 _READABLE = b", ".join(
     (
         *(b"Allow", b"Content-Disposition", b"ETag", b"Retry-After", b"WWW-Authenticate"),
-        # Without it a page would take the length of compressed content for that of what it reads.
+        # Tells a page that Content-Length is that of compressed content.
         b"Content-Encoding",
         *(b"Posefield-Duration", b"Posefield-Inferred", b"Posefield-Missed", b"Posefield-Model"),
         *(b"Posefield-Sigma", b"Posefield-Supported", b"Posefield-Warning"),
-        *(b"X-Request-Id", b"Inference-Header-Content-Length"),
+        b"X-Request-Id",
     )
 )
 _TAKEN = b", ".join(
     (
-        *(b"Authorization", b"Content-Type", b"If-None-Match", b"Inference-Header-Content-Length"),
-        *(b"Prefer", b"Traceparent", b"Tracestate", b"X-Request-Id"),
+        *(b"Authorization", b"Content-Type", b"If-None-Match", b"Prefer"),
+        *(b"Traceparent", b"Tracestate", b"X-Request-Id"),
     )
 )
 _REMEMBERED = b"7200"
-"""Seconds that a browser need not ask again; more than two hours no browser takes."""
+"""Lifetime of a preflight response, s; browsers accept at most two hours."""
 
 
 def read(text: str, field: str) -> frozenset[bytes]:
-    """Origins of a text with commas between, or `*` for all; InvalidField where one is none."""
+    """Return the origins of a comma-separated text, `*` for all.
+
+    field: name of the setting. Raises InvalidField for an invalid origin.
+    """
     origins = frozenset(filter(None, (part.strip() for part in text.split(","))))
     if origins == {"*"}:
         return EVERY
@@ -48,12 +51,15 @@ def read(text: str, field: str) -> frozenset[bytes]:
 
 
 def headers(origin: bytes | None, allowed: frozenset[bytes]) -> Headers:
-    """What every answer says to a page's browser; origin: the request's, where it has one."""
+    """Return the CORS headers of a response.
+
+    origin: header Origin of the request, if any. allowed: origins of the settings.
+    """
     if not allowed:
         return []
     if allowed == EVERY:
         return [(b"access-control-allow-origin", b"*"), *_SHOWN]
-    # A cache has to keep the answers to different pages apart, and to no page at all.
+    # Caches must separate responses by origin, also those without one.
     varying = (b"vary", b"Origin")
     if origin not in allowed:
         return [varying]
@@ -64,7 +70,10 @@ _SHOWN = [(b"access-control-expose-headers", _READABLE)]
 
 
 def preflight(allow: bytes) -> Headers:
-    """What the answer to OPTIONS says beside `headers`; allow: the methods of the path."""
+    """Return the headers of a preflight response, beside `headers`.
+
+    allow: methods of the path.
+    """
     return [
         (b"access-control-allow-methods", allow),
         (b"access-control-allow-headers", _TAKEN),
@@ -73,5 +82,5 @@ def preflight(allow: bytes) -> Headers:
 
 
 def is_preflight(given: Mapping[bytes, bytes]) -> bool:
-    """Whether a browser asks with OPTIONS if it may ask otherwise; given: the request's headers."""
+    """Return True if an OPTIONS request with these headers is a CORS preflight."""
     return b"origin" in given and b"access-control-request-method" in given

@@ -1,7 +1,7 @@
-"""The crowd question as it travels: columns of JSON numbers to arrays.
+"""Crowd requests: decoding of the JSON body, with lists as columns, to arrays.
 
-All lists have one length, the number of characters; what is no list holds for each of them. Where
-nothing is a list there is one character.
+All lists have the same length, the number of characters; a scalar applies to each of them. Without
+a list there is one character.
 """
 
 from collections.abc import Sequence
@@ -13,22 +13,24 @@ import numpy as np
 
 from service.motion.conventions import Floats, Indices
 from service.motion.crowd import Placement
-from service.motion.errors import InvalidField
+from service.motion.errors import FormError, InvalidField
+from service.question import body as bodies
+from service.question.motion_question import Policy, Root
 from service.synthesis.crowd_question import Blending, CrowdQuestion
-from service.synthesis.question import POLICY, Policy, Root
 from service.synthesis.view import Camera, View
-from service.web import decoding
-from service.web.problems import pointer
+from service.web.problems import BODY_TOO_LARGE, RequestFault
 
 PIXELS = 1.0
-# JSON has one kind of number: 1.0 is a whole one.
+VALUES, FEWEST = 64, 100_000
+"""Maximum values of a character, and minimum number of characters that the limit allows for."""
+# float, since JSON has one number type: 1.0 is a valid level.
 Level = Annotated[float, msgspec.Meta(ge=0, le=127)]
 Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Numbers = float | list[float]
 
 
 class CameraBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Schema Camera of the contract."""
+    """Camera (schema of the contract)."""
 
     position: tuple[float, float, float]
     fov: float
@@ -36,9 +38,9 @@ class CameraBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Schema CrowdQuestion of the contract."""
+    """CrowdQuestion (schema of the contract)."""
 
-    controls: dict[str, msgspec.Raw]
+    controls: dict[str, Numbers]
     time: Numbers
     position: list[tuple[float, float, float]] | None = None
     heading: Numbers = 0.0
@@ -51,24 +53,21 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pixels: Annotated[float, msgspec.Meta(ge=0)] | None = None
     budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
     root: Root = "travelling"
-    extrapolate: Policy = POLICY
-
-
-_CROWD = msgspec.json.Decoder(CrowdBody)
-_NUMBERS: msgspec.json.Decoder[Numbers] = msgspec.json.Decoder(Numbers)
+    extrapolate: Policy = "warn"
 
 
 def of_body(content: bytes, most: float) -> CrowdQuestion:
-    """Question of a JSON body, of at most so many characters.
+    """Return the question of a JSON body.
 
-    RequestFault where it breaks the contract's form, InvalidField where it has no answer.
+    most: maximum number of characters. Raises FormError for a malformed body, InvalidField for
+    invalid values and RequestFault 413 for too many values.
     """
-    body = decoding.decoded(_CROWD, content)
-    controls = {name: _control(name, raw) for name, raw in body.controls.items()}
-    count = _count(controls, body, most)
+    _check_values(content, most)
+    body = bodies.question(CrowdBody, content)
+    count = _count(body, most)
     performers, performer = _performers(body.performer, count)
     return CrowdQuestion(
-        {name: _column(values, count) for name, values in controls.items()},
+        {name: _column(values, count) for name, values in body.controls.items()},
         _column(body.time, count),
         Placement(_positions(body.position, count), _column(body.heading, count)),
         performers,
@@ -80,18 +79,16 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
     )
 
 
-def _control(name: str, raw: msgspec.Raw) -> Numbers:
-    """Values of a control; decoded one by one because msgspec does not name a key at fault."""
-    try:
-        return _NUMBERS.decode(raw)
-    except msgspec.ValidationError as fault:
-        where = pointer("controls", name, *decoding.steps(str(fault)))
-        raise decoding.bad_body(f"{fault}, expected finite numbers", where) from None
+def _check_values(content: bytes, most: float) -> None:
+    """Raise RequestFault for more values than a valid body has: decoded, each takes 32 bytes."""
+    found, limit = content.count(b","), VALUES * max(most, FEWEST)
+    if found > limit:
+        raise RequestFault(BODY_TOO_LARGE, f"{found} values, expected at most {limit:.0f}")
 
 
-def _count(controls: dict[str, Numbers], body: CrowdBody, most: float) -> int:
-    """How many characters all lists are for."""
-    fields = {f"controls/{name}": values for name, values in controls.items()} | {
+def _count(body: CrowdBody, most: float) -> int:
+    """Return the number of characters; raises InvalidField for lists of different lengths."""
+    fields = {f"controls/{name}": values for name, values in body.controls.items()} | {
         name: getattr(body, name) for name in CrowdBody.__struct_fields__ if name != "controls"
     }
     sizes = {name: len(values) for name, values in fields.items() if isinstance(values, list)}
@@ -105,20 +102,21 @@ def _count(controls: dict[str, Numbers], body: CrowdBody, most: float) -> int:
 
 
 def _column(values: Numbers, count: int) -> Floats:
-    return np.array(values) if isinstance(values, list) else np.full(count, values)
+    """Return the values (N,), with 0 for -0."""
+    return (np.array(values) if isinstance(values, list) else np.full(count, values)) + 0.0
 
 
 def _positions(given: list[tuple[float, float, float]] | None, count: int) -> Floats:
     if given is None:
         return np.zeros((count, 3))
-    # Half the time that np.array takes with tuples.
-    return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3)
+    # np.fromiter takes half the time of np.array for tuples. Adding 0.0 turns -0 into 0.
+    return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3) + 0.0
 
 
 def _performers(
     given: str | list[str | None] | None, count: int
 ) -> tuple[tuple[str | None, ...], Indices]:
-    """Everybody who is asked for, once, and which of them each character is."""
+    """Return the distinct performers and the index (N,) of each character's performer."""
     if not isinstance(given, list):
         return (given,), np.zeros(count, dtype=np.int64)
     places = {name: place for place, name in enumerate(dict.fromkeys(given))}
@@ -139,7 +137,7 @@ def _levels(name: str, given: Sequence[float]) -> Indices:
     parts = np.flatnonzero(values % 1.0)
     if len(parts):
         place, found = str(parts[0]), values[parts[0]]
-        raise decoding.bad_body(f"{found:g}, expected a whole number", pointer(name, place))
+        raise FormError(f"{name}/{place}", f"{found:g}, expected a whole number")
     return values.astype(np.int64)
 
 

@@ -1,4 +1,4 @@
-"""How long an answer may take to begin."""
+"""Deadlines: maximum time until a response begins."""
 
 import asyncio
 import re
@@ -12,20 +12,20 @@ from service.web.problems import LATE, RequestFault
 Answer = TypeVar("Answer")
 
 LOOK = 0.1
-"""Seconds between two looks: a timer for each request would cost a tenth of a pose."""
+"""Seconds between two checks: a timer per request would take a tenth of a pose request's time."""
 
-# RFC 7240, 4.3: a client that has no use for an answer after so many seconds.
+# RFC 7240, 4.3: time after which the client needs no response, s.
 _WAIT = re.compile(rb"(?:^|[,;\s])wait\s*=\s*([0-9]{1,6})(?![0-9])", re.IGNORECASE)
 
 
 def seconds(prefer: bytes | None, most: float) -> float:
-    """The client's own patience, of a Prefer header, but never more than the service's."""
+    """Return the deadline of a request, s: `wait` of its Prefer header, at most `most`."""
     found = _WAIT.search(prefer) if prefer else None
     return min(most, float(found[1])) if found else most
 
 
 class Watch:
-    """The tasks of an event loop that have to end in time."""
+    """Requests of an event loop with their deadlines."""
 
     def __init__(self) -> None:
         self._until: dict[Task[Any], float] = {}
@@ -33,9 +33,9 @@ class Watch:
         self._looks = False
 
     async def within(self, limit: float, answer: Awaitable[Answer]) -> Answer:
-        """What is awaited; RequestFault where it takes longer than so many seconds.
+        """Await a response; raises RequestFault 503 if it takes longer than `limit` seconds.
 
-        What runs in a thread goes on to its end, and holds its place there until then.
+        The awaiting task is cancelled then, and `threads.run` asks the thread's work to stop.
         """
         task, loop = asyncio.current_task(), asyncio.get_running_loop()
         assert task is not None

@@ -1,10 +1,10 @@
-"""One request on its way to its answer, and what surrounds every answer."""
+"""Processing of one request: checks, operation, errors, common headers and telemetry."""
 
 import logging
 import os
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
@@ -24,7 +24,6 @@ from service.web import (
     metrics,
     negotiation,
     problems,
-    protocol,
 )
 from service.web.access import door
 from service.web.access.audit import Call
@@ -32,6 +31,7 @@ from service.web.access.principal import EVERYONE
 from service.web.contract import Operation
 from service.web.deadline import Watch
 from service.web.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
+from service.web.request_head import HeadLimits
 from service.web.routing import Map, Place, Route
 from service.web.service import Service
 from service.web.telling import trace
@@ -39,24 +39,29 @@ from service.web.telling import trace
 faults = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
-# A prefix of this process and a number: a random number for each would take four times as long.
+# Process prefix and counter: a random number per request would take four times as long.
 _PROCESS, _NUMBERS = os.urandom(12).hex(), count(1)
 
 
 @dataclass
 class Site:
-    """What lies at which path, what all of it may use, and how many requests are being answered;
-    missing: the fault of a path at which nothing lies."""
+    """State that all requests share.
+
+    places: routes by path. service: state that handlers share. missing: returns the error of an
+    unknown path. head_limits: limits on request heads. open: number of open requests. watch:
+    deadlines.
+    """
 
     places: Map
     service: Service
     missing: Callable[[str], Exception]
+    head_limits: HeadLimits
     open: int = 0
     watch: Watch = field(default_factory=Watch)
 
 
 class Exchange:
-    """A request, how far its answer is, and what will be noted of it."""
+    """One request, its response in progress and its facts for telemetry."""
 
     def __init__(self, site: Site, scope: Scope, receive: Receive, send: Send) -> None:
         self._begun = time.perf_counter()
@@ -73,7 +78,7 @@ class Exchange:
         self._span = site.service.telling.begin(self._headers)
 
     async def run(self) -> None:
-        """Answer, whatever happens, and note it."""
+        """Send the response, or that of the error, and record the request."""
         self._site.open += 1
         try:
             await self._finish(await self._response())
@@ -86,6 +91,7 @@ class Exchange:
             await self._fail()
         finally:
             self._site.open -= 1
+            self._site.service.bodies.release(self._scope.get("body_memory", 0))
             self._note()
 
     async def _fail(self) -> None:
@@ -105,8 +111,7 @@ class Exchange:
 
     async def _answer(self) -> Response:
         site, scope = self._site, self._scope
-        if protocol.FAULT in scope:
-            raise scope[protocol.FAULT]
+        site.head_limits.check(scope)
         found = site.places.find(scope["path"])
         if found is None:
             raise site.missing(scope["path"])
@@ -114,13 +119,13 @@ class Exchange:
         route = place.routes.get(scope["method"])
         if route is None:
             return self._other_method(place)
-        self._route = route
+        self._route, scope["format"] = route, route.format
         self._prepare(route)
         limit = deadline.seconds(self._headers.get(b"prefer"), site.service.settings.deadline)
         return await site.watch.within(limit, route.endpoint(self._request))
 
     def _other_method(self, place: Place) -> Response:
-        """Answer to OPTIONS, or the fault of a method that the path does not take."""
+        """Return the response to OPTIONS; raises RequestFault 405 for other methods."""
         method, allow = self._scope["method"], {"Allow": place.allow}
         if method != "OPTIONS":
             detail = f"{method}, expected one of {place.allow}"
@@ -131,12 +136,15 @@ class Exchange:
         return response
 
     def _prepare(self, route: Route) -> None:
-        """Refuse what needs no model, find the model, and see whether the client has the answer."""
+        """Check overload, access, query parameters, format, model and the client's cached response.
+
+        Raises RequestFault, QueryError for an unknown model, and NotModified.
+        """
         operation, site, scope = route.operation, self._site, self._scope
         if site.open > site.service.settings.concurrency and operation.sheds:
             detail = f"{site.open - 1} requests are being answered"
             raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
-        self._let_in(operation)
+        self._let_in(route)
         if scope["query_string"] and not operation.open_query:
             _check_parameters(self._request, operation)
         if route.compresses and b"accept-encoding" in self._headers:
@@ -144,7 +152,7 @@ class Exchange:
         if route.offers:
             scope["format"] = negotiation.format_of(self._request, route.offers)
         if "model" in scope["path_params"]:
-            key = _key(scope["path_params"])
+            key = scope["path_params"]["model"]
             scope["model"] = scope["library"].find(key)
             if operation.pure:
                 self._lifetime = site.service.lifetime(key)
@@ -153,28 +161,26 @@ class Exchange:
             self._lifetime = caching.PUBLIC + caching.AGAIN
             self._check_held(page.digest)
 
-    def _let_in(self, operation: Operation) -> None:
-        """Who asks, and the library as they may see it; RequestFault 401 or 403."""
+    def _let_in(self, route: Route) -> None:
+        """Set the request's principal and the library that it may read; raises RequestFault."""
         scope, service = self._scope, self._site.service
         scope["library"], scope["principal"] = service.library, EVERYONE
         if service.rules.closed:
-            call = Call(self._identity, scope["method"], operation.path)
-            known = door.check(service.rules, scope["headers"], operation.scope, call)
+            call, needed = Call(self._identity, scope["method"], route.path), route.operation.scope
+            known = door.check(service.rules, scope["headers"], needed, call)
             scope["principal"] = known
-            if operation.scope is not None:
+            if needed is not None:
                 asked = scope["path_params"].get("model")
                 scope["library"] = door.seen(service.library, known, asked, call)
 
     def _parts(self, route: Route) -> tuple[bytes, ...]:
-        """All that the answer to a pure question follows from."""
-        scope, chosen = self._scope, b""
-        if route.offers:
-            chosen = scope["format"].encode()
+        """Return all that the response of a pure operation depends on."""
+        scope, chosen = self._scope, (self._scope["format"] or "").encode()
         model, code = scope["model"], self._site.service.code
         return code, model.fingerprint, route.name, scope["query_string"], chosen
 
     def _check_held(self, *parts: bytes) -> None:
-        """Name the answer before it is made; NotModified where the client has it."""
+        """Set the entity tag; raises NotModified if the client has a response with this tag."""
         self._tag = caching.tag(*parts, coding=self._coding)
         given = self._headers.get(b"if-none-match")
         if given is not None and caching.held(given.decode("latin-1"), self._tag):
@@ -187,9 +193,12 @@ class Exchange:
         await response(self._scope, self._request.receive, self._sent)
 
     def _surrounding(self, response: Response) -> list[tuple[bytes, bytes]]:
-        """Headers that every answer has, or every answer of its kind."""
+        """Return the common headers: request id, security, connection, CORS and caching."""
         kind = browser.of(response.media_type, response.status_code)
         headers = [(b"x-request-id", self._identity.encode()), *kind]
+        if self._site.service.readiness.draining and "connection" not in response.headers:
+            # The client's next request must reach a process that continues to run.
+            headers.append((b"connection", b"close"))
         if origins := self._site.service.origins:
             headers += cors.headers(self._headers.get(b"origin"), origins)
         held = response.status_code in (200, 304)
@@ -209,10 +218,11 @@ class Exchange:
         await self._send(message)
 
     def _note(self) -> None:
-        """Count the request, and say it in one line."""
+        """Record the request in the metrics, the log and the trace."""
         took = time.perf_counter() - self._begun
         operation = self._route.operation.id if self._route else "none"
-        metrics.answered(operation, self._status, took, self._size)
+        form = self._scope.get("format")
+        metrics.answered(operation, form or "", self._status, took, self._size)
         telling = self._site.service.telling
         if telling.wanted:
             telling.end(self._span, self._line(operation, took))
@@ -225,6 +235,7 @@ class Exchange:
             "trace": trace(self._headers),
             "method": self._scope["method"],
             "operation": operation,
+            "format": self._scope.get("format"),
             "model": model.identity if model else None,
             "who": self._scope["principal"].name if "principal" in self._scope else None,
             "tag": self._tag,
@@ -238,12 +249,6 @@ def _request_id(headers: dict[bytes, bytes]) -> str:
     given = headers.get(b"x-request-id", b"")
     known = REQUEST_ID.fullmatch(given)
     return given.decode() if known else f"{_PROCESS}{next(_NUMBERS):08x}"
-
-
-def _key(parameters: Mapping[str, str]) -> str:
-    """Name of the model that a path leads to, or its name@contenthash."""
-    model = parameters["model"]
-    return f"{model}@{parameters['version']}" if "version" in parameters else model
 
 
 def _check_parameters(request: Request, operation: Operation) -> None:

@@ -1,7 +1,7 @@
-"""One JSON line for each request on standard error.
+"""Request log: one JSON line per request on standard error.
 
-Lines are gathered for a moment and written together: a system call for each would cost a tenth of
-what answering with a pose does.
+Lines are buffered briefly and written together: a system call per line would take a tenth of a pose
+request's time.
 """
 
 import asyncio
@@ -15,27 +15,27 @@ from typing import Any
 import orjson
 
 MOMENT = 0.05
-"""Seconds that a line may wait."""
+"""Maximum time of a line in the buffer, s."""
 
 PIECE = 4096
-"""Bytes that a pipe takes whole, so that lines of several processes do not mix."""
+"""Bytes that a pipe accepts atomically, so that lines of several processes do not interleave."""
 
 
 class Lines:
-    """Lines on their way to a file descriptor."""
+    """Buffer of log lines for a file descriptor."""
 
     def __init__(self, target: int) -> None:
         self._target = target
         self._held: list[bytes] = []
 
     def add(self, content: Mapping[str, Any]) -> None:
-        """Write this soon, in an event loop."""
+        """Buffer a line of JSON; a flush follows within MOMENT. Needs a running event loop."""
         if not self._held:
             asyncio.get_running_loop().call_later(MOMENT, self.flush)
         self._held.append(orjson.dumps(content, option=orjson.OPT_APPEND_NEWLINE))
 
     def flush(self) -> None:
-        """Write what is held."""
+        """Write the buffer."""
         held, self._held = self._held, []
         for piece in _pieces(held):
             _write(self._target, piece)
@@ -47,7 +47,7 @@ def _write(target: int, piece: bytes) -> None:
 
 
 def _pieces(lines: list[bytes]) -> list[bytes]:
-    """The lines joined to pieces that are written at once, a long line alone."""
+    """Return the lines joined to pieces of at most PIECE bytes; a longer line is a piece."""
     pieces, size = [[]], 0  # type: list[list[bytes]], int
     for line in lines:
         if size + len(line) > PIECE and pieces[-1]:
@@ -59,12 +59,15 @@ def _pieces(lines: list[bytes]) -> list[bytes]:
 
 
 def to_standard_error() -> Lines:
-    """Lines to where a container's log is read from."""
+    """Return a log buffer for standard error."""
     return Lines(sys.stderr.fileno())
 
 
 def moment(seconds: float) -> str:
-    """Time of day of a clock's reading, UTC, as RFC 3339 writes it."""
+    """Return a time in RFC 3339 form, UTC.
+
+    seconds: since 1970.
+    """
     whole = int(seconds)
     return f"{_second(whole)}.{int(1000 * (seconds - whole)):03d}Z"
 

@@ -1,7 +1,7 @@
-"""What an operator watches, in Prometheus' text format.
+"""Metrics in Prometheus' text format.
 
-Several worker processes write files in one folder, PROMETHEUS_MULTIPROC_DIR, and any of them
-answers for all; prometheus_client reads that variable when it is imported.
+Worker processes write files in one folder, PROMETHEUS_MULTIPROC_DIR, and each can report the
+metrics of all; prometheus_client reads that variable when it is imported.
 """
 
 import os
@@ -25,12 +25,16 @@ ROWS = (1, 2, 4, 8, 16, 32, 64)
 _LATENCY = prometheus.Histogram(
     "posefield_request_seconds",
     "Time from a request's head to the end of its answer",
-    ("operation", "status"),
+    ("operation", "format", "status"),
     buckets=SECONDS,
 )
-_BYTES = prometheus.Counter("posefield_sent_bytes", "Bytes of bodies of answers", ("operation",))
+_BYTES = prometheus.Counter(
+    "posefield_sent_bytes", "Bytes of bodies of answers", ("operation", "format")
+)
 _HELD = prometheus.Counter(
-    "posefield_not_modified", "Answers that clients had already: no model was asked", ("operation",)
+    "posefield_not_modified",
+    "Answers that clients had already: no model was asked",
+    ("operation", "format"),
 )
 _BATCH = prometheus.Histogram(
     "posefield_batch_rows", "Poses that one call of a graph answered together", buckets=ROWS
@@ -57,32 +61,41 @@ _BUILD = prometheus.Gauge(
 )
 _BUILD.labels(__version__).set(1)
 
-# Looking a child up takes a lock and a tuple; there are some hundred of them.
+# Cached since labels() takes a lock and builds a tuple; there are some hundred label sets.
 _latency = lru_cache(None)(_LATENCY.labels)
 _bytes = lru_cache(None)(_BYTES.labels)
 _held = lru_cache(None)(_HELD.labels)
 
 
-def answered(operation: str, status: int, seconds: float, size: int) -> None:
-    """Count a request that has been answered."""
-    _latency(operation, status).observe(seconds)
-    _bytes(operation).inc(size)
+def answered(operation: str, form: str, status: int, seconds: float, size: int) -> None:
+    """Count a request.
+
+    form: format of the response, empty without a choice. seconds: duration. size: bytes sent.
+    """
+    _latency(operation, form, status).observe(seconds)
+    _bytes(operation, form).inc(size)
     if status == 304:
-        _held(operation).inc()
+        _held(operation, form).inc()
 
 
 def batched(rows: int) -> None:
-    """Count a call of a graph for so many poses."""
+    """Count an inference call.
+
+    rows: poses of its batch.
+    """
     _BATCH.observe(rows)
 
 
 def open_now(count: int) -> None:
-    """Note how many requests are being answered."""
+    """Set the number of open requests."""
     _OPEN.set(count)
 
 
 def models(identities: Iterable[str], reloads: Mapping[str, int]) -> None:
-    """Note which versions of models answer, and what became of looking for new ones."""
+    """Set the versions of models in service and the counts of their reloads.
+
+    identities: as name@hash.
+    """
     now = {tuple(identity.split("@")) for identity in identities}
     for labels in now | _known:
         _MODEL.labels(*labels).set(labels in now)
@@ -95,7 +108,7 @@ _known: set[tuple[str, ...]] = set()
 
 
 def page() -> bytes:
-    """All of it as text, of all processes that share a folder."""
+    """Return all metrics as text, aggregated over the processes that share a folder."""
     if FOLDER not in os.environ:
         return prometheus.generate_latest()
     registry = prometheus.CollectorRegistry()
@@ -105,13 +118,16 @@ def page() -> bytes:
 
 @contextmanager
 def shared() -> Iterator[str]:
-    """A folder for the counters of several processes, gone with this one."""
+    """Yield a temporary folder for the metrics of several processes, and set FOLDER to it."""
     with TemporaryDirectory(prefix="posefield-metrics-") as folder:
         os.environ[FOLDER] = folder
         yield folder
 
 
 def gone(process: int) -> None:
-    """Forget what is counted of a living process alone, once it has ended."""
+    """Remove the live gauges of a process that has ended.
+
+    process: its id.
+    """
     if Path(os.environ.get(FOLDER, "")).is_dir():
         multiprocess.mark_process_dead(process)

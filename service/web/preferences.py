@@ -1,4 +1,4 @@
-"""Lists of what a client prefers: fields with weights from 0 to 1, RFC 9110 12.4.2."""
+"""Header lists with weights from 0 to 1 (quality values, RFC 9110, 12.4.2)."""
 
 import re
 
@@ -6,7 +6,7 @@ _WEIGHT = re.compile(r"q=(0(?:\.[0-9]{0,3})?|1(?:\.0{0,3})?)", re.IGNORECASE)
 
 
 def weighted(header: str) -> list[tuple[str, float]]:
-    """Names in lower case and their weights; a weight that cannot be read counts as none given."""
+    """Return the names, in lower case, and their weights; 1 for a missing or invalid weight."""
     return [_weighted(part) for part in header.split(",") if part.strip()]
 
 

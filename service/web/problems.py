@@ -1,6 +1,6 @@
-"""Errors as clients see them: class -> status and problem type, RFC 9457.
+"""Problem responses (RFC 9457): mapping of errors to statuses and problem types.
 
-The only module that knows both the errors of the domain and the statuses of HTTP.
+No other module maps domain errors to HTTP statuses.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from service.motion.errors import (
+    FormError,
     InvalidField,
     OutOfReach,
     OutsideSamples,
@@ -18,16 +19,21 @@ from service.motion.errors import (
     UnknownFormat,
     UnknownModel,
 )
+from service.question.body import pointer
 
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:posefield:problem:"
-INFERENCE = "/v2"
 PAGE = "/problems"
+LONGEST = 1000
+"""Maximum characters of a detail."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of problem: its status, the last part of its type and its title."""
+    """A kind of problem.
+
+    status: HTTP status code. name: last part of the type. title: short text for people.
+    """
 
     status: int
     name: str
@@ -35,25 +41,23 @@ class Kind:
 
     @property
     def type(self) -> str:
-        """What programs tell it by."""
+        """Problem type, a URN, which identifies the kind."""
         return TYPE_PREFIX + self.name
 
     @property
     def help(self) -> str:
-        """Header Link to what it means."""
+        """Value of the Link header to the documentation of the kind."""
         return f'<{PAGE}#{self.name}>; rel="help"'
 
 
 BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
 BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
-MALFORMED = Kind(400, "malformed-request", "This is not HTTP as the service reads it")
 UNAUTHENTICATED = Kind(401, "unauthenticated", "Nobody known asks")
 FORBIDDEN = Kind(403, "forbidden", "Whoever asks may not")
 NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
 METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
 NOT_ACCEPTABLE = Kind(406, "not-acceptable", "Nothing that is accepted is there")
 BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
-TOO_SLOW = Kind(408, "request-too-slow", "The request took too long to arrive")
 URL_TOO_LONG = Kind(414, "url-too-long", "The URL is too long")
 NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
 OVERLOADED = Kind(503, "overloaded", "The service has too much to do; ask again soon")
@@ -61,11 +65,11 @@ LATE = Kind(503, "late", "The answer took too long")
 NOT_READY = Kind(503, "not-ready", "The service should not be sent requests now")
 INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
 
+UNKNOWN_HOST = Kind(421, "unknown-host", "The service does not answer under this name")
 HEAD_TOO_LARGE = Kind(431, "head-too-large", "The request's head is too large")
-NO_CONNECTION_LEFT = Kind(503, "no-connection-left", "The service has no connection left")
 
-OF_WIRE = (MALFORMED, TOO_SLOW, URL_TOO_LONG, HEAD_TOO_LARGE, NO_CONNECTION_LEFT)
-"""What service/web/protocol.py refuses before any operation is known."""
+OF_HEAD = (UNKNOWN_HOST, URL_TOO_LONG, HEAD_TOO_LARGE)
+"""Kinds raised before routing; see service/web/request_head.py."""
 OF_LOAD = (OVERLOADED, LATE, NOT_READY)
 OF_REQUEST = (
     BAD_PARAMETER,
@@ -87,17 +91,18 @@ TABLE: dict[type[QueryError], Kind] = {
     OutOfReach: Kind(422, "out-of-reach", "A target cannot be reached"),
 }
 
-KINDS = (*OF_REQUEST, *OF_WIRE, *OF_LOAD, *TABLE.values(), INTERNAL)
+KINDS = (*OF_REQUEST, *OF_HEAD, *OF_LOAD, *TABLE.values(), INTERNAL)
 
 _IN_THE_PATH = ("model", "format")
 _REPEATED = {"times": "time", "targets": "target"}
-"""Fields that a query says by a parameter for each."""
+"""Fields that a query string gives as one parameter per element."""
 
 
 class RequestFault(Exception):
-    """A request that breaks the contract before any model is asked.
+    """Error of a request, with its kind of problem.
 
-    places: where the fault lies, as {"pointer": ...} or {"parameter": ...}.
+    kind: of the problem. detail: text for the client. place: location of the error, as
+    {"pointer": ...} or {"parameter": ...}. headers: of the response.
     """
 
     def __init__(
@@ -115,37 +120,56 @@ class RequestFault(Exception):
 
 
 def of_fault(request: Request, fault: RequestFault) -> Response:
-    """Answer to a request that breaks the contract."""
-    errors = [{**fault.place, "detail": fault.detail}] if fault.place else []
-    return _answer(request, fault.kind, fault.detail, errors, fault.headers)
+    """Return the response to a RequestFault."""
+    detail = _cut(fault.detail)
+    errors = [{**fault.place, "detail": detail}] if fault.place else []
+    return _answer(request, fault.kind, detail, errors, fault.headers)
 
 
 def of_query_error(request: Request, error: QueryError) -> Response:
-    """Answer to a question that has none."""
+    """Return the response to a QueryError."""
     place = _place(error, in_body=request.method == "POST")
-    errors = [{**place, "detail": error.message}]
-    return _answer(request, TABLE[type(error)], str(error), errors)
+    errors = [{**place, "detail": _cut(error.message)}]
+    return _answer(request, _kind(error, request.method), _cut(str(error)), errors)
+
+
+def _kind(error: QueryError, method: str) -> Kind:
+    if isinstance(error, FormError):
+        return BAD_BODY if method == "POST" else BAD_PARAMETER
+    return TABLE[type(error)]
 
 
 def within(error: QueryError, where: str) -> RequestFault:
-    """The same fault in one question of many; where: JSON pointer to that question."""
+    """Return the fault of one question of many.
+
+    where: JSON pointer to that question in the body.
+    """
     place = where + _place(error, in_body=True)["pointer"]
     detail = f"{place.removeprefix('/')}: {error.message}"
     return RequestFault(TABLE[type(error)], detail, {"pointer": place})
 
 
 def internal(request: Request) -> Response:
-    """Answer to a failure of the service: nothing of the failure but the request's id."""
+    """Return the response to an unexpected exception: the request id and no details."""
     return _answer(request, INTERNAL, "see the service's log under the id in `instance`", [])
 
 
+def _cut(detail: str) -> str:
+    """Return the detail, shortened in the middle to LONGEST: it may quote the request."""
+    if len(detail) <= LONGEST:
+        return detail
+    return f"{detail[: LONGEST - 105]} ... {detail[-100:]}"
+
+
 def _place(error: QueryError, in_body: bool) -> dict[str, str]:
-    """Where a field of a question stands in the request that asked it."""
+    """Return the location of an error's field in its request: a pointer or a parameter."""
     head, _, rest = error.field.partition("/")
+    if isinstance(error, FormError) and in_body:
+        return {"pointer": f"/{error.field}" if error.field else ""}
     if error.field in _IN_THE_PATH:
         return {"parameter": error.field}
     if in_body:
-        # A control's name is one key, whatever stands in it.
+        # A control's name is one key, even if it contains slashes.
         keys = [rest] if head == "controls" else rest.split("/")
         index = "" if error.index is None else str(error.index)
         return {"pointer": pointer(*filter(None, (head, *keys, index)))}
@@ -156,11 +180,6 @@ def _place(error: QueryError, in_body: bool) -> dict[str, str]:
     return {"parameter": rest or head}
 
 
-def pointer(*parts: str) -> str:
-    """JSON pointer, RFC 6901."""
-    return "".join("/" + part.replace("~", "~0").replace("/", "~1") for part in parts)
-
-
 def _answer(
     request: Request,
     kind: Kind,
@@ -169,9 +188,6 @@ def _answer(
     headers: Mapping[str, str] | None = None,
 ) -> Response:
     content = document(kind, detail, request.state.request_id, errors)
-    if request.scope["path"].startswith(INFERENCE):
-        # Clients of the Open Inference Protocol read nothing else.
-        content["error"] = detail
     sent = {"Link": kind.help, **(headers or {})}
     return Response(orjson.dumps(content), kind.status, sent, MEDIA_TYPE)
 
@@ -179,7 +195,7 @@ def _answer(
 def document(
     kind: Kind, detail: str, instance: str, errors: Sequence[Mapping[str, str]]
 ) -> dict[str, object]:
-    """Schema Problem of the contract."""
+    """Return a Problem (schema of the contract)."""
     return {
         "type": kind.type,
         "title": kind.title,

@@ -1,6 +1,7 @@
-"""Whether the service should be sent requests: its models answer as they did, and it is not ending.
+"""Readiness: the models give the same output as when opened, and the process is not draining.
 
-A new file that cannot be used is shown, and changes nothing: the version before it answers.
+A new model file that cannot be used is reported and does not affect readiness: the previous version
+stays in service.
 """
 
 import time
@@ -16,12 +17,15 @@ from service.web import problems
 from service.web.problems import RequestFault
 
 HELD = 1.0
-"""Seconds that a trial of the models is good for, however often one asks."""
+"""Lifetime of a cached test of the models, s."""
 
 
 class Readiness:
-    """Tries the newest model of each name with the question that it was checked with when it was
-    opened, whose answer must be the same to the byte. draining: the process is about to end."""
+    """Readiness of the service.
+
+    It tests the newest model of each name: the output for the trial question must equal, byte for
+    byte, that of the opening of the model. draining: the process is shutting down.
+    """
 
     def __init__(self, models: Models) -> None:
         self.models = models
@@ -30,8 +34,10 @@ class Readiness:
         self._wrong: list[str] = []
 
     def document(self, may_read: Callable[[str], bool]) -> dict[str, Any]:
-        """What answers, and what became of newer files, of the models whose names may be read;
-        RequestFault 503 when not ready."""
+        """Return the status, the models in service and the facts of reloads.
+
+        may_read: filter on the names of models. Raises RequestFault 503 when not ready.
+        """
         library = self.models.library
         if self.draining:
             raise RequestFault(problems.NOT_READY, "the service is ending")
@@ -48,7 +54,7 @@ class Readiness:
         }
 
     def _tested(self, library: Library) -> list[str]:
-        """Identities of the models that answer otherwise than they did."""
+        """Return the identities of the models whose output has changed."""
         now = time.monotonic()
         if self._tried is None or self._tried[0] is not library or now > self._tried[1] + HELD:
             self._wrong = [m.identity for m in library.models.values() if not _answers(m)]
@@ -74,6 +80,6 @@ def _told(reloads: Reloads, may_read: Callable[[str], bool]) -> dict[str, Any]:
 
 
 def _fault(fault: Fault) -> dict[str, str]:
-    # After a colon stand others' words, which may name paths: they are in the log.
+    # The text after a colon comes from libraries and may contain paths: it is only logged.
     detail = fault.error.message.partition(": ")[0]
     return {"model": fault.name, "version": fault.version, "detail": detail}

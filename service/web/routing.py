@@ -1,4 +1,7 @@
-"""Which operations lie at a path: one look-up for each part of it, however many there are."""
+"""Routing: a tree of path segments, with one look-up per segment.
+
+A path that ends in `{format}` has one entry per format, so that its look-up is as fast.
+"""
 
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,33 +20,47 @@ Endpoint = Callable[[Request], Awaitable[Response]]
 
 @dataclass(frozen=True)
 class Route:
-    """An operation and what answers it; offers: what Accept chooses among, if it does."""
+    """An operation at one path, and its endpoint.
+
+    format: format at the end of the path, None for a path without. offers: formats for the
+    negotiation by Accept; empty without negotiation.
+    """
 
     operation: Operation
     endpoint: Endpoint
+    format: str | None = None
     offers: Offers = ()
 
     @cached_property
+    def path(self) -> str:
+        """Path template of the contract, with the format filled in."""
+        return self.operation.path.replace("{format}", self.format or "")
+
+    @cached_property
     def name(self) -> bytes:
-        """Of the operation, as part of what an entity tag is made of."""
+        """The operationId, a part of entity tags."""
         return self.operation.id.encode()
 
     @cached_property
     def compresses(self) -> bool:
-        """Whether an answer may be sent in a content coding."""
-        return any(map(compression.pays, self.operation.media_types))
+        """True if a response may have a content coding."""
+        operation = self.operation
+        types = [operation.formats[self.format]] if self.format else operation.media_types
+        return any(map(compression.pays, types))
 
     @cached_property
     def vary(self) -> bytes:
-        """Which of the request's headers the answer depends on."""
+        """Value of the Vary header: request headers that the response depends on."""
         named = ("Accept", bool(self.offers)), ("Accept-Encoding", self.compresses)
         return ", ".join(name for name, heeded in named if heeded).encode()
 
 
 @dataclass(frozen=True)
 class Place:
-    """What lies at a path: its routes by method, HEAD among them, and all its methods as the header
-    Allow lists them."""
+    """Routes of one path.
+
+    template: path template. routes: by method, with HEAD. allow: value of the header Allow.
+    """
 
     template: str
     routes: Mapping[str, Route]
@@ -52,7 +69,11 @@ class Place:
 
 @dataclass
 class _Branch:
-    """The parts of paths that may follow; `any` is what takes every part, under a name."""
+    """Node of the tree.
+
+    fixed: children by segment. any: child of a path parameter, and `name` the parameter's name.
+    place: routes of the path that ends here.
+    """
 
     fixed: dict[str, "_Branch"] = field(default_factory=dict)
     any: "_Branch | None" = None
@@ -61,14 +82,18 @@ class _Branch:
 
 
 class Map:
-    """Places by path."""
+    """Routing table: places by path."""
 
     def __init__(self, routes: Iterable[Route]) -> None:
         self._root = _Branch()
         self.places: list[Place] = []
         by_path: dict[str, dict[str, Route]] = {}
+        self._formats: dict[str, dict[str, None]] = {}
         for route in routes:
-            by_path.setdefault(route.operation.path, {})[route.operation.method] = route
+            by_path.setdefault(route.path, {})[route.operation.method] = route
+            if route.format:
+                stem = route.path.removesuffix(f".{route.format}")
+                self._formats.setdefault(stem, {})[route.format] = None
         for path, own in by_path.items():
             self._add(_place(path, own))
 
@@ -80,7 +105,7 @@ class Map:
         self.places.append(place)
 
     def find(self, path: str) -> tuple[Place, dict[str, str]] | None:
-        """What lies at a path, and the values of the parameters in it; none of them is empty."""
+        """Return the place of a path and its non-empty path parameters; None if unknown."""
         branch, values = self._root, {}
         for part in path.split("/"):
             known = branch.fixed.get(part)
@@ -91,6 +116,13 @@ class Map:
                 return None
             branch = known
         return (branch.place, values) if branch.place else None
+
+    def other_formats(self, path: str) -> tuple[str, Iterable[str]] | None:
+        """Return the unknown format that a path ends in and the known formats of that path."""
+        asked = path.rpartition("/")[2].partition(".")[2]
+        found = self.find(path.removesuffix(f".{asked}"))
+        known = self._formats.get(found[0].template) if found else None
+        return (asked, known) if asked and known else None
 
 
 def _grown(branch: _Branch, part: str) -> _Branch:

@@ -1,15 +1,17 @@
-"""Bodies of answers that are sent while they are made."""
+"""Streaming of response bodies while they are generated."""
 
 from collections.abc import AsyncIterator, Iterable, Iterator
 
-from anyio import CapacityLimiter, to_thread
+from anyio import CapacityLimiter
+
+from service.web import threads
 
 ENOUGH = 1 << 18
-"""Bytes that are worth a change of threads, which takes a tenth of a millisecond."""
+"""Minimum bytes of a piece, since a thread switch per piece takes a tenth of a millisecond."""
 
 
 def gathered(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """The same bytes in pieces that are worth sending, none of them empty."""
+    """Yield the same bytes in pieces of at least ENOUGH bytes, except the last; none is empty."""
     held, size = [], 0
     for piece in pieces:
         held.append(piece)
@@ -21,10 +23,11 @@ def gathered(pieces: Iterable[bytes]) -> Iterator[bytes]:
         yield b"".join(held)
 
 
-async def sent(pieces: Iterator[bytes], limiter: CapacityLimiter) -> AsyncIterator[bytes]:
-    """The pieces, none of them empty, each made in a thread when the one before has been taken.
+async def sent(pieces: Iterator[bytes], places: CapacityLimiter) -> AsyncIterator[bytes]:
+    """Yield the pieces, each generated in a thread after the previous one was sent.
 
-    A client that goes away leaves the piece that is being made the last.
+    pieces: none may be empty. When the client disconnects, generation stops after the current
+    piece.
     """
-    while piece := await to_thread.run_sync(next, pieces, b"", limiter=limiter):
+    while piece := await threads.run(next, pieces, b"", places=places):
         yield piece

@@ -1,49 +1,62 @@
-"""What handlers of operations share."""
+"""Shared state and types of the operations' handlers."""
 
-import os
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import blake2b
+from typing import Generic
 
-from anyio import CapacityLimiter
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
+from service.encode.media import F
 from service.synthesis.library import Library
 from service.synthesis.synthesizer import Synthesizer
-from service.web import caching
+from service.web import caching, threads
 from service.web.access.policy import Policy
 from service.web.batching import Batcher
+from service.web.body import BodyMemory
 from service.web.readiness import Readiness
 from service.web.settings import Settings
 from service.web.telling import SILENT, Telling
 from service.web.writing import Desk
 
-# Crowds take as long as many clips: of their own, these threads hold nobody else up.
-CROWDS = CapacityLimiter(os.cpu_count() or 1)
-CLIPS = CapacityLimiter(os.cpu_count() or 1)
-
 
 @dataclass(frozen=True)
 class Page:
-    """A document, and headers that it is sent with."""
+    """A static document, created at the first request.
 
-    content: bytes
+    make: returns the content. headers_of: returns the response headers for a content.
+    """
+
     media_type: str
-    headers: Mapping[str, str] = field(default_factory=dict)
+    make: Callable[[], bytes]
+    headers_of: Callable[[bytes], Mapping[str, str]] = lambda _: {}
+
+    @cached_property
+    def content(self) -> bytes:
+        """Content of the document."""
+        return self.make()
+
+    @cached_property
+    def headers(self) -> Mapping[str, str]:
+        """Response headers of the document."""
+        return self.headers_of(self.content)
 
     @cached_property
     def digest(self) -> bytes:
-        """What its entity tag is made of."""
+        """Hash of the content, for its entity tag."""
         return blake2b(self.content, digest_size=16).digest()
 
 
 @dataclass(frozen=True)
 class Service:
-    """What every operation may use; contract: its version. pages: by
-    operationId."""
+    """Shared state of all operations.
+
+    contract: version of the contract. pages: by operationId. rules: access policy. origins: for
+    CORS. telling: log and traces. code: digest for entity tags. batcher: of pose requests. desk: of
+    file requests.
+    """
 
     readiness: Readiness
     settings: Settings
@@ -56,25 +69,48 @@ class Service:
     batcher: Batcher = field(default_factory=Batcher)
     desk: Desk = field(default_factory=Desk)
 
+    @cached_property
+    def bodies(self) -> BodyMemory:
+        """Memory limit on the bodies of open requests."""
+        return BodyMemory(self.settings.bodies_memory)
+
     def lifetime(self, model: str) -> bytes:
-        """How long an answer may be used unasked, by the model's name in its path."""
+        """Return the Cache-Control of a response.
+
+        model: key in the path, a name with or without a hash.
+        """
         return caching.lifetime(model, self.settings.alias_seconds, self.rules.closed)
 
     @property
     def library(self) -> Library:
-        """The models as they are now: to be taken once a request."""
+        """Current models; a reload can replace them, so read this once per request."""
         return self.readiness.models.library
 
 
 Handler = Callable[[Service, Request], Awaitable[Response]]
 
 
+@dataclass(frozen=True)
+class Formatted(Generic[F]):
+    """Handler of an operation with several response formats.
+
+    formats: by name, the default first. handler: called with the format that the path or Accept
+    has selected (`request.scope["format"]`).
+    """
+
+    formats: Mapping[str, F]
+    handler: Callable[[F, Service, Request], Awaitable[Response]]
+
+    def __call__(self, service: Service, request: Request) -> Awaitable[Response]:
+        return self.handler(self.formats[request.scope["format"]], service, request)
+
+
 def model(request: Request) -> Synthesizer:
-    """The model that a path names, which was found before the operation began."""
+    """Return the model of a request, which the exchange has put into its scope."""
     found: Synthesizer = request.scope["model"]
     return found
 
 
 async def made(quick: bool, make: Callable[[], bytes]) -> bytes:
-    """What `make` returns: at once if that is quick, else in a thread."""
-    return make() if quick else await run_in_threadpool(make)
+    """Return the result of `make`, called here if it is quick, else in a thread."""
+    return make() if quick else await threads.run(make)

@@ -1,4 +1,4 @@
-"""What an operator may choose, read once from the environment."""
+"""Settings of the service, read once from environment variables."""
 
 import os
 from collections.abc import Mapping
@@ -13,32 +13,37 @@ PREFIX = "POSEFIELD_"
 class Settings:
     """Settings of the service; each is read from POSEFIELD_ and its name in capitals.
 
-    host, port: where to listen; port 0 takes a free one. body_limit: bytes of a request body, and
-    crowd_body_limit of one that asks for a crowd. crowd_limit: characters of a crowd, and
-    crowd_poses: poses of all motions of one that walks. clips_body_limit: bytes of a body
-    that asks for many clips, clips_limit: how many, and clips_poses: frames of all of them.
-    grid_limit: points of a grid of sigma. output_limit: bytes of a clip or a crowd's poses.
-    grace: seconds that open requests get to finish after SIGTERM, and drain: seconds before that in
-    which the service still listens, but says that it is not ready. workers: processes that share
-    the port; 0 for as many as there are processors. reload: seconds from a look for new models to
-    the next; 0 for never. versions: older versions of a model that answer under their hash, and
-    versions_memory: bytes that all of those may take. concurrency: requests that a process answers
-    at a time, and deadline: seconds until an answer has to begin. alias_seconds: how long caches
-    may use an answer under a model's plain name without asking whether it is the newest's. log:
-    whether each request is told on standard error, in one line. inference_body_limit: bytes of a
-    body of tensors, and inference_poses: rows times times of one.
+    Limits are maxima; times are in seconds, sizes in bytes.
 
-    url_limit, head_limit: bytes of a URL, and of all header lines. head_time, body_time: seconds in
-    which a request's head and body have to arrive; idle_time: seconds that an unused connection
-    stays open; drain_time: seconds in which a client has to take what was sent; who sends or takes
-    4 KiB a second has longer. connections: how many may be open.
+    host, port: address to listen on; port 0 takes a free one. workers: processes that share the
+    port; 0 for the number of processors. log: "on" for one line per request on standard error.
+    concurrency: open requests of a process. deadline: time until a response begins. drain: time
+    after SIGTERM in which the service still listens and reports not ready. grace: time for open
+    requests to finish after that. unresponsive: time without an iteration of the event loop until a
+    process logs its stacks and ends, to be replaced; 0 for never.
 
-    origins: pages of other origins that may read answers, with commas between them.
+    body_limit: size of a request body. crowd_body_limit: of a crowd request. clips_body_limit: of a
+    request for many clips. bodies_memory: memory of the bodies of all open requests. url_limit,
+    head_limit: size of a URL and of all headers. idle_time: time until an idle connection is
+    closed. output_limit: size of a clip, of a crowd's poses and of a walking crowd.
 
-    keys, keys_file: API keys as lines of name, hash and scopes. open: whether everybody may ask on
-    an address that is not this machine's alone. metrics_open: whether /metrics needs no key.
-    jwt_keys: file or URL of the issuer's public keys; jwt_refresh: seconds between two looks at it;
-    jwt_leeway: seconds that clocks may differ by; jwt_scopes: name of the claim that holds scopes.
+    crowd_limit: characters of a crowd. crowd_poses: poses of all motions of a walking crowd.
+    crowd_frames: frames of each of these motions. clips_limit: clips of a request. clips_poses:
+    frames of all its clips. clips_targets: cost of all its targets. grid_limit: points of a grid
+    of sigma.
+
+    reload: time between two checks for new models; 0 for never. versions: older versions of a model
+    that stay available by hash. versions_memory: memory of all of these. alias_seconds: time for
+    which caches may use a response for a model's plain name without revalidation.
+
+    hosts: accepted host names, comma-separated; IP addresses are always accepted. origins: origins
+    that CORS allows, comma-separated.
+
+    keys, keys_file: API keys as lines of name, hash and scopes. open: allow a service
+    without credentials on addresses other than loopback. metrics_open: /metrics needs no
+    credentials. jwt_keys: file or URL of the token issuer's public keys. jwt_refresh: time between
+    two reads of it. jwt_issuer, jwt_audience, jwt_algorithm: required of tokens. jwt_leeway:
+    tolerance for clock differences. jwt_scopes: name of the claim with the scopes.
     """
 
     host: str = "127.0.0.1"
@@ -49,35 +54,37 @@ class Settings:
     crowd_limit: int = 100_000
     # USD takes 900 bytes for a pose of 31 joints.
     crowd_poses: int = 500_000
+    # Twenty minutes at 30 frames a second; a whole motion is in memory while its layer is written.
+    crowd_frames: int = 36_000
     # A clip with six controls, none rounded, a name and a performer takes 400 bytes.
     clips_body_limit: int = 8 * 1024 * 1024
     clips_limit: int = 10_000
     clips_poses: int = 1_000_000
-    # 50 ms of work.
+    # A target takes 3 to 12 ms of CPU time: at most 25 s in all, within the default deadline.
+    clips_targets: int = 2000
+    # 50 ms of CPU time.
     grid_limit: int = 65_536
     output_limit: int = 256 * 1024 * 1024
-    inference_body_limit: int = 32 * 1024 * 1024
-    inference_poses: int = 100_000
     grace: int = 10
-    # A pose takes a tenth of a millisecond, a thousand in flight a tenth of a second.
+    # A pose takes 0.1 ms, so a thousand open requests delay one by 0.1 s.
     concurrency: int = 1000
     deadline: int = 30
     alias_seconds: int = 0
     log: str = "on"
-    drain: int = 0
+    # Clients with open connections learn in this time to open new ones.
+    drain: int = 1
     workers: int = 1
     reload: int = 10
     versions: int = 2
     versions_memory: int = 64 * 1024 * 1024
     url_limit: int = 8 * 1024
     head_limit: int = 16 * 1024
-    head_time: int = 10
-    body_time: int = 20
-    # Longer than what usual proxies keep unused connections for: they should end them, not we.
+    # Longer than the default of common proxies: the proxy should close idle connections.
     idle_time: int = 75
-    drain_time: int = 30
-    # With twice as many about to end, the usual 1024 open files of a process are enough.
-    connections: int = 500
+    bodies_memory: int = 128 * 1024 * 1024
+    hosts: str = ""
+    # Long work runs in threads, so half a minute is a fault of the event loop, not load.
+    unresponsive: int = 30
     origins: str = ""
     keys: str = ""
     keys_file: str = ""
@@ -97,13 +104,13 @@ class Settings:
         _within("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
         _within("crowd_limit", self.crowd_limit, 1, 10_000_000)
         _within("crowd_poses", self.crowd_poses, 1, 50_000_000)
+        _within("crowd_frames", self.crowd_frames, 1, 50_000_000)
         _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
         _within("clips_limit", self.clips_limit, 1, 1_000_000)
         _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("clips_targets", self.clips_targets, 1, 1_000_000)
         _within("output_limit", self.output_limit, 64 * 1024, 1 << 34)
         _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
-        _within("inference_body_limit", self.inference_body_limit, 1, 1024 * 1024 * 1024)
-        _within("inference_poses", self.inference_poses, 1, 10_000_000)
         _within("grace", self.grace, 0, 600)
         _within("concurrency", self.concurrency, 1, 1_000_000)
         _within("deadline", self.deadline, 1, 3600)
@@ -117,11 +124,9 @@ class Settings:
         _within("versions_memory", self.versions_memory, 0, 1 << 40)
         _within("url_limit", self.url_limit, 256, 64 * 1024)
         _within("head_limit", self.head_limit, 1024, 256 * 1024)
-        _within("head_time", self.head_time, 1, 600)
-        _within("body_time", self.body_time, 1, 600)
         _within("idle_time", self.idle_time, 1, 3600)
-        _within("drain_time", self.drain_time, 1, 3600)
-        _within("connections", self.connections, 1, 100_000)
+        _within("bodies_memory", self.bodies_memory, 1024 * 1024, 1 << 40)
+        _within("unresponsive", self.unresponsive, 0, 3600)
         _within("jwt_leeway", self.jwt_leeway, 0, 600)
         _within("jwt_refresh", self.jwt_refresh, 10, 86_400)
 
@@ -129,9 +134,9 @@ class Settings:
 def read(
     host: str | None = None, port: int | None = None, environ: Mapping[str, str] = os.environ
 ) -> Settings:
-    """Settings of the environment, but the host and port of the command line where given.
+    """Return the settings of the environment; host and port of the command line override them.
 
-    Raises InvalidField for a variable or value that cannot be used.
+    Raises InvalidField for an invalid value.
     """
     found = {f.name: (f.default, environ.get(PREFIX + f.name.upper())) for f in fields(Settings)}
     values = {
@@ -148,7 +153,10 @@ def read(
 
 
 def _parse(name: str, default: object, text: str) -> str | int:
-    """Value of a variable, of the type that the setting's default has."""
+    """Return the value of a variable, of the type of the setting's default.
+
+    Raises InvalidField for invalid text.
+    """
     if isinstance(default, str):
         return text
     if isinstance(default, bool):

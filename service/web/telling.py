@@ -1,4 +1,4 @@
-"""What is told of requests: a line in the log, a span in a trace, or neither."""
+"""Telemetry of requests: log lines and trace spans, both optional."""
 
 import re
 from collections.abc import Mapping
@@ -8,35 +8,41 @@ from typing import Any
 from service.web.log import Lines
 from service.web.tracing import Tracer
 
-# Of the W3C's Trace Context, version 00.
+# Header traceparent of the W3C Trace Context, version 00.
 _PARENT = re.compile(rb"00-([0-9a-f]{32})-[0-9a-f]{16}-[0-9a-f]{2}")
 
 
 @dataclass(frozen=True)
 class Telling:
-    """Where to, if anywhere."""
+    """Telemetry outputs.
+
+    lines: request log. tracer: of spans. Each is None if disabled.
+    """
 
     lines: Lines | None = None
     tracer: Tracer | None = None
 
     @property
     def wanted(self) -> bool:
-        """Whether there is anybody to tell."""
+        """True if the log or tracing is enabled."""
         return self.lines is not None or self.tracer is not None
 
     def begin(self, headers: Mapping[bytes, bytes]) -> Any:
-        """Span of a request with these headers; none where nobody traces."""
+        """Return the span of a request with these headers; None without tracing."""
         return None if self.tracer is None else self.tracer.begin(headers)
 
     def end(self, span: Any, line: Mapping[str, Any]) -> None:
-        """Tell of a request that has been answered."""
+        """Log a request and end its span.
+
+        line: facts of the request.
+        """
         if self.lines is not None:
             self.lines.add(line)
         if self.tracer is not None:
             self.tracer.end(span, line)
 
     def close(self) -> None:
-        """Tell what is still held, before the process ends."""
+        """Write buffered lines and spans, before the process ends."""
         if self.lines is not None:
             self.lines.flush()
         if self.tracer is not None:
@@ -47,6 +53,6 @@ SILENT = Telling()
 
 
 def trace(headers: Mapping[bytes, bytes]) -> str | None:
-    """The trace that a request's headers say it is part of."""
+    """Return the trace id in a request's headers; None without a valid one."""
     found = _PARENT.fullmatch(headers.get(b"traceparent", b""))
     return found[1].decode() if found else None

@@ -1,7 +1,8 @@
-"""Traces for OpenTelemetry, where OTEL_EXPORTER_OTLP_ENDPOINT says where to: a span a request.
+"""OpenTelemetry tracing, enabled by OTEL_EXPORTER_OTLP_ENDPOINT: one span per request.
 
-Its own middleware takes as long as a pose does, sampled or not; here nothing is done without an
-endpoint, and little with one. The SDK reads its own variables (OTEL_SERVICE_NAME and others).
+OpenTelemetry's ASGI middleware takes as long as a pose request, sampled or not; this module costs
+nothing without an endpoint and little with one. The SDK reads its own variables
+(OTEL_SERVICE_NAME and others).
 """
 
 import importlib
@@ -17,7 +18,7 @@ _CONTEXT = (b"traceparent", b"tracestate")
 
 
 class Tracer:
-    """Begins and ends spans of a provider of OpenTelemetry's SDK."""
+    """Tracer of requests with a provider of OpenTelemetry's SDK."""
 
     def __init__(self, provider: Any) -> None:
         self._provider = provider
@@ -27,13 +28,13 @@ class Tracer:
         self._propagator = context.TraceContextTextMapPropagator()
 
     def begin(self, headers: Mapping[bytes, bytes]) -> Any:
-        """Span of a request with these headers, within the trace that they name."""
+        """Return a new span of a request, a child of the span that its headers name."""
         carrier = {n.decode(): headers[n].decode("latin-1") for n in _CONTEXT if n in headers}
         context = self._propagator.extract(carrier)
         return self._tracer.start_span("request", context, self._trace.SpanKind.SERVER)
 
     def end(self, span: Any, line: Mapping[str, Any]) -> None:
-        """End a span with what the log says of the request."""
+        """End a span, with attributes from the facts of the request."""
         span.update_name(f"{line['method']} {line['operation']}")
         for name, field in _ATTRIBUTES.items():
             if line[field] is not None:
@@ -43,7 +44,7 @@ class Tracer:
         span.end()
 
     def close(self) -> None:
-        """Send what is held."""
+        """Export buffered spans."""
         self._provider.shutdown()
 
 
@@ -52,15 +53,16 @@ _ATTRIBUTES = {
     "http.response.status_code": "status",
     "http.response.body.size": "bytes",
     "posefield.operation": "operation",
+    "posefield.format": "format",
     "posefield.model": "model",
     "posefield.request": "request",
 }
 
 
 def of(environ: Mapping[str, str] = os.environ) -> Tracer | None:
-    """Tracer that sends spans to the endpoint that is set; none where there is none.
+    """Return the tracer of the configured endpoint; None without an endpoint.
 
-    Raises InvalidField where one is set and the SDK is not installed.
+    Raises InvalidField for an endpoint without the SDK installed.
     """
     named = [name for name in ENDPOINTS if environ.get(name)]
     if not named:

@@ -1,45 +1,47 @@
-"""Files that several clients wait for at once, written a few at a time in a thread.
+"""Batching of concurrent clip encodings in a thread.
 
-A writer of files shares much of its work among the clips that it is given together, and a change of
-threads costs a tenth of a millisecond. Nobody waits for others to come: what has come while the
-last files were written is written next.
+Encoders share much of their work among the clips of a call, and a thread switch takes a tenth of a
+millisecond. There is no timer: requests that arrive during a batch form the next one.
 """
 
 import asyncio
 from asyncio import Future, Task
+from contextvars import Context, copy_context
 
 from anyio import to_thread
 
 from service.encode import Encoder
 from service.encode.convention import Convention
+from service.motion import cancel
 from service.motion.answer import ClipAnswer
+from service.web import threads
 
 MOST = 16
-"""Files that are written together: the last waits for the first."""
+"""Maximum files of a batch: all of its requests wait for the whole batch."""
 
 LONG = 1000
-"""Frames beyond which a clip is written by itself, so that no short one waits for it."""
+"""Maximum frames of a clip in a batch, so that short clips do not wait for long ones."""
 
 Waiting = list[tuple[ClipAnswer, "Future[bytes]"]]
 
 
 class Desk:
-    """What an event loop's clients wait for, by format and convention."""
+    """Queues of clips to encode in an event loop, by format and convention."""
 
     def __init__(self) -> None:
         self._waiting: dict[tuple[str, Convention], Waiting] = {}
         self._tasks: set[Task[None]] = set()
 
     async def file(self, encoder: Encoder, convention: Convention, answer: ClipAnswer) -> bytes:
-        """File of an answer; the same bytes whatever is written with it."""
+        """Return the file of an answer; the batch does not affect its bytes."""
         if len(answer.clip) > LONG:
-            return await to_thread.run_sync(encoder.encode, answer, convention)
+            return await threads.run(encoder.encode, answer, convention)
         future: Future[bytes] = asyncio.get_running_loop().create_future()
         key = encoder.extension, convention
         if key not in self._waiting:
             self._waiting[key] = []
-            task = asyncio.create_task(self._write(encoder, convention))
-            # The loop itself holds no task for long.
+            task = asyncio.create_task(self._write(encoder, convention), context=_nobodys())
+            # The event loop keeps only weak references to tasks.
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
         self._waiting[key].append((answer, future))
@@ -51,6 +53,13 @@ class Desk:
             self._waiting[key] = waiting[MOST:]
             await _written(encoder, convention, waiting[:MOST])
         del self._waiting[key]
+
+
+def _nobodys() -> Context:
+    """Return a context without a request's cancellation: a batch serves several requests."""
+    context = copy_context()
+    context.run(cancel.current.set, None)
+    return context
 
 
 async def _written(encoder: Encoder, convention: Convention, own: Waiting) -> None:

@@ -1,4 +1,4 @@
-"""A crowd as a file and a folder beside it."""
+"""Crowds as a file and a folder beside it."""
 
 import re
 from pathlib import Path
@@ -12,9 +12,9 @@ OURS = re.compile(r"(m\d{5,}|character|summary)\.usdc")
 
 
 def write(crowd: CrowdClip, path: Path, instanced: bool) -> None:
-    """Put both in place, whole, instead of a crowd that was there before.
+    """Write a crowd's file and folder atomically, replacing an earlier crowd.
 
-    Raises FileError where the folder holds what no crowd left there, which would be lost.
+    Raises FileError if the folder contains other files than a crowd's layers, which would be lost.
     """
     folder = path.with_name(f"{path.stem}_clips")
     _ours(folder)

@@ -1,4 +1,4 @@
-"""The motions of a crowd, one after the other, as samples that USD takes."""
+"""Motions of a crowd as USD samples, one at a time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,15 +14,18 @@ from service.encode.content import Content, Samples
 from service.encode.convention import METRES
 from service.encode.crowd import reach
 from service.encode.crowd.reach import Hull
-from service.encode.press import CRATES
+from service.encode.press import CRATES, Press
 from service.motion.conventions import Floats, Indices
 from service.motion.crowd import CrowdClip, Motions
 
 
 @dataclass(frozen=True)
 class Note:
-    """What is kept of a motion once it is written: its box (2, 3), m, and its level of detail by
-    the frames from which it holds."""
+    """Facts of a motion that are kept after it is written.
+
+    box (2, 3): lowest and highest corner, m. levels: level of detail by the first frame at which it
+    applies.
+    """
 
     box: Floats
     levels: dict[int, int]
@@ -30,24 +33,27 @@ class Note:
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of translations (F, J, 3) and of rotations (F, J, 4), real part last; its note."""
+    """Samples of one motion and its note.
+
+    samples: translations (F, J, 3), and rotations (F, J, 4), real part last.
+    """
 
     samples: Samples
     note: Note
 
 
 def count(crowd: CrowdClip) -> int:
-    """How many motions the characters play."""
+    """Return the number of motions that the characters play."""
     return int(crowd.motion.max()) + 1
 
 
 def each(crowd: CrowdClip, rig: Rig) -> Iterator[Motion]:
-    """The motions in order; of the batches one is held, and none while the next is made.
+    """Yield the motions in order; at most one batch is in memory at a time.
 
-    Raises ValueError where there are more or fewer than the characters play, or other frames.
+    Raises ValueError for a number of motions other than the characters play, and for other shapes.
     """
     made, hull = 0, reach.hull(rig)
-    # A loop over the batches would hold on to each until it has the next.
+    # The variable of a for loop would keep each batch in memory while the next is computed.
     for motion in chain.from_iterable(map(partial(_of, crowd, hull), crowd.batches)):
         made += 1
         yield motion
@@ -55,9 +61,9 @@ def each(crowd: CrowdClip, rig: Rig) -> Iterator[Motion]:
         raise ValueError(f"{made} motions, expected {count(crowd)}")
 
 
-def layer(rig: Rig, rate: float, samples: Samples) -> bytes:
-    """Binary layer of one motion."""
-    return CRATES.write(Animations(rate, METRES, rig.paths), Content(samples, {}, facts.NONE))
+def layer(rig: Rig, rate: float, samples: Samples, press: Press = CRATES) -> bytes:
+    """Return the binary layer of one motion, written by `press`."""
+    return press.write(Animations(rate, METRES, rig.paths), Content(samples, {}, facts.NONE))
 
 
 def _of(crowd: CrowdClip, hull: Hull, batch: Motions) -> Iterator[Motion]:
@@ -72,6 +78,6 @@ def _of(crowd: CrowdClip, hull: Hull, batch: Motions) -> Iterator[Motion]:
 
 
 def _changes(levels: Indices) -> dict[int, int]:
-    """Level by frame, of the first frame and of those whose level is not the frame's before."""
+    """Return the level by frame, for the first frame and each frame at which it changes."""
     changed = np.flatnonzero(np.diff(levels, prepend=levels[0] - 1))
     return {int(frame): int(levels[frame]) for frame in changed}

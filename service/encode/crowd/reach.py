@@ -1,8 +1,8 @@
-"""Boxes that the characters of a crowd never leave.
+"""Extents of the characters of a crowd.
 
-All of them share one body, drawn for the model's own bones, while each has bones of its own. Of
-the body each end of a bone's box is held by a ball about the joint or tip that it is nearest to
-among those that turn with it: the same for all frames, and never too small.
+All characters share one body mesh, made for the model's own bones, while each has its own bone
+offsets. Each end of a bone's box is bounded by a sphere about the nearest of its joint and the
+joint's children; the radii are the same for all frames and never too small.
 """
 
 from dataclasses import dataclass
@@ -26,10 +26,11 @@ CORNERS = np.array(list(product((False, True), repeat=3)))
 
 @dataclass(frozen=True)
 class Hull:
-    """The E ends of a body's boxes: where they are and which points hold them.
+    """The E ends of a body's boxes, and the points about which spheres bound them.
 
-    ends (E, 3) in the frame of the joint that each turns with, radii (E,), m. holders (E,): that
-    joint, or, where `moved`, a joint or tip that hangs on it, whose place hangs on the offsets.
+    ends (E, 3): in the frame of the joint that each is skinned to, m. radii: (E,), m. holders (E,):
+    that joint or, where `moved`, one of its child joints or tips, whose position depends on the
+    bone offsets.
     """
 
     tree: Tree
@@ -40,7 +41,7 @@ class Hull:
 
 
 def hull(rig: Rig) -> Hull:
-    """Hull of a rig's body."""
+    """Return the hull of a rig's body."""
     joints, offsets = rig.skeleton, rig.skeleton.offsets
     drawn, turning = body.boxes(joints, rig.bones, offsets), rig.bones.joints
     starts = drawn.starts - joints.at_rest(offsets)[turning]
@@ -50,12 +51,12 @@ def hull(rig: Rig) -> Hull:
 
 
 def boxes(hull: Hull, made: Moves) -> Floats:
-    """Lowest and highest corner (M, 2, 3) of all that each motion does in its own frame, m."""
+    """Return the lowest and highest corner (M, 2, 3) of each motion in its own frame, m."""
     return reach.boxes(hull.tree, made, _balls(hull, made.offsets))
 
 
 def placed(placement: Placement, boxes: Floats) -> Floats:
-    """Lowest and highest corner (2, 3) of boxes (N, 2, 3) that stand where the characters do, m."""
+    """Return a box (2, 3) in the world, m, around boxes (N, 2, 3) of placed characters."""
     low, high = boxes[:, 0], boxes[:, 1]
     corners = np.where(CORNERS, high[:, None], low[:, None])
     moved = quat.rotate(placement.turns[:, None], corners) + placement.positions[:, None]
@@ -71,7 +72,7 @@ def _holder(rig: Rig, joint: int, end: Floats) -> int:
 
 
 def _balls(hull: Hull, offsets: Singles) -> Floats:
-    """Radius (M, P) about each joint and tip within which the ends lie that it holds."""
+    """Return the radius (M, P) of the sphere about each joint and tip, m."""
     tips = np.broadcast_to(hull.tree.tips, (len(offsets), *hull.tree.tips.shape))
     anchors = np.concatenate([offsets, tips], axis=1)[:, hull.holders]
     reached = hull.ends - np.where(hull.moved[:, None], anchors, 0.0)

@@ -1,16 +1,16 @@
-"""What a crowd's layer holds but for its motions: the model hierarchy and who stands where.
+"""Scene hierarchy of a crowd: prototype, characters and their placement, without the motions.
 
     /Crowd                      assembly, the default prim
       Prototype                 class, the one character that all others refer to
-      Motions                   a SkelAnimation for each motion, outside of what is instanced
+      Motions                   a SkelAnimation for each motion, outside of the instances
         m00000
       Characters                group
-        c00000                  component: refers to the prototype, stands, is bound to a motion
+        c00000                  component: refers to the prototype, is placed, bound to a motion
 
-USD never forgets a name, so they are few and always the same.
+USD never frees a name, so names are few and constant.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from pxr import Sdf, Vt
 
 from service.encode import facts, layers, specs
 from service.encode.specs import Type
-from service.motion import quat
+from service.motion import cancel, quat
+from service.motion.conventions import Indices
 from service.motion.crowd import CrowdClip, Placement
 
 ROOT = Sdf.Path("/Crowd")
@@ -26,21 +27,32 @@ PROTOTYPE = ROOT.AppendChild("Prototype")
 MOTIONS = ROOT.AppendChild("Motions")
 CHARACTERS = ROOT.AppendChild("Characters")
 MODEL = ("GeomModelAPI",)
+BLOCK = 500
+"""Characters that are written at a time."""
 
 
 def motion(index: int) -> str:
-    """Name of a motion."""
+    """Return the name of a motion's prim."""
     return f"m{index:05}"
 
 
 def character(index: int) -> str:
-    """Name of a character."""
+    """Return the name of a character's prim."""
     return f"c{index:05}"
 
 
-def new(crowd: CrowdClip) -> Any:
-    """Layer that states what the crowd is, with no character yet; the caller must keep it."""
-    made = Sdf.Layer.CreateAnonymous("crowd.usda")
+def place_of(index: int) -> Any:
+    """Return the path of a character."""
+    return CHARACTERS.AppendChild(character(index))
+
+
+def new(crowd: CrowdClip, form: str) -> Any:
+    """Return a layer with the crowd's metadata and no character; the caller must hold it.
+
+    form: usda or usdc, in which it will be exported. usd-core copies a layer of the other form
+    before it writes it, which takes half as much memory again.
+    """
+    made = Sdf.Layer.CreateAnonymous(f"crowd.{form}")
     layers.head(made, ROOT.name, crowd.frames, crowd.rate)
     made.customLayerData = {"posefield": facts.dictionary(crowd.facts)}
     specs.prim(made, ROOT.name, "Xform", MODEL).kind = "assembly"
@@ -48,37 +60,47 @@ def new(crowd: CrowdClip) -> Any:
 
 
 def group(made: Any) -> Any:
-    """New prim that holds the characters."""
+    """Return a new prim for the characters."""
     characters = specs.prim(made.GetPrimAtPath(ROOT), CHARACTERS.name, "Xform", MODEL)
     characters.kind = "group"
     return characters
 
 
 def payload(owner: Any, path: str) -> None:
-    """Let a prim be the default prim of another layer, which readers may leave out."""
+    """Set another layer's default prim as the payload of a prim; readers may leave it out."""
     owner.SetInfo("payload", Sdf.PayloadListOp.Create(prependedItems=[Sdf.Payload(path)]))
 
 
 def referring(made: Any, crowd: CrowdClip, instanced: bool) -> None:
-    """Every character as a reference to the prototype, which USD may draw as one where instanced.
+    """Add every character as a reference to the prototype, instanceable where `instanced`.
 
-    A prim cannot be added below an instance, so its root is what is bound to a motion.
+    A prim cannot be added below an instance, so each character's root is bound to its motion.
     """
-    characters = group(made)
-    prims = [specs.prim(characters, character(i), "SkelRoot") for i in range(len(crowd.motion))]
+    with Sdf.ChangeBlock():
+        characters = group(made)
     prototype = Sdf.ReferenceListOp.Create(prependedItems=[Sdf.Reference("", PROTOTYPE)])
-    for prim, played in zip(prims, crowd.motion, strict=True):
-        prim.SetInfo("references", prototype)
-        if instanced:
-            prim.SetInfo("instanceable", True)
-        specs.relation(prim, "skel:animationSource", MOTIONS.AppendChild(motion(played)))
-    place(prims, crowd.placement)
+    for some in blocks(crowd):
+        with Sdf.ChangeBlock():
+            prims = [specs.prim(characters, character(i), "SkelRoot") for i in some]
+            for prim, played in zip(prims, crowd.motion[some], strict=True):
+                prim.SetInfo("references", prototype)
+                if instanced:
+                    prim.SetInfo("instanceable", True)
+                specs.relation(prim, "skel:animationSource", MOTIONS.AppendChild(motion(played)))
+            place(prims, crowd.placement.of(some))
+
+
+def blocks(crowd: CrowdClip) -> Iterator[Indices]:
+    """Yield indices of characters in blocks, since a change block records changes until it ends."""
+    for first in range(0, len(crowd.motion), BLOCK):
+        cancel.check()
+        yield np.arange(first, min(first + BLOCK, len(crowd.motion)))
 
 
 def place(prims: Sequence[Any], placement: Placement) -> None:
-    """Let each prim stand where its character does.
+    """Set the transform of each prim to its character's placement.
 
-    As a matrix: one reader cannot take translations by whole numbers.
+    It is a matrix, since one reader does not support translations by whole numbers.
     """
     order = Vt.TokenArray(["xformOp:transform"])
     for prim, matrix in zip(prims, _matrices(placement), strict=True):
@@ -87,7 +109,7 @@ def place(prims: Sequence[Any], placement: Placement) -> None:
 
 
 def _matrices(placement: Placement) -> Any:
-    """matrix4d of each character, for row vectors: its rows are where the axes and origin go."""
+    """Return each character's matrix4d, for row vectors: images of the axes, then the origin."""
     matrices = np.tile(np.eye(4), (len(placement), 1, 1))
     matrices[:, :3, :3] = quat.rotate(placement.turns[:, None], np.eye(3))
     matrices[:, 3, :3] = placement.positions

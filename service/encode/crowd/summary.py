@@ -1,6 +1,6 @@
-"""What is known of a crowd once all its motions have been made: its boxes and levels of detail.
+"""Extents and levels of detail of a crowd, written after all its motions are computed.
 
-Written as opinions, so that they may stand in a layer of their own.
+They are written as opinions, so that they may be in a layer of their own.
 """
 
 from collections.abc import Sequence
@@ -17,32 +17,37 @@ from service.motion.conventions import Floats
 from service.motion.crowd import CrowdClip
 
 LEVEL = "posefield:level"
-"""Level of detail of a motion's frames, with a time sample where it changes."""
+"""Level of detail of a motion's frames, with a time sample at each change."""
 
 
 def referring(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
-    """Boxes of a crowd of references to one prototype, and levels of the motions."""
+    """Add extents to a crowd of references to one prototype, and levels to its motions."""
     _boxes(made, crowd, notes)
     every = _round([note.box for note in notes])
-    for path in (scene.PROTOTYPE, scene.PROTOTYPE.AppendChild("Body")):
-        _extent(made, path, every)
-    for index, note in enumerate(notes):
-        _levels(made, scene.MOTIONS.AppendChild(scene.motion(index)), note)
+    with Sdf.ChangeBlock():
+        for path in (scene.PROTOTYPE, scene.PROTOTYPE.AppendChild("Body")):
+            _extent(made, path, every)
+        for index, note in enumerate(notes):
+            _levels(made, scene.MOTIONS.AppendChild(scene.motion(index)), note)
 
 
 def flat(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
-    """Boxes of a crowd of which each character has its own body and motion, and their levels."""
+    """Add extents and levels to a crowd in which each character has its own body and motion."""
     _boxes(made, crowd, notes)
-    for index, played in enumerate(crowd.motion):
-        path = scene.CHARACTERS.AppendChild(scene.character(index))
-        _extent(made, path.AppendChild("Body"), notes[played].box)
-        _levels(made, path.AppendChild(scene.character(index)), notes[played])
+    for some in scene.blocks(crowd):
+        with Sdf.ChangeBlock():
+            for index, played in zip(some, crowd.motion[some], strict=True):
+                path = scene.place_of(index)
+                _extent(made, path.AppendChild("Body"), notes[played].box)
+                _levels(made, path.AppendChild(scene.character(index)), notes[played])
 
 
 def _boxes(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
     own = np.array([notes[played].box for played in crowd.motion])
-    for index, box in enumerate(own):
-        _extent(made, scene.CHARACTERS.AppendChild(scene.character(index)), box)
+    for some in scene.blocks(crowd):
+        with Sdf.ChangeBlock():
+            for index in some:
+                _extent(made, scene.place_of(index), own[index])
     whole = specs.vectors(reach.placed(crowd.placement, own))
     for path in (scene.ROOT, scene.CHARACTERS):
         _attribute(made, path.AppendProperty("extentsHint"), Type.Float3Array).default = whole

@@ -1,1 +1,1 @@
-"""Answers that meet what they are asked for: the reduced motion corrected until they do."""
+"""Answers that satisfy constraints: the smallest correction of the predicted reduced motion."""

@@ -1,4 +1,4 @@
-"""What a motion can be held to: each aim says what the motion has instead, and how to change it."""
+"""Constraints of a motion: measured quantities, their target values and gradients."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,43 +6,46 @@ from typing import Protocol
 
 import numpy as np
 
-from service.motion import measure
+from service.motion import cancel, measure
 from service.motion.conventions import Floats
 from service.motion.measure import AXES, TRAVELLED, Measure
 from service.synthesis.exact.scene import BESIDE, Scene
 
 Looked = tuple[Floats, Floats]
-"""Values (k,), and their gradients (k, numbers) by the numbers of the motion."""
+"""Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
 
 
 class Aim(Protocol):
-    """Something that can be measured, and the goal (k,) of it."""
+    """A measured quantity with a target value (k,)."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What is said of it: a name for all its values, or one for each."""
+        """One name for all values, or one name for each."""
 
     @property
     def unit(self) -> str:
-        """Unit of its values."""
+        """Unit of the values."""
 
     @property
     def goal(self) -> Floats:
-        """The values that are asked for."""
+        """Target values (k,)."""
 
     def look(self, scene: Scene, numbers: Floats) -> Looked:
-        """The values that a motion has, and their gradients."""
+        """Return the values of a motion and their gradients."""
 
     def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
-        """The values (n, k) of other reduced motions (n, r2 r1) that have everything else of this
-        one, at its moment."""
+        """Return the values (n, k) of other reduced motions (n, r2 r1) at the moment of this one.
+
+        All other numbers, such as the travel, are those of this motion.
+        """
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the middle of some joints is at a moment, along some axes, m.
+    """Constraint on the mean position of joints at a moment, along some axes, m.
 
-    moment: how it is found. at: the canonical frame, where that is given.
+    names: one for all axes, or one each. moment: rule that determines the moment. axes: indices of
+    the coordinates. goal: target values (k,). at: canonical frame, where the moment is a given one.
     """
 
     names: tuple[str, ...]
@@ -53,12 +56,12 @@ class Place:
     unit: str = "m"
 
     def frame(self, last: float) -> float | None:
-        """Canonical frame, of 0 to last, of the moment; None where it has to be looked for."""
+        """Return the moment's canonical frame, 0 to last; None if the motion determines it."""
         known = {"start": 0.0, "end": last, "landmark": self.at}
         return known.get(self.moment.at or "")
 
     def look(self, scene: Scene, numbers: Floats) -> Looked:
-        """Values and gradients."""
+        """Return the values and their gradients."""
         joints = self.moment.joints
         at = _moment(scene, numbers, self.moment, self.at)
         found = [scene.place(numbers, joint, at) for joint in joints]
@@ -67,7 +70,7 @@ class Place:
         return values[list(self.axes)], gradients[list(self.axes)]
 
     def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
-        """Values of other motions."""
+        """Return the values (n, k) of other motions."""
         at = _moment(scene, numbers, self.moment, self.at)
         found = [scene.among(numbers, motions, joint, at) for joint in self.moment.joints]
         return np.asarray(np.mean(found, axis=0)[:, list(self.axes)], np.float64)
@@ -75,7 +78,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Step:
-    """The greatest distance ahead that one foot gets of the other, m."""
+    """Constraint on the step length: the largest distance of one foot ahead of the other, m."""
 
     names: tuple[str, ...]
     moment: Measure
@@ -83,7 +86,7 @@ class Step:
     unit: str = "m"
 
     def look(self, scene: Scene, numbers: Floats) -> Looked:
-        """Values and gradients."""
+        """Return the value and its gradient."""
         at = _moment(scene, numbers, self.moment, 0.0)
         first, second = (scene.place(numbers, joint, at) for joint in self.moment.joints)
         ahead = first[0][2] - second[0][2]
@@ -91,7 +94,7 @@ class Step:
         return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
 
     def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
-        """Values of other motions."""
+        """Return the values (n, 1) of other motions."""
         at = _moment(scene, numbers, self.moment, 0.0)
         first, second = (scene.among(numbers, motions, j, at) for j in self.moment.joints)
         return np.abs(first - second)[:, 2:]
@@ -99,7 +102,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Travelled:
-    """How far a cycle goes, m, how fast, m/s, or how far it turns, degrees."""
+    """Constraint on the travel of a cycle: distance, m, speed, m/s, or turn, degrees."""
 
     names: tuple[str, ...]
     quantity: str
@@ -107,7 +110,7 @@ class Travelled:
     unit: str
 
     def look(self, scene: Scene, numbers: Floats) -> Looked:
-        """Values and gradients."""
+        """Return the value and its gradient."""
         log_duration, travel = scene.beside(numbers)
         duration = float(np.exp(log_duration))
         value = measure.travelled(self.quantity, travel, duration)
@@ -123,21 +126,22 @@ class Travelled:
         return np.array([value]), gradients
 
     def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
-        """Values of other motions: all the same, for none of it is in them."""
+        """Return the values (n, 1) of other motions: all equal, without their own travel."""
         return np.repeat(self.look(scene, numbers)[0][None], len(motions), axis=0)
 
 
 def look(aims: Sequence[Aim], scene: Scene, numbers: Floats) -> Looked:
-    """Values and gradients of several aims, one after the other."""
+    """Return the concatenated values and gradients of several constraints."""
+    cancel.check()
     found = [aim.look(scene, numbers) for aim in aims]
     return np.concatenate([v for v, _ in found]), np.vstack([g for _, g in found])
 
 
 def of_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> list[Aim]:
-    """Aims of measured controls: name, measure and goal of each.
+    """Return the constraints of measured controls, given as name, measure and target value.
 
-    Places of the same joints at the same moment are one aim: how far a hand is off counts as one
-    distance.
+    frames: number of canonical frames. Positions of the same joints at the same moment become one
+    constraint, so that its error is one distance.
     """
     aims: list[Aim] = []
     places: dict[Measure, list[tuple[str, int, float]]] = {}
@@ -158,12 +162,15 @@ def of_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> lis
 
 
 def _moment(scene: Scene, numbers: Floats, own: Measure, given: float) -> float:
-    """Canonical frame at which something is measured."""
+    """Return the canonical frame at which a quantity is measured.
+
+    given: frame of a landmark.
+    """
     last = scene.reduced.frames - 1
     if own.at in ("start", "end", "landmark"):
         return {"start": 0.0, "end": float(last), "landmark": given}[own.at]
-    # Where the moment has to be looked for: of an extreme, the gradient at that frame is that of
-    # the extreme itself.
+    # Determined by the motion: at an extreme, the gradient at that frame equals the gradient of the
+    # extreme.
     joints = own.joints if own.at != "farthest" else (0, *own.joints)
     places = np.arange(last + 1.0)
     positions = np.stack([scene.positions(numbers, joint, places) for joint in joints], axis=1)

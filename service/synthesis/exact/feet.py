@@ -1,8 +1,7 @@
-"""Feet that are to stay where they stand while the rest is corrected.
+"""Pinned feet: planted feet keep their predicted positions during a correction.
 
-A pin is an aim that may be missed by a centimetre or so: a foot that stands is looked at every so
-many frames, and asked to be where the prediction has it. Feet that slide there slide on: no
-correction of the reach mends them.
+A pin is a soft constraint with a standard deviation of LOOSE: positions of a planted foot every few
+frames, with the predicted ones as targets. Foot skate in the prediction remains.
 """
 
 from collections.abc import Sequence
@@ -15,14 +14,14 @@ from service.motion.measure import Measure
 from service.synthesis.exact.aims import Place
 from service.synthesis.exact.scene import Scene
 
-# By how much a pinned foot may still move, m: as many standard deviations as anything else.
+# Standard deviation of a pinned foot's position, m.
 LOOSE = 0.01
-# Of the canonical frames in which a foot stands, one in so many is pinned, and the last.
+# Of the canonical frames in which a foot is planted, every eighth is pinned, and the last.
 EVERY = 8
 
 
 def pins(scene: Scene, numbers: Floats, feet: Sequence[int]) -> list[Place]:
-    """Pins for the feet of a motion, wherever it has one on the ground."""
+    """Return the pins of the feet of a motion, for each foot where it is planted."""
     return [pin for foot in feet for pin in _of(scene, numbers, foot)]
 
 
@@ -37,7 +36,10 @@ def _of(scene: Scene, numbers: Floats, foot: int) -> list[Place]:
 
 
 def down(path: Floats) -> Truths:
-    """Whether a foot on a path (F, 3), m, stands at each frame: near its lowest, and not alone."""
+    """Return whether a foot on a path (F, 3), m, is planted at each frame (F,).
+
+    It is planted where its height is near its lowest for at least two consecutive frames.
+    """
     heights = path @ UP
     near = heights < heights.min() + PLANTED
     before, after = np.roll(near, 1), np.roll(near, -1)
@@ -47,7 +49,7 @@ def down(path: Floats) -> Truths:
 
 
 def _chosen(stands: Truths) -> list[int]:
-    """Some frames of each run in which it stands, the first and the last among them."""
+    """Return frames of each planted interval: every EVERY-th, including the first and the last."""
     frames = np.flatnonzero(stands)
     runs = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
     return [int(f) for run in runs if len(run) for f in {*run[::EVERY].tolist(), int(run[-1])}]

@@ -1,4 +1,4 @@
-"""What a question is held to: checked once, and made into aims."""
+"""Constraints of a question, validated."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,19 +6,22 @@ from dataclasses import dataclass
 from service.motion.card import Control, ModelCard
 from service.motion.errors import InvalidField
 from service.motion.measure import AXES, Measure
+from service.question import validation
+from service.question.motion_question import MotionQuestion, Target
 from service.synthesis import limits
 from service.synthesis.door import Question
-from service.synthesis.question import Hold, Target
 
-# Nobody reaches farther, m; float32 would still hold it.
+# Largest coordinate of a target, m: beyond any human reach, and well within float32.
 FARTHEST = 100.0
 MOST_TARGETS = 32
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A joint that is to be in a place (3,), m: where its moment is looked for, or at which time,
-    s."""
+    """Target position of a joint.
+
+    moment: rule that determines the moment. place: (3,), m. time: s, None for a moment without one.
+    """
 
     name: str
     moment: Measure
@@ -28,8 +31,11 @@ class Goal:
 
 @dataclass(frozen=True)
 class Goals:
-    """What a question is held to: measured controls with their values, targets, and whether feet
-    stay where they stand meanwhile."""
+    """Constraints of a question.
+
+    controls: measured controls with their target values. targets: target positions of joints.
+    pin_feet: true if planted feet keep their positions.
+    """
 
     controls: tuple[tuple[str, Measure, float], ...]
     targets: tuple[Goal, ...]
@@ -42,56 +48,40 @@ class Goals:
 NOTHING = Goals((), ())
 
 
-def of(card: ModelCard, question: Question, hold: Hold, correctable: bool) -> Goals:
-    """Goals of a question.
+def of(card: ModelCard, question: Question, asked: MotionQuestion) -> Goals:
+    """Return the constraints of a question.
 
-    Raises InvalidField for a control that cannot be measured on a motion, a joint that there is
-    not, a place or time that is none, two targets for one joint at one moment, and whatever has to
-    be exact of a file that cannot say it.
+    Raises InvalidField for a control that is not measured on a motion, an unknown joint, an invalid
+    position or time, and two targets for one joint at one moment.
     """
-    if not correctable:
-        _refuse_old(hold)
-        return NOTHING
-    if hold.pin_feet and not card.feet:
+    if asked.pin_feet and not card.feet:
         raise InvalidField("pin_feet", "true, but this model's recipe names no feet")
-    targets = tuple(_goal(card, i, target) for i, target in enumerate(hold.targets))
-    _refuse_twins(hold.targets, targets)
+    targets = tuple(_goal(card, i, target) for i, target in enumerate(asked.targets))
+    _refuse_twins(asked.targets, targets)
     taken = {goal.moment for goal in targets if goal.time is None}
-    named = hold.exact not in ("auto", "none")
+    named = asked.exact not in ("auto", "none")
     controls = []
-    for control in _exact(card, question, hold):
+    for control in _exact(card, question, asked):
         own = control.measure
         assert own is not None
         if own.quantity in AXES and Measure("height", own.joints, own.at, own.share) in taken:
-            # A target says where the same joint is to be: of controls that were not named it is
-            # the nearer word.
+            # The target of the same joint is more specific than a control that was not named in
+            # `exact`.
             if named:
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
         controls.append((control.name, own, question.controls[control.name]))
-    return Goals(tuple(controls), targets, hold.pin_feet)
+    return Goals(tuple(controls), targets, asked.pin_feet)
 
 
-def _refuse_old(hold: Hold) -> None:
-    if hold.targets:
-        raise InvalidField("targets", _OLD)
-    if hold.exact not in ("auto", "none"):
-        raise InvalidField("exact", _OLD)
-    if hold.pin_feet:
-        raise InvalidField("pin_feet", _OLD)
-
-
-_OLD = "this model's file is older than exact controls; expected none, or a model trained anew"
-
-
-def _exact(card: ModelCard, question: Question, hold: Hold) -> Sequence[Control]:
-    """Controls that the answer is held to."""
+def _exact(card: ModelCard, question: Question, asked: MotionQuestion) -> Sequence[Control]:
+    """Return the controls whose measured values the answer must match."""
     given = [c for c in card.controls if c.name not in question.inferred]
-    if hold.exact == "none":
+    if asked.exact == "none":
         return ()
-    if hold.exact == "auto":
+    if asked.exact == "auto":
         return [control for control in given if _movable(control)]
-    for name in hold.exact:
+    for name in asked.exact:
         control = card.control(name)
         if control is None:
             known = ", ".join(c.name for c in card.controls)
@@ -104,7 +94,7 @@ def _exact(card: ModelCard, question: Question, hold: Hold) -> Sequence[Control]
             )
         if name in question.inferred:
             raise InvalidField("exact", f"{name!r} was not given, expected a control that was")
-    return [control for control in given if control.name in hold.exact]
+    return [control for control in given if control.name in asked.exact]
 
 
 def _movable(control: Control) -> bool:
@@ -121,12 +111,12 @@ def _goal(card: ModelCard, index: int, target: Target) -> Goal:
     joint = card.skeleton.names.index(target.joint)
     if len(target.position) != 3:
         raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
-    x, y, z = (limits.number(f"{field}/position/{a}", v) for a, v in enumerate(target.position))
+    x, y, z = (validation.number(f"{field}/position/{a}", v) for a, v in enumerate(target.position))
     for axis, value in enumerate((x, y, z)):
-        limits.within(f"{field}/position/{axis}", value, -FARTHEST, FARTHEST, "m")
+        validation.within(f"{field}/position/{axis}", value, -FARTHEST, FARTHEST, "m")
     when = target.when
     if not isinstance(when, str):
-        time = limits.number(f"{field}/time", when)
+        time = validation.number(f"{field}/time", when)
         if not 0.0 <= time <= limits.durations(card)[1]:
             raise InvalidField(
                 f"{field}/time",

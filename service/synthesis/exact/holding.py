@@ -1,4 +1,4 @@
-"""From a question and what it is held to, to the motion that meets it."""
+"""Constrained motions: predictions and their nearest motions that satisfy constraints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,10 +22,11 @@ from service.synthesis.session import Session, State
 
 @dataclass(frozen=True)
 class Held:
-    """A motion that is held to something: its numbers, what they mean, and how near it comes.
+    """A motion, predicted or corrected.
 
-    state: what the model predicted. steps: of the correction. distance: at which the aims lay,
-    in standard deviations.
+    numbers: the motion as the variables of the correction. state: the model's prediction. met:
+    error of each constraint. steps: of the correction. distance: Mahalanobis distance of the
+    constraints from the prediction.
     """
 
     scene: Scene
@@ -37,21 +38,21 @@ class Held:
 
     @property
     def duration(self) -> float:
-        """Of the clip, s."""
+        """Duration of the clip, s."""
         return float(np.exp(self.scene.beside(self.numbers)[0])) * self._given
 
     @property
     def _given(self) -> float:
-        # What is no cycle keeps the duration that was predicted.
+        # Motions without cycles keep the predicted duration.
         return 1.0 if self.scene.cyclic else self.state.duration
 
     @property
     def travel(self) -> Floats:
-        """Way to the left and ahead, m, and change of heading, rad, of a whole cycle (3,)."""
+        """Travel of a whole cycle (3,): to the left and ahead, m, and change of heading, rad."""
         return self.scene.beside(self.numbers)[1]
 
     def poses(self, frames: Floats) -> tuple[Floats, Floats]:
-        """Rotations (S, J, 4) and root positions (S, 3), m, at canonical frames (S,)."""
+        """Return rotations (S, J, 4) and root positions (S, 3), m, at canonical frames (S,)."""
         scene = self.scene
         rotations, roots = scene.reduced.poses(scene.motion(self.numbers), frames)
         if not scene.cyclic:
@@ -62,36 +63,38 @@ class Held:
 
 @dataclass(frozen=True)
 class Bench:
-    """What corrections at one level of a model need, made once: the reduced tensor, and how
-    captured motions stray."""
+    """Data for corrections at one level of a model, computed once.
+
+    reduced: reduced tensor. spread: covariance of the residuals of captured motions.
+    """
 
     card: ModelCard
     reduced: Reduced
     spread: Spread
 
     def begun(self, state: State) -> Held:
-        """The motion as the model predicts it, held to nothing."""
+        """Return the predicted motion, without constraints."""
         scene = Scene(self.reduced, self.card.skeleton.parents, state.bones, self.card.cyclic)
         inner = self.reduced.motion(state.coefficients).ravel()
         beside = [np.log(state.duration), *state.way] if self.card.cyclic else []
         return Held(scene, np.concatenate([inner, beside]), state, ())
 
     def held(self, begun: Held, aims: Sequence[Aim], pins: Sequence[Aim] = ()) -> Held:
-        """The motion nearest to a predicted one that meets the aims, and its pins about."""
+        """Return the nearest motion that satisfies the constraints; pins are soft."""
         sigma, numbers = begun.state.sigma, begun.numbers
         found = meet.meet(begun.scene, self.spread, sigma, numbers, aims, pins)
         return Held(begun.scene, found.numbers, begun.state, found.met, found.steps, found.distance)
 
     def distance(self, begun: Held, aims: Sequence[Aim]) -> float:
-        """How far off aims lie from a predicted motion, in standard deviations."""
+        """Return the Mahalanobis distance of the constraints from a predicted motion."""
         return meet.distance(begun.scene, self.spread, begun.state.sigma, begun.numbers, aims)
 
     def pins(self, begun: Held) -> list[Place]:
-        """Pins for the feet of a predicted motion."""
+        """Return the pins for the feet of a predicted motion."""
         return feet.pins(begun.scene, begun.numbers, self.card.feet)
 
     def measured(self, held: Held) -> dict[str, float]:
-        """Values of the card's measured controls in a motion."""
+        """Return the values of the card's measured controls on a motion."""
         asked = [(c.name, c.measure, 0.0) for c in self.card.controls if c.measure]
         moving = [(name, own, goal) for name, own, goal in asked if not own.bodily]
         found = dict[str, float]()
@@ -108,7 +111,7 @@ class Bench:
 
 
 def bench(session: Session, level: int) -> Bench:
-    """Bench of a level; only of a session that is `correctable`."""
+    """Return the data for corrections at a level."""
     weights = freeze.weights(session.content)
     own = reduced.read(weights, session.card.levels[level])
     return Bench(session.card, own, spread.of(session.card, weights, session.weigher.samples, own))

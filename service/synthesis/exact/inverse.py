@@ -1,7 +1,8 @@
-"""Controls of a question that gives targets instead: the most typical for what is to be met.
+"""Inference of controls from targets.
 
-A control that is measured on the very joint and at the very moment of a target is read off it. The
-others are those that captured motions have whose joints the model puts there.
+A control that is measured on the joint and at the moment of a target is read off the target. The
+others are the conditional mean, given the joint positions that the model predicts for captured
+clips.
 """
 
 from collections.abc import Mapping
@@ -17,8 +18,10 @@ from service.synthesis.exact.goals import Goal
 def read_off(
     card: ModelCard, given: Mapping[str, float], goals: tuple[Goal, ...]
 ) -> dict[str, float]:
-    """Values of controls that were not given and that a target is about, within what was sampled:
-    the target itself goes on asking for the rest."""
+    """Return values of controls that targets determine, limited to the sampled ranges.
+
+    The targets remain constraints.
+    """
     found = {}
     for goal in goals:
         for control in card.controls:
@@ -32,11 +35,12 @@ def read_off(
             )
             if same and goal.time is None:
                 value = float(goal.place[AXES[own.quantity]])
-                # What lies beyond is the correction's to approach, not the model's to guess.
+                # Beyond the sampled range, the correction approaches the target, not the model's
+                # extrapolation.
                 found[control.name] = min(max(value, control.minimum), control.maximum)
     return found
 
 
 def wanted(goals: tuple[Goal, ...]) -> Floats:
-    """Places (3 G,) that goals ask for, one after the other."""
+    """Return the target positions (3 G,) of the goals, concatenated."""
     return np.array([value for goal in goals for value in goal.place])

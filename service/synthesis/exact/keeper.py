@@ -1,4 +1,4 @@
-"""A model's exact answers: what corrections need, and the last of them."""
+"""Constraint solver of a model, with a cache of recent answers."""
 
 import math
 from collections.abc import Sequence
@@ -7,10 +7,13 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.answer import PoseAnswer, Trust
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
 from service.motion.measure import Measure
+from service.question import validation
+from service.question.motion_question import MotionQuestion
 from service.synthesis import limits
 from service.synthesis.door import Question
 from service.synthesis.exact import aims as looking
@@ -18,21 +21,21 @@ from service.synthesis.exact import goals, holding, inverse
 from service.synthesis.exact.aims import Aim, Place
 from service.synthesis.exact.goals import NOTHING, Goal, Goals
 from service.synthesis.exact.holding import Bench, Held
-from service.synthesis.question import HOLD, Hold
 from service.synthesis.session import Session, State
 from service.synthesis.typical import Chooser
 
-# Somebody who plays a clip pose by pose, or looks at a few.
+# Number of cached motions, for clients that play a clip pose by pose or alternate between a few.
 KEPT = 64
-# A speed that is met changes the duration, and so the frame at a time in seconds.
+# A speed constraint changes the duration, and so the canonical frame of a time in seconds: the most
+# iterations, and the relative change of the duration at which they stop.
 ROUNDS, SAME = 8, 1e-6
-# Canonical frames that are one moment.
+# Canonical frames closer than this are one moment.
 TWINS = 1e-3
 
 
 @dataclass(frozen=True)
 class _Asked:
-    """A question and its goals, told by what they are made of."""
+    """Cache key: a question and its goals, compared by the goals and the graph's inputs."""
 
     question: Question = field(compare=False)
     goals: Goals
@@ -42,7 +45,7 @@ class _Asked:
 
 
 class Keeper:
-    """Answers of one model that are held to something."""
+    """Constraint solver of one model."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -51,27 +54,27 @@ class Keeper:
         self._seen = lru_cache(KEPT)(self._places)
 
     @cached_property
-    def correctable(self) -> bool:
-        """Whether the model's file can be asked for exact answers."""
-        return self._session.correctable
-
-    @cached_property
     def measures(self) -> bool:
-        """Whether some control is measured on the motion."""
-        return self.correctable and any(c.measure for c in self._session.card.controls)
+        """True if a control is measured on the motion."""
+        return any(c.measure for c in self._session.card.controls)
 
-    def goals(self, question: Question, hold: Hold) -> Goals:
-        """What a question is held to; raises as `goals.of`."""
-        if hold is HOLD and not self.measures:
+    def goals(self, question: Question, asked: MotionQuestion) -> Goals:
+        """Return the constraints of a question; raises as `goals.of` does."""
+        if not asked.corrects and not self.measures:
             return NOTHING
-        return goals.of(self._session.card, question, hold, self.correctable)
+        return goals.of(self._session.card, question, asked)
 
-    def controls(self, question: Question, hold: Hold, chooser: Chooser) -> dict[str, float] | None:
-        """All controls of a question that leaves some open and names targets, as is most typical
-        for both; None for any other."""
-        if not (question.inferred and hold.targets and self.correctable):
+    def controls(
+        self, question: Question, asked: MotionQuestion, chooser: Chooser
+    ) -> dict[str, float] | None:
+        """Return all controls of a question with open controls and targets, else None.
+
+        The open controls are the conditional mean, given the other controls and the targets.
+        """
+        if not (question.inferred and asked.targets):
             return None
-        targets = self.goals(question, Hold("none", hold.targets)).targets
+        # Validation comes first: the search for controls takes about a second.
+        targets = self.goals(question, asked).targets
         open_ = set(question.inferred)
         given = {name: v for name, v in question.controls.items() if name not in open_}
         given |= inverse.read_off(self._session.card, given, targets)
@@ -86,11 +89,12 @@ class Keeper:
         targets: tuple[Goal, ...],
         chooser: Chooser,
     ) -> dict[str, float]:
-        """Controls by which the model itself comes near the targets.
+        """Return the controls with which the model's prediction comes nearest to the targets.
 
-        What is typical is linear, and motions are not: what it misses is asked for in addition,
-        until the targets lie no farther off than captured motions stray. To ask for less would
-        explain by controls what is chance.
+        The conditional mean is linear in the targets, but motions are not, so the remaining error
+        is added to the requested positions in each round. It stops when the distance of the targets
+        is within the spread of captured motions; a closer fit would attribute chance to the
+        controls.
         """
         seen = np.hstack([self._seen(goal.moment, goal.time) for goal in targets])
         wanted = asked = inverse.wanted(targets)
@@ -107,43 +111,44 @@ class Keeper:
         return min(tried, key=lambda pair: pair[0])[1]
 
     def held(self, question: Question, found: Goals) -> Held:
-        """The motion that meets its goals, or comes as near as captured motions get; the predicted
-        one where there are none.
+        """Return the motion that satisfies its constraints, as far as captured motions reach.
 
-        Raises InvalidField for a target at a time that the clip does not have.
+        Without constraints, it is the predicted motion. Raises InvalidField for a target at a time
+        outside the clip.
         """
         point, labels = question.point.tobytes(), question.labels.tobytes()
         return self._kept(_Asked(question, found, point, labels, question.level))
 
     def measured(self, question: Question, held: Held) -> dict[str, float]:
-        """Measured controls of a motion."""
+        """Return the measured controls of a motion."""
         return self._bench(question.level).measured(held)
 
     def poses(
         self, question: Question, held: Held, when: Floats, trust: Trust
     ) -> PoseAnswer[np.float64]:
-        """Poses of a motion at times (S,), s."""
+        """Return the poses of a motion at times (S,), s."""
         rotations, roots = held.poses(self._frames(question, held, when))
         return PoseAnswer(when, rotations, roots, held.state.bones, trust)
 
     def _places(self, moment: Measure, time: float | None) -> Floats:
-        """Where the model puts a joint (n, 3), m, at a moment of each captured clip."""
+        """Return a joint's predicted position (n, 3), m, at a moment of each captured clip."""
         goal = Goal("", moment, (0.0, 0.0, 0.0), time)
         found = []
         for state in self._captured if time is None else self._predicted(time):
+            cancel.check()
             begun = self._bench(0).begun(state)
             aim, motion = self._aim(goal, begun, state.frames[0]), begun.scene.motion(begun.numbers)
-            # Its value alone: nobody asks here how that changes.
+            # `among` computes the value without its gradient, which is not needed here.
             found.append(aim.among(begun.scene, begun.numbers, motion[None])[0])
         return np.array(found)
 
     @cached_property
     def _captured(self) -> list[State]:
-        """What the model predicts of each captured clip, whichever moment is looked at."""
+        """Predictions for the captured clips; moments without a time share them."""
         return self._predicted(0.0)
 
     def _predicted(self, time: float) -> list[State]:
-        """What the model predicts of each captured clip, and at which frame it is at a time, s."""
+        """Return the prediction for each captured clip, with the canonical frame of a time, s."""
         card, when = self._session.card, np.array([time])
         pairs = zip(card.examples, card.labels, strict=True)
         return [self._session.state(np.array([own]), when, labels[None]) for own, labels in pairs]
@@ -154,7 +159,7 @@ class Keeper:
         return self._benches[level]
 
     def _frames(self, question: Question, held: Held, when: Floats) -> Floats:
-        """Canonical frames (S,) at times (S,), s: a corrected duration keeps the clip's pace."""
+        """Return the canonical frames (S,) of times (S,), s, scaled by a corrected duration."""
         shares = when * (held.state.duration / held.duration)
         own = self._session.state(question.point, shares, question.labels, question.level)
         return own.frames
@@ -180,8 +185,10 @@ class Keeper:
         return held
 
     def _beside(self, aims: Sequence[Aim], targets: Sequence[Place], last: float) -> list[Aim]:
-        """Aims of controls but those of a joint that a target places at the same frame: it is the
-        nearer word."""
+        """Return the constraints without those of a joint that a target places at the same frame.
+
+        The target is more specific than the control.
+        """
         return [
             aim
             for aim in aims
@@ -189,9 +196,9 @@ class Keeper:
         ]
 
     def _targets(self, question: Question, targets: tuple[Goal, ...], held: Held) -> list[Place]:
-        """Aims of targets; the frames of those at a time are a motion's own."""
-        # Whether a time is within the clip shows when it is known how long that is; what is within
-        # none might be more than a float32 holds.
+        """Return the constraints of targets, at the canonical frames of the given motion."""
+        # The duration is known only after the correction; times beyond the longest plausible clip
+        # are limited because they may overflow float32.
         longest = limits.durations(self._session.card)[1]
         times = np.array([min(goal.time or 0.0, longest) for goal in targets])
         timed = self._frames(question, held, times) if len(times) else times
@@ -199,7 +206,7 @@ class Keeper:
         return [self._aim(goal, held, frame) for goal, frame in pairs]
 
     def _aim(self, goal: Goal, held: Held, frame: float) -> Place:
-        """Aim of a target, which, where it has a time, counts at that canonical frame."""
+        """Return the constraint of a target; frame: canonical frame of its time, if it has one."""
         last = held.scene.reduced.frames - 1
         at = (goal.moment.share or 0.0) * last if goal.time is None else frame
         return Place((goal.name,), goal.moment, (0, 1, 2), np.array(goal.place), at)
@@ -207,12 +214,15 @@ class Keeper:
     def _check_times(self, targets: tuple[Goal, ...], held: Held) -> None:
         for index, goal in enumerate(targets):
             if goal.time is not None:
-                limits.within(f"targets/{index}/time", goal.time, 0.0, held.duration, "s")
+                field = f"targets/{index}/time"
+                validation.rounded_within(field, goal.time, 0.0, held.duration, "s")
 
 
 def _same(a: Place, b: Place, last: float) -> bool:
-    """Whether two aims are of the same joints at one frame; moments that have to be looked for are
-    at none."""
+    """Return whether two constraints are on the same joints at one frame.
+
+    False for moments that the motion determines.
+    """
     at, other = a.frame(last), b.frame(last)
     if a.moment.joints != b.moment.joints or at is None or other is None:
         return False
@@ -220,7 +230,7 @@ def _same(a: Place, b: Place, last: float) -> bool:
 
 
 def _refuse_twins(targets: Sequence[Place], last: float) -> None:
-    """InvalidField for a second target of a joint at a time that turns out to be the same."""
+    """Raise InvalidField for a second target of a joint at a time that maps to the same frame."""
     for later, aim in enumerate(targets):
         for earlier, other in enumerate(targets[:later]):
             if _same(aim, other, last):

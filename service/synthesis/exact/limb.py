@@ -1,6 +1,6 @@
-"""Where one joint is, and how it moves with the numbers of a pose vector.
+"""Forward kinematics of one joint, and its gradient with respect to a pose vector.
 
-Only the joints that it hangs on are ever posed.
+Only the joints of the chain from the root to this joint are computed.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,10 @@ from service.synthesis.exact.reduced import Reduced
 
 @dataclass(frozen=True)
 class Limb:
-    """A chain of joints from the root to one, with their bones (C, 3), m, and what the reduced
-    tensor says of them.
+    """Chain of C joints from the root to one joint.
 
-    rotations (C, 3, 3): mean ones. mean (3 + 3 C,), directions (r1, 3 + 3 C): of the root's
-    position and the chain's rotation vectors.
+    bones: (C, 3), m. rotations: mean rotation matrices (C, 3, 3). mean (3 + 3 C,), directions (r1,
+    3 + 3 C): rows of the reduced tensor for the root's position and the chain's rotation vectors.
     """
 
     bones: Floats
@@ -27,8 +26,10 @@ class Limb:
     directions: Floats
 
     def posed(self, moves: Floats, gone: Floats) -> "Pose":
-        """The chain at coefficients (S, r1) of the first mode, where the root has got gone (S, 3)
-        of a cycle's travel: to the left and ahead, m, and turned, rad."""
+        """Return the chain's poses at coefficients (S, r1) of the first mode.
+
+        gone (S, 3): travel of the root so far: to the left and ahead, m, and turn, rad.
+        """
         found = self.mean + moves @ self.directions
         vectors = found[:, 3:].reshape(len(moves), -1, 3)
         turns = self.rotations @ quat.to_matrix(quat.exp(vectors))
@@ -39,8 +40,11 @@ class Limb:
         return _forward(self.bones, vectors, turns, roots)
 
     def gradient(self, pose: "Pose", row: int) -> tuple[Floats, Floats]:
-        """How the last joint moves with the coefficients of the first mode (3, r1), m, and with the
-        turn of the travel (3,), m for a radian, in one of the poses."""
+        """Return the gradients of the last joint's position in one of the poses.
+
+        The first is by the coefficients of the first mode (3, r1), m; the second by the turn of the
+        travel (3,), m per radian.
+        """
         axes = pose.turned[row] @ quat.right_jacobian(pose.vectors[row])
         arms = pose.positions[row, -1] - pose.positions[row]
         moved = quat.cross(np.swapaxes(axes, -1, -2), arms[:, None])
@@ -50,8 +54,10 @@ class Limb:
 
 @dataclass(frozen=True)
 class Pose:
-    """A chain in S poses: rotation vectors (S, C, 3), orientations (S, C, 3, 3), positions
-    (S, C, 3)."""
+    """A chain in S poses.
+
+    vectors: rotation vectors (S, C, 3). turned: orientations (S, C, 3, 3). positions: (S, C, 3), m.
+    """
 
     vectors: Floats
     turned: Floats
@@ -59,7 +65,7 @@ class Pose:
 
 
 def to(joint: int, parents: tuple[int, ...], bones: Floats, reduced: Reduced) -> Limb:
-    """The limb that ends with a joint; bones (J, 3), m."""
+    """Return the chain that ends with a joint; bones (J, 3), m."""
     chain = [joint]
     while chain[0]:
         chain.insert(0, parents[chain[0]])

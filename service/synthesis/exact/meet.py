@@ -1,10 +1,10 @@
-"""The smallest correction of a motion that makes it meet its aims.
+"""The smallest correction of a motion that satisfies its constraints.
 
-Gauss-Newton on the whole correction, in the metric of how captured motions stray: each step meets
-the aims as they look from where the last one led, by the least change from the prediction. A step
-moves nothing by more than a stride of its own, and one that does not bring the aims nearer is
-halved. What lies farther off than captured motions stray, which would take a broken pose, is
-approached as far as they go.
+Gauss-Newton on the whole correction, in the metric of the residuals of captured motions: each step
+solves the constraints, linearised at the last iterate, by the least change from the prediction. A
+step moves no position by more than STRIDE, and a step that does not reduce the error is halved.
+Targets beyond the spread of captured motions, which would take an implausible pose, are approached
+up to that spread.
 """
 
 from collections.abc import Sequence
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.answer import Met
 from service.motion.conventions import Floats
 from service.synthesis.exact import aims as looking
@@ -22,20 +23,24 @@ from service.synthesis.exact.scene import Scene
 from service.synthesis.exact.spread import Spread
 
 STEPS, HALVINGS = 25, 6
-# m, or m/s: a hundredth of a millimetre is far below what any format keeps. Degrees likewise.
+# Convergence, m, m/s or degrees: a hundredth of a millimetre is below the precision of every
+# format.
 CLOSE = 1e-5
-# To what a step has to bring the square of what is left.
+# Factor by which a step must reduce the squared error.
 ENOUGH = 0.98
-# Farther than this, m, no linearisation is trusted.
+# Largest move of a position in one step, m, for which the linearisation is trusted.
 STRIDE = 0.15
-# Above this a target counts as missed, in its unit.
+# Above this error, in its unit, a target counts as missed.
 MISSED = 1e-3
 
 
 @dataclass(frozen=True)
 class Corrected:
-    """Numbers of the motion that was found, what it was held to, in how many steps, and the
-    distance, in standard deviations, at which the aims lay."""
+    """Result of a correction.
+
+    numbers: of the corrected motion. met: error of each constraint. steps: number of iterations.
+    distance: Mahalanobis distance of the constraints from the prediction.
+    """
 
     numbers: Floats
     met: tuple[Met, ...]
@@ -45,10 +50,11 @@ class Corrected:
 
 @dataclass(frozen=True)
 class _Task:
-    """What is to be met, and in which metric.
+    """Constraints and metric of one correction.
 
-    aims: that must be met. pins: that should. worth (a,): of the aims' values in what is to become
-    less. loose (k,): variance that each value is left, for a sigma of one metre: none for the aims.
+    begun: numbers of the prediction. aims: hard constraints. pins: soft constraints. worth (a,):
+    weights of the aims' values in the squared error. loose (k,): variance that each value is left,
+    for a sigma of one metre; zero for the aims.
     """
 
     scene: Scene
@@ -61,15 +67,15 @@ class _Task:
 
     @property
     def firm(self) -> int:
-        """Number of values that must be met."""
+        """Number of values of hard constraints."""
         return sum(len(aim.goal) for aim in self.aims)
 
     def look(self, numbers: Floats) -> Looked:
-        """Values and gradients of aims and pins."""
+        """Return values and gradients of aims and pins."""
         return looking.look([*self.aims, *self.pins], self.scene, numbers)
 
     def least(self, gradients: Floats, toward: Floats) -> Floats:
-        """The least change that moves what has such gradients by so much."""
+        """Return the least change (numbers,) that moves values with these gradients by `toward`."""
         carried = self.spread.shrunk(gradients)
         return carried @ _solve(gradients @ carried + np.diag(self.loose), toward)
 
@@ -82,8 +88,11 @@ def meet(
     aims: Sequence[Aim],
     pins: Sequence[Aim] = (),
 ) -> Corrected:
-    """The motion nearest to a predicted one (numbers,) of standard deviation sigma, m, that meets
-    the aims, or comes as near as captured motions get, and leaves pins about where they are."""
+    """Return the motion nearest to a prediction that satisfies the constraints.
+
+    begun: its numbers. sigma: its standard deviation, m. Constraints beyond the spread of captured
+    motions are approached up to it; pins stay near their positions.
+    """
     looked = looking.look([*aims, *pins], scene, begun)
     found = reach.of(scene, spread, sigma, begun, aims, looked)
     loose = np.repeat([0.0, (LOOSE / sigma) ** 2], [len(found.left), 3 * len(pins)])
@@ -95,7 +104,7 @@ def meet(
 
 
 def _descend(task: _Task, looked: Looked, goal: Floats) -> tuple[Floats, Floats, int]:
-    """The corrected numbers, their values, and in how many steps."""
+    """Return the corrected numbers, their values, and the number of steps."""
     numbers, whole = task.begun, True
     for step in range(STEPS):
         if np.abs((goal - looked[0])[: task.firm]).max() < CLOSE:
@@ -110,7 +119,10 @@ def _descend(task: _Task, looked: Looked, goal: Floats) -> tuple[Floats, Floats,
 def _nearer(
     task: _Task, numbers: Floats, looked: Looked, goal: Floats, whole: bool
 ) -> tuple[Floats, Looked, bool] | None:
-    """The next numbers with what is seen of them; None where none come nearer."""
+    """Return the next numbers, their values and gradients, and whether the step was shortened.
+
+    whole: correct from the prediction anew, pins included. None if no step reduces the error.
+    """
     (values, gradients), firm = looked, task.firm
     left = goal - values
     share = min(1.0, STRIDE / max(_apart(task.aims, left), 1e-12))
@@ -118,6 +130,7 @@ def _nearer(
     if not whole:
         left[firm:] = 0.0
     for _ in range(HALVINGS):
+        cancel.check()
         toward = share * left + gradients @ (numbers - base)
         tried = base + task.least(gradients, toward)
         found = task.look(tried)
@@ -128,13 +141,16 @@ def _nearer(
 
 
 def _solve(matrix: Floats, right: Floats) -> Floats:
-    """Solution of a covariance's system; aims that contradict each other share the miss."""
+    """Return the solution of a covariance's system.
+
+    A ridge distributes the error between contradicting constraints.
+    """
     ridge = 1e-9 * np.diag(np.diagonal(matrix)) + 1e-300 * np.eye(len(matrix))
     return np.asarray(np.linalg.solve(matrix + ridge, right), np.float64)
 
 
 def _apart(aims: Sequence[Aim], left: Floats) -> float:
-    """Largest distance, m, among values (k,) of aims that are places."""
+    """Return the largest distance, m, among the values (k,) in metres."""
     units = [aim.unit for aim in aims for _ in aim.goal]
     places = zip(left[: len(units)], units, strict=True)
     return max((abs(value) for value, unit in places if unit == "m"), default=0.0)
@@ -147,7 +163,7 @@ def _size(left: Floats, worth: Floats) -> float:
 def distance(
     scene: Scene, spread: Spread, sigma: float, numbers: Floats, aims: Sequence[Aim]
 ) -> float:
-    """How far off aims lie from a motion (numbers,), in standard deviations."""
+    """Return the Mahalanobis distance of the constraints from a motion (numbers,)."""
     looked = looking.look(aims, scene, numbers)
     return reach.of(scene, spread, sigma, numbers, aims, looked).distance
 

@@ -1,4 +1,4 @@
-"""What is said of the goals that a motion does not meet."""
+"""Messages for constraints that a motion does not meet."""
 
 from collections.abc import Iterator, Sequence
 
@@ -8,19 +8,19 @@ from service.synthesis.exact.goals import Goals
 
 
 def sentences(met: Sequence[Met]) -> tuple[str, ...]:
-    """A sentence for each goal that is not reached."""
+    """Return a sentence for each constraint that is not met."""
     return tuple(_sentence(each) for each in met if not each.reached)
 
 
 def refuse(goals: Goals, met: Sequence[Met]) -> None:
-    """OutOfReach where some goal is not reached; it names the first."""
+    """Raise OutOfReach, which names the first, if a constraint is not met."""
     for field, each in zip(_fields(goals, met), met, strict=True):
         if not each.reached:
             raise OutOfReach(field, "; ".join(sentences(met)))
 
 
 def _fields(goals: Goals, met: Sequence[Met]) -> Iterator[str]:
-    """Where each of them was asked for: controls are looked at before targets."""
+    """Yield the field of each constraint in the question; controls precede targets."""
     first = len(met) - len(goals.targets)
     for index, each in enumerate(met):
         yield f"controls/{each.what}" if index < first else f"targets/{index - first}"

@@ -1,8 +1,8 @@
-"""How far off aims lie, judged by how captured motions stray, and how much of the way is gone.
+"""Reachability of constraints, measured by the residuals of captured motions.
 
-What the others predict for each captured clip misses it by so much in the very values that are
-aimed at: a hand that the controls place strays less than its arm does. Aims that lie farther off
-than that are approached as far as captured motions go.
+For each captured clip, the leave-one-out prediction has an error in the constrained values; it is
+smaller for a hand that controls place than for its elbow. Constraints at a larger distance are
+approached up to the largest distance of captured motions.
 """
 
 from collections.abc import Sequence
@@ -11,25 +11,30 @@ from functools import cached_property
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.conventions import Floats
 from service.synthesis.exact.aims import Aim, Looked
 from service.synthesis.exact.scene import Scene
 from service.synthesis.exact.spread import Spread
 
-# Of the covariance: an even share for all values of an aim, so that none is nothing.
+# Weight in the covariance of an equal share for all values of a constraint, so that none has zero
+# variance.
 EVEN = 0.1
-# Of an aim's even share: what goes along with that of the same joint a moment later.
+# Factor on the covariances between the equal shares of different constraints, such as those of one
+# joint at successive moments.
 ALONG = 0.99
-# Standard deviations that three coordinates of a target may be off: one captured clip in 300. At 4
-# a tenth of the targets 20 cm too far are not told from others, at 3.25 one captured one in 70 is.
+# Standard deviations that three coordinates of a target may be off: exceeded by one captured clip
+# in 300. At 4, a tenth of the targets 20 cm too far are accepted; at 3.25, one captured clip in 70
+# is not.
 FAR = 3.7
 
 
 @dataclass(frozen=True)
 class Reach:
-    """The way (k,) from a motion to its aims, and how values like these stray.
+    """Differences (k,) between constraints and a motion, with their covariance.
 
-    covariance (k, k). members (k, aims): which values are of which aim, ones and zeros.
+    left: differences of the values from their targets. covariance: (k, k). members (k, aims): 1
+    where a value belongs to a constraint, else 0.
     """
 
     left: Floats
@@ -38,19 +43,24 @@ class Reach:
 
     @cached_property
     def distance(self) -> float:
-        """How far off the aims lie, in standard deviations."""
+        """Mahalanobis distance of the constraints."""
         return float(np.sqrt(self.left @ np.linalg.solve(self.covariance, self.left)))
 
     @cached_property
     def worth(self) -> Floats:
-        """Weight (k,) of each value in what is to become less: one over the mean variance of its
-        aim, so that metres and degrees compare."""
+        """Weight (k,) of each value in the squared error.
+
+        The inverse mean variance of its constraint, so that metres and degrees compare.
+        """
         return 1.0 / (self.members @ _means(self.members, np.diagonal(self.covariance)))
 
     @property
     def way(self) -> Floats:
-        """What of the way (k,) captured motions go: all of it, or what is left of each aim's own
-        where together they lie too far."""
+        """Reachable part (k,) of the differences.
+
+        All of them within the largest plausible distance; else a share of each constraint's
+        difference, chosen for the least remaining error at that distance.
+        """
         limit = far(len(self.left))
         if self.distance <= limit:
             return self.left
@@ -75,9 +85,10 @@ def of(
     aims: Sequence[Aim],
     looked: Looked,
 ) -> Reach:
-    """Reach from a motion (numbers,) of standard deviation sigma, m.
+    """Return the reachability of constraints from a motion (numbers,).
 
-    looked: what was seen of it, of the aims first.
+    sigma: standard deviation of the motion, m. looked: its values and gradients, those of `aims`
+    first.
     """
     members = np.repeat(np.eye(len(aims)), [len(aim.goal) for aim in aims], axis=0)
     values, gradients = (seen[: len(members)] for seen in looked)
@@ -86,8 +97,11 @@ def of(
 
 
 def far(values: int) -> float:
-    """How far so many values may be off together, in standard deviations: as unlikely as FAR is for
-    three (Wilson and Hilferty 1931)."""
+    """Return the largest plausible Mahalanobis distance of a number of values.
+
+    Its probability is that of FAR for three values, by the approximation of Wilson and Hilferty
+    (1931).
+    """
     spread = np.sqrt(2.0 / (9.0 * 3.0))
     share = ((FAR**2 / 3.0) ** (1.0 / 3.0) - (1.0 - spread**2)) / spread
     own = np.sqrt(2.0 / (9.0 * values))
@@ -97,25 +111,35 @@ def far(values: int) -> float:
 def _strays(
     scene: Scene, spread: Spread, numbers: Floats, aims: Sequence[Aim], gradients: Floats
 ) -> Floats:
-    """Covariance (k, k) of values that the others predict for captured clips, for a sigma of one
-    metre, all with the body and the travel of this motion."""
+    """Return the covariance (k, k) of leave-one-out residuals in the constrained values.
+
+    For a sigma of one metre, with the skeleton and the travel of this motion.
+    """
     motions = np.concatenate([spread.captured, spread.predicted])
-    found = np.hstack([aim.among(scene, numbers, motions) for aim in aims])
+    found = np.hstack([_among(aim, scene, numbers, motions) for aim in aims])
     clips = len(spread.captured)
     strays = (found[:clips] - found[clips:]) / spread.sigmas[:, None]
     beside = gradients[:, motions.shape[1] :]
     return np.asarray(strays.T @ strays + beside @ spread.beside @ beside.T, np.float64)
 
 
+def _among(aim: Aim, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+    cancel.check()
+    return aim.among(scene, numbers, motions)
+
+
 def _evened(covariance: Floats, members: Floats) -> Floats:
-    """Covariance with an even share for all values of an aim, which goes along with that of other
-    aims as the whole of it does: else two that contradict each other would seem near."""
+    """Return the covariance blended with equal shares for all values of a constraint.
+
+    The shares correlate between constraints as their mean covariances do; otherwise two
+    contradicting constraints would seem near.
+    """
     sizes = members.sum(axis=0)
     place = np.concatenate([np.arange(size) for size in sizes])
     beside = members @ sizes
     alike = (place[:, None] == place) & (beside[:, None] == beside)
     shared = members.T @ (alike * covariance) @ members / sizes
-    # What never moves has no variance at all.
+    # A value that never varies has a variance of zero.
     own = np.diag(np.maximum(np.diagonal(shared), 1e-12))
     shared = ALONG * shared + (1.0 - ALONG) * own
     return (1.0 - EVEN) * covariance + EVEN * alike * (members @ shared @ members.T)
@@ -126,8 +150,11 @@ def _means(members: Floats, values: Floats) -> Floats:
 
 
 def _shares(apart: Floats, misses: Floats, price: float) -> Floats:
-    """Shares (aims,) of the ways for which misses and a price of the distance are least."""
-    # An aim that is met already has no way to go.
+    """Return the shares (aims,) of the differences for the least error plus weighted distance.
+
+    price: weight of the squared distance.
+    """
+    # A constraint that is met already has a difference of zero.
     met = np.diag((np.diagonal(misses) == 0.0).astype(float))
     found = np.linalg.solve(price * apart + misses + met, np.diagonal(misses))
     return np.asarray(np.clip(found, 0.0, 1.0), np.float64)

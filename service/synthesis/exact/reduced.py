@@ -1,4 +1,4 @@
-"""The reduced tensor as a model file holds it, and poses of a reduced motion."""
+"""Reduced tensor of a model file, and poses of a reduced motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ Weights = Mapping[str, npt.NDArray[Any]]
 class Reduced:
     """Core and bases of one level of detail.
 
-    core (r2, r1, r3): modes of time, degrees of freedom, samples. time (T, r2). directions (r1, D)
-    and mean (D,): pose vectors, of the root's position and a rotation vector for each joint about
-    its mean rotation (J, 4).
+    core: (r2, r1, r3), modes of time, degrees of freedom and samples. time: (T, r2). directions:
+    (r1, D) and mean: (D,), pose vectors of the root's position and a rotation vector for each joint
+    about its mean rotation. rotations: mean rotations (J, 4).
     """
 
     core: Floats
@@ -32,33 +32,33 @@ class Reduced:
 
     @property
     def frames(self) -> int:
-        """Canonical frames T."""
+        """Number of canonical frames T."""
         return len(self.time)
 
     def motion(self, coefficients: Floats) -> Floats:
-        """Reduced motion (r2, r1) of sample coefficients (r3,)."""
+        """Return the reduced motion (r2, r1) of sample coefficients (r3,)."""
         return self.core @ coefficients
 
     def row(self, place: float) -> Floats:
-        """Time coefficients (r2,) at a canonical frame, linear between two."""
+        """Return the time coefficients (r2,) at a canonical frame, interpolated linearly."""
         before = min(int(place), self.frames - 2)
         share = place - before
         found: Floats = (1.0 - share) * self.time[before] + share * self.time[before + 1]
         return found
 
     def rows(self, places: Floats) -> Floats:
-        """Time coefficients (S, r2) at canonical frames (S,)."""
+        """Return the time coefficients (S, r2) at canonical frames (S,)."""
         return blend.between(self.time, places)
 
     def poses(self, motion: Floats, places: Floats) -> tuple[Floats, Floats]:
-        """Rotations (S, J, 4) and root positions (S, 3) of a reduced motion (r2, r1)."""
+        """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
         numbers = self.mean + self.rows(places) @ motion @ self.directions
         vectors = numbers[:, 3:].reshape(len(places), -1, 3)
         return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
 
 
 def read(weights: Weights, level: Level) -> Reduced:
-    """The reduced tensor of a level; KeyError for a file that holds none by these names."""
+    """Return the reduced tensor of a level; KeyError for a missing constant."""
     r1, r2, r3 = level.ranks
     rotations = weights["mean_rotations"][:, :, 0].astype(np.float64)
     moves = np.zeros((1 + len(rotations), 1))
@@ -74,7 +74,7 @@ def read(weights: Weights, level: Level) -> Reduced:
 
 
 def _directions(weights: Weights) -> Floats:
-    """Directions (D, r1); degrees of freedom that never vary take a row of zeros."""
+    """Return the directions (D, r1), with zeros for degrees of freedom that never vary."""
     stored = weights["directions"]
     whole = np.vstack([stored, np.zeros((1, stored.shape[1]))])
     found: Floats = whole[weights["freedoms"]].astype(np.float64)
@@ -82,7 +82,7 @@ def _directions(weights: Weights) -> Floats:
 
 
 def _mean_vectors(weights: Weights, rotations: Floats) -> Floats:
-    """Mean rotation vectors (J, 3), of which the graph holds mean rotation · vector / 2."""
+    """Return the mean rotation vectors (J, 3); the graph stores mean rotation · vector / 2."""
     turned = weights["rotation_mean"].reshape(-1, 4).astype(np.float64)
     if "joint_order" in weights:
         turned = turned[np.argsort(weights["joint_order"])]

@@ -1,4 +1,4 @@
-"""A motion that can still be changed, as one row of numbers, and what is seen of it."""
+"""A motion as a vector of variables for the correction, and its forward kinematics."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,13 +11,18 @@ from service.synthesis.exact.limb import Limb
 from service.synthesis.exact.reduced import Reduced
 
 BESIDE = 4
-"""Numbers beside the reduced motion of a cycle: logarithm of the duration; way to the left and
-ahead, m; change of heading, rad."""
+"""Variables of a cycle in addition to the reduced motion: logarithm of the duration; travel to the
+left and ahead, m; change of heading, rad.
+"""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Whose motion it is: bones (J, 3), m, and whether it is a cycle, which travels by itself."""
+    """Skeleton and model level of a motion.
+
+    reduced: reduced tensor. parents: of the joints. bones: (J, 3), m. cyclic: true for cycles,
+    which have a travel.
+    """
 
     reduced: Reduced
     parents: tuple[int, ...]
@@ -29,43 +34,44 @@ class Scene:
         return {}
 
     def limb(self, joint: int) -> Limb:
-        """The chain to a joint, made once."""
+        """Return the chain from the root to a joint, cached."""
         if joint not in self._limbs:
             self._limbs[joint] = limb.to(joint, self.parents, self.bones, self.reduced)
         return self._limbs[joint]
 
     @property
     def numbers(self) -> int:
-        """How many numbers a motion is."""
+        """Number of variables of a motion."""
         r2, r1, _ = self.reduced.core.shape
         return r2 * r1 + BESIDE * self.cyclic
 
     def motion(self, numbers: Floats) -> Floats:
-        """The reduced motion (r2, r1) among the numbers."""
+        """Return the reduced motion (r2, r1) among the variables."""
         r2, r1, _ = self.reduced.core.shape
         return numbers[: r2 * r1].reshape(r2, r1)
 
     def beside(self, numbers: Floats) -> tuple[float, Floats]:
-        """Logarithm of the duration and travel (3,): zeros of what is no cycle."""
+        """Return the logarithm of the duration and the travel (3,); zeros without a cycle."""
         if not self.cyclic:
             return 0.0, np.zeros(3)
         return float(numbers[-BESIDE]), numbers[-BESIDE + 1 :]
 
     def positions(self, numbers: Floats, joint: int, places: Floats) -> Floats:
-        """Where a joint is (S, 3), m, at canonical frames (S,)."""
+        """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
         moves = self.reduced.rows(places) @ self.motion(numbers)
         return self.limb(joint).posed(moves, self._gone(numbers, places)).positions[:, -1]
 
     def among(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
-        """Where a joint is (n, 3), m, at a canonical frame of other motions (n, r2 r1) that have
-        everything else of this one."""
+        """Return a joint's positions (n, 3), m, at a canonical frame of motions (n, r2 r1).
+
+        All other variables, such as the travel, are those of this motion.
+        """
         row, gone = self.reduced.row(at), self._gone(numbers, np.full(len(motions), at))
         moves = row @ motions.reshape(len(motions), len(row), -1)
         return self.limb(joint).posed(moves, gone).positions[:, -1]
 
     def place(self, numbers: Floats, joint: int, at: float) -> tuple[Floats, Floats]:
-        """Where a joint is (3,), m, at a canonical frame, and how it moves with every number of the
-        motion (3, numbers)."""
+        """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
         places = np.array([at])
         row, own = self.reduced.row(at), self.limb(joint)
         pose = own.posed(row[None] @ self.motion(numbers), self._gone(numbers, places))
@@ -79,6 +85,6 @@ class Scene:
         return pose.positions[0, -1], inner
 
     def _gone(self, numbers: Floats, places: Floats) -> Floats:
-        """How much of the travel (S, 3) lies behind at canonical frames (S,)."""
+        """Return the travel so far (S, 3) at canonical frames (S,)."""
         share = places / (self.reduced.frames - 1)
         return share[:, None] * self.beside(numbers)[1]

@@ -1,32 +1,34 @@
-"""How captured motions stray from what the others predict: the metric of a correction.
+"""Covariance of the residuals of captured motions: the metric of a correction.
 
-The covariance of standardised leave-one-out residuals, as exact-control literature has it for a
-Gaussian conditioned on a target: the least change in this metric is the most probable one. Few
-residuals say little of most directions, so most of it is replaced by what its marginals over time
-and degrees of freedom say, their Kronecker product. Motions vary smoothly, and so do corrections.
+The residuals are standardised leave-one-out errors of the captured clips. For a Gaussian
+conditioned on a target, the least change in this metric is the most probable one. Few residuals
+leave most directions undetermined, so the covariance is shrunk towards the Kronecker product of its
+marginals over time and degrees of freedom, which keeps corrections smooth in time.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from service.motion import field
+from service.motion import cross_validation, field
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Indices
 from service.synthesis.exact.reduced import Reduced, Weights
 
-# Of the marginals. On real motion all from 0.3 to 1 come as near; the less, the rougher.
+# Weight of the marginals. On real motion, weights from 0.3 to 1 are equally accurate; smaller ones
+# are less smooth.
 SHRUNK = 0.7
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Covariance of a reduced motion (r2, r1) and what goes beside it, for a sigma of one metre.
+    """Covariance of a reduced motion (r2, r1) and of the variables beside it.
 
-    residuals (r2 r1, r3): a root of the covariance of residuals. time (r2, r2), freedoms (r1, r1):
-    its marginals, their product scaled to its trace. beside (b, b): covariance of the logarithm of
-    the duration and of a cycle's travel; empty for what is no cycle. captured (n, r2 r1): reduced
-    motions of the captured clips; predicted: what the others say of each. sigmas (n,): of those, m,
+    All for a sigma of one metre. residuals: (r2 r1, r3), a root of the covariance of residuals.
+    time: (r2, r2) and freedoms: (r1, r1), its marginals, their product scaled to its trace. beside:
+    (b, b), covariance of the logarithm of the duration and of a cycle's travel; empty for motions
+    without cycles. captured: (n, r2 r1), reduced motions of the captured clips. predicted: (n, r2
+    r1), their leave-one-out predictions. sigmas: (n,), standard deviations of the predictions, m,
     times the root of n.
     """
 
@@ -39,7 +41,7 @@ class Spread:
     sigmas: Floats
 
     def shrunk(self, gradients: Floats) -> Floats:
-        """Shrunk covariance times gradients (k, r2 r1 + b), transposed: (r2 r1 + b, k)."""
+        """Return the shrunk covariance times gradients (k, r2 r1 + b): (r2 r1 + b, k)."""
         inner = gradients[:, : len(self.residuals)]
         r2, r1 = len(self.time), len(self.freedoms)
         blocks = self.time @ inner.reshape(-1, r2, r1) @ self.freedoms
@@ -50,21 +52,20 @@ class Spread:
 
 
 def of(card: ModelCard, weights: Weights, samples: Floats, reduced: Reduced) -> Spread:
-    """Spread of a model's level.
+    """Return the covariance for a model's level.
 
-    samples (n, d + p): where the captured clips lie. What they are made of is read off the dual
-    weights: the system times them is the samples.
+    samples: (n, d + p), points of the captured clips. Their coefficients are recovered from the
+    dual weights: the kriging system times the weights gives the samples.
     """
     hyper = card.kriging
-    assert hyper is not None
-    left_out = field.leave_out(hyper, samples, groups(card, samples))
-    variances = field.left_out_variances(hyper, samples, left_out)
+    left_out = cross_validation.leave_out(hyper, samples, groups(card, samples))
+    variances = cross_validation.left_out_variances(hyper, samples, left_out)
     sill = np.mean(np.square(card.left_out) / variances)
     r3 = reduced.core.shape[2]
-    held = _coefficients(card, weights, samples)[:, :r3]
+    held = coefficients(card, weights, samples)[:, :r3]
     missed = left_out @ held
     sigmas = np.sqrt(sill * variances * len(samples))
-    # Residuals of a variance of one each, of a field whose sill is a square metre.
+    # Standardised residuals, of a kriging model whose sill is one square metre.
     strays = missed / sigmas[:, None]
     root = np.linalg.cholesky(strays.T @ strays + 1e-12 * np.eye(r3))
     spread = reduced.core @ root
@@ -77,10 +78,9 @@ def of(card: ModelCard, weights: Weights, samples: Floats, reduced: Reduced) -> 
     return Spread(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
 
 
-def _coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
-    """Sample coefficients (n, r3) of the captured clips, in the card's order."""
+def coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
+    """Return the sample coefficients (n, r3) of the captured clips, in the card's order."""
     hyper = card.kriging
-    assert hyper is not None
     r3 = weights["core"].shape[2]
     order = order_of(card, weights, samples)
     held = samples[order]
@@ -93,7 +93,7 @@ def _coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
 
 
 def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
-    """Place on the card (n,) of each sample of the file, which holds those first that say most."""
+    """Return the index on the card (n,) of each sample, in the file's order of importance."""
     held = weights["samples"][0].T
     listed = samples[:, : len(card.controls)].astype(np.float32)
     whose = weights["whose"] if card.performers else np.zeros(len(held), dtype=np.int64)
@@ -104,10 +104,12 @@ def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
 
 
 def groups(card: ModelCard, samples: Floats) -> Indices:
-    """Captured clips that are left out together (n,): those of one file, or where the others could
-    not carry the drift then, each by itself."""
+    """Return indices (n,) of the groups of captured clips that are left out together.
+
+    Clips of one file form a group; each clip is a group of its own if the other groups could not
+    determine the drift.
+    """
     hyper = card.kriging
-    assert hyper is not None
     files = [source.partition(", frames ")[0] for source in card.sources]
     takes = np.unique(files, return_inverse=True)[1]
     functions = field.drift(samples, len(card.controls), max(hyper.drifts))

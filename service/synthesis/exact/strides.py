@@ -1,4 +1,4 @@
-"""The way that a held motion goes, for answers in place and for loops."""
+"""Travel of a constrained motion, for answers in place and for loops."""
 
 import numpy as np
 
@@ -8,12 +8,12 @@ from service.synthesis.walk.stride import Strides
 
 
 def of(held: Held) -> Strides:
-    """The cycle of a motion, or the straight way of what is no cycle from first pose to last."""
+    """Return the cycle of a motion, or its straight line from first to last pose."""
     last = held.scene.reduced.frames - 1.0
     roots = plane.of(held.poses(np.array([0.0, last]))[1])
     durations, turns = np.array([held.duration]), held.travel[2:]
     if not held.scene.cyclic:
         return Strides(durations, roots[1:] - roots[:1], np.zeros(1), roots[:1])
     gap = np.array([held.travel[1] + 1j * held.travel[0]])
-    # Without its travel a cycle ends where it began.
+    # A cycle without its travel ends at its start.
     return Strides(durations, plane.straightened(gap, turns), turns, roots[1:] - gap)

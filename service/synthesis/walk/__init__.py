@@ -1,1 +1,1 @@
-"""Characters that walk their own ways through a model of a cycle that travels."""
+"""Locomotion: characters that follow paths with a model of a travelling cycle."""

@@ -1,4 +1,4 @@
-"""Crowds of walkers: the door, and motions that are made as they are asked for."""
+"""Crowds of walking characters: validation, plans, and motions computed on demand."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -20,24 +20,26 @@ from service.synthesis.walk.given import Route
 from service.synthesis.walk.march import Plan
 from service.synthesis.walk.stride import Poses
 
-# Motions that are made at a time: a few megabytes of poses for ten seconds.
-TOGETHER = 50
+# Poses of one batch of motions: 8 MB at 31 joints, or one longer motion.
+TOGETHER = 8_000
+# Poses computed at once in double precision: 25 MB at 31 joints.
+POSED = 16_000
 
 
-# Poses that one plan may be of: its own numbers take some hundred bytes each.
+# Largest number of poses of one plan, which takes a few hundred bytes for each.
 MOST_POSES = 20_000_000
-# Ways are planned every so often, s, however few frames there are of them.
+# Longest interval between planned points of a path, s, for crowds with few frames a second.
 PLANNED = 0.05
 LARGEST_SEED = 2**63
 Pairs = tuple[Indices, Indices]
-"""Characters (K,) and frames (K,)."""
+"""Indices of characters (K,) and frames (K,)."""
 RATES = (1.0, 1000.0)
 
 
 def wandering(gait: Gait, count: int, seconds: float, rate: float, seed: int) -> Plan:
-    """Plan of characters that wander, each on a way of its own.
+    """Return a plan of `count` characters on random paths.
 
-    Raises InvalidField for numbers that no crowd can be made of.
+    Raises InvalidField for numbers out of range.
     """
     frames = _frames(count, seconds, rate, seed)
     characters = wander.cast(gait, count, seed)
@@ -46,9 +48,9 @@ def wandering(gait: Gait, count: int, seconds: float, rate: float, seed: int) ->
 
 
 def following(gait: Gait, routes: Sequence[Route], seconds: float, rate: float, seed: int) -> Plan:
-    """Plan of characters that follow routes; the seed says who they are and in which phase.
+    """Return a plan of characters that follow routes; performers and phases depend on the seed.
 
-    Raises InvalidField as `wandering` and `given.through` do, and for a route that ends too soon.
+    Raises InvalidField as `wandering` and `given.through` do, and for a route that is too short.
     """
     frames = _frames(len(routes), seconds, rate, seed)
     characters = wander.cast(gait, len(routes), seed)
@@ -68,17 +70,22 @@ def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
     most = poses(count, seconds, rate)
     if most > MOST_POSES:
         raise InvalidField("count", f"{most:.3g} poses, expected {MOST_POSES} at most")
-    # A millionth of a frame forgives the rounding of seconds * rate.
+    return frames(seconds, rate)
+
+
+def frames(seconds: float, rate: float) -> int:
+    """Return the number of frames of a motion of this length, s."""
+    # Tolerance of a millionth of a frame for the rounding of seconds * rate.
     return math.floor(seconds * rate + 1e-6) + 1
 
 
 def poses(count: int, seconds: float, rate: float) -> float:
-    """How many poses a crowd is of, or what as many take to plan where its frames are few."""
+    """Return the number of poses of a crowd, or of planned points if these are more."""
     return count * (seconds * max(rate, 1.0 / PLANNED) + 1.0)
 
 
 def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:
-    """Crowd of a plan, each character with a motion of its own, in the frame that it begins in."""
+    """Return the crowd of a plan, each character with its own motion in the frame of its start."""
     characters, frames = plan.phases.shape
     return CrowdClip(
         session.card.skeleton,
@@ -92,8 +99,7 @@ def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:
 
 
 def sharing(session: Session, plan: Plan, shown: Detail, stands: Placement) -> CrowdClip:
-    """Crowd of more characters than a plan has, who stand at places of their own and take turns
-    with its motions."""
+    """Return a crowd at given placements, whose characters reuse the plan's motions in turn."""
     one_each = crowd(session, plan, shown)
     return replace(one_each, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
 
@@ -108,47 +114,53 @@ def _facts(session: Session, plan: Plan) -> dict[str, Any]:
 
 
 def _shares(session: Session, shown: Detail) -> list[float]:
-    """Share of the poses that is shown at each level."""
+    """Return the share of the poses that has each level."""
     counts = np.bincount(shown.levels.ravel(), minlength=len(session.card.levels))
     return [float(f"{share:.4g}") for share in counts / shown.levels.size]
 
 
 def _outside(card: ModelCard, plan: Plan) -> float:
-    """Share of the poses with some control outside its sampled range."""
+    """Return the share of the poses with some control outside its sampled range."""
     low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
     return float(np.mean(np.any((plan.controls < low) | (plan.controls > high), axis=-1)))
 
 
 def _batches(session: Session, plan: Plan, shown: Detail) -> Iterator[Motions]:
-    for first in range(0, len(plan.who), TOGETHER):
-        who = np.arange(first, min(first + TOGETHER, len(plan.who)))
+    count, frames = plan.phases.shape
+    together = max(1, TOGETHER // frames)
+    for first in range(0, count, together):
+        who = np.arange(first, min(first + together, count))
         yield motions(session, plan, who, shown.of(who))
 
 
 def motions(session: Session, plan: Plan, who: Indices, shown: Detail) -> Motions:
-    """Motions of some characters (M,), where the plan has them, at the levels of their own."""
+    """Return the motions of characters (M,) of the plan, at their levels of detail."""
     shape = (len(who), plan.phases.shape[1])
-    pairs = np.meshgrid(who, range(shape[1]), indexing="ij")
-    posed = _posed(session, plan, (pairs[0].ravel(), pairs[1].ravel()), shown)
-    roots = plane.at_height(posed.places, posed.heights).astype(np.float32)
-    # A character's bones do not grow as it speeds up: they are those of its mean controls.
+    count, joints = shape[0] * shape[1], len(session.card.skeleton)
+    rotations = np.empty((count, joints, 4), np.float32)
+    roots = np.empty((count, 3), np.float32)
+    for rows in (slice(first, first + POSED) for first in range(0, count, POSED)):
+        character, frame = np.divmod(np.arange(count)[rows], shape[1])
+        posed = _posed(session, plan, (who[character], frame), shown.rows(rows))
+        rotations[rows] = posed.rotations
+        roots[rows] = plane.at_height(posed.places, posed.heights)
+    # Bone lengths must not vary with the speed: they are those at the mean controls.
     usual = plan.controls[who].mean(axis=1)
     bones = stride.bones(session, usual, stride.labels(session, plan.who[who]))
-    return Motions(
-        posed.rotations.astype(np.float32).reshape(*shape, *posed.rotations.shape[1:]),
-        roots.reshape(*shape, 3),
-        bones,
-        shown.levels,
-    )
+    turns = rotations.reshape(*shape, joints, 4)
+    return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels)
 
 
 def _posed(session: Session, plan: Plan, pairs: Pairs, shown: Detail) -> Poses:
-    """Poses of pairs of characters and frames, mixed where they are between two levels."""
-    after, shares = _at_levels(session, plan, pairs, shown.levels.ravel()), shown.shares.ravel()
+    """Return the poses of K pairs of a character and a frame, blended where levels change.
+
+    shown: levels of the pairs, in arrays (K,).
+    """
+    after, shares = _at_levels(session, plan, pairs, shown.levels), shown.shares
     between = np.flatnonzero(shares < 1.0)
     if len(between):
         some = pairs[0][between], pairs[1][between]
-        before = _at_levels(session, plan, some, shown.before.ravel()[between])
+        before = _at_levels(session, plan, some, shown.before[between])
         for name, whole in vars(after).items():
             mix = blend.rotations if name == "rotations" else blend.straight
             whole[between] = mix(getattr(before, name), whole[between], shares[between])

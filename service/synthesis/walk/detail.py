@@ -1,28 +1,28 @@
-"""Levels of detail of walkers over time: who switches when, and by how much at a time.
+"""Levels of detail of walking characters over time, with blended transitions.
 
-A switch takes a quarter of a second, in which poses of both levels are mixed. What is needed is
-known beforehand, so a finer level is there by the moment that the coarser one would show.
+A transition takes a quarter of a second, in which poses of both levels are blended. The required
+levels are known in advance, so a finer level is complete before the coarser one would be noticed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from service.motion import blend
+from service.motion import blend, cancel
 from service.motion.conventions import Floats, Indices
 from service.synthesis import view
 from service.synthesis.view import HYSTERESIS, Camera, Ladder
 
 SWITCH = 0.25
-"""Seconds from one level to another."""
+"""Duration of a transition between levels, s."""
 
 
 @dataclass(frozen=True)
 class Detail:
-    """What N characters are shown at in F frames.
+    """Levels of detail of N characters in F frames.
 
-    levels (N, F), those that they come from (N, F), and how much (N, F) of the way is behind them:
-    one, but while they switch.
+    levels: (N, F). before: (N, F), previous levels. shares: (N, F), completed share of the
+    transition, 1 outside transitions.
     """
 
     levels: Indices
@@ -30,20 +30,26 @@ class Detail:
     shares: Floats
 
     def of(self, who: Indices) -> "Detail":
-        """That of some characters (M,)."""
+        """Return the levels of some characters (M,)."""
         return Detail(self.levels[who], self.before[who], self.shares[who])
+
+    def rows(self, rows: slice) -> "Detail":
+        """Return the levels of some of all frames (N F,), character by character."""
+        levels, before, shares = self.levels.ravel(), self.before.ravel(), self.shares.ravel()
+        return Detail(levels[rows], before[rows], shares[rows])
 
 
 def constant(level: int, shape: tuple[int, ...]) -> Detail:
-    """One level for all characters and frames (N, F)."""
+    """Return one level for all characters and frames (N, F)."""
     levels = np.full(shape, level)
     return Detail(levels, levels, np.ones(shape))
 
 
 def scale(camera: Camera, centres: Floats, radius: float) -> Floats:
-    """Pixels (N, F) that a metre covers on characters of a radius, m, round centres (N, F, 3), m.
+    """Return the pixels (N, F) that a metre covers on each character.
 
-    InvalidField names a character that the camera is in.
+    centres: (N, F, 3), m. radius: of each body, m. Raises InvalidField, which names a character
+    that contains the camera.
     """
     frames = range(centres.shape[1])
     columns = [view.pixels_per_metre(camera, centres[:, frame], radius) for frame in frames]
@@ -51,16 +57,20 @@ def scale(camera: Camera, centres: Floats, radius: float) -> Floats:
 
 
 def seen(ladder: Ladder, scale: Floats, limit: float, rate: float) -> Detail:
-    """The coarsest levels whose errors cover at most `limit` pixels at a scale (N, F), all through
-    every switch; the finest where none does."""
+    """Return the coarsest levels with errors of at most `limit` pixels, transitions included.
+
+    scale: (N, F), pixels per metre. rate: frames a second. The finest level where none is within
+    the limit.
+    """
     switch = max(1, round(SWITCH * rate))
-    # A switch that has just begun ends before the next one does.
+    # Two transitions: one that has just begun ends before the next one.
     ahead = 2 * switch
     needed = _least_ahead(_levels(ladder, scale, limit), ahead)
     spare = _least_ahead(_levels(ladder, scale, limit * (1.0 - HYSTERESIS)), ahead)
     held, before = needed[:, 0], needed[:, 0]
     age, columns = np.full(len(held), switch), []
     for need, may in zip(needed.T, spare.T, strict=True):
+        cancel.check()
         wanted = np.where(need < held, need, np.maximum(held, may))
         wanted = np.where(age < switch, held, wanted)
         turning = wanted != held
@@ -76,7 +86,7 @@ def _levels(ladder: Ladder, scale: Floats, limit: float) -> Indices:
 
 
 def _least_ahead(levels: Indices, frames: int) -> Indices:
-    """Finest level (N, F) from each frame on, so many frames ahead."""
+    """Return the finest level (N, F) from each frame on, over `frames` frames ahead."""
     padded = np.pad(levels, ((0, 0), (0, frames)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, frames + 1, axis=1)
     least: Indices = windows.min(axis=-1)

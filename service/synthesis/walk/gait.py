@@ -1,7 +1,7 @@
-"""What a cyclic model can walk: speeds and rates of turning to controls, and how far they go.
+"""Gait of a cyclic model: controls for speeds and rates of turning.
 
-Names and units of controls are the recipe's. What they mean is asked of the model: how fast and
-turning how fast its own clips go.
+Names and units of controls are the recipe's, so their effect is measured on the model's own clips:
+speed and rate of turning.
 """
 
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from service.synthesis.session import Session
 from service.synthesis.walk import region, stride
 from service.synthesis.walk.region import Region
 
-# Slower than this nothing travels, and speeds nearer than this are one, m/s.
+# A lower speed does not count as travel, and speeds closer than this count as equal, m/s.
 STILL = 0.05
-# Rounds of correcting what is asked by what came of it.
+# Iterations that correct the requested rates by the resulting ones.
 ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class Gait:
-    """A model's way of walking.
+    """Relation between the controls of a model and the rates at which it walks.
 
-    rates (N, 2): speed, m/s, and rate of turning, rad/s, of each captured clip, as the model
-    walks it. slopes (3, d): regression of controls on 1 and rates. manners (p + 1, d): what each
-    performer does otherwise, and nobody in particular at the end. region: of the rates, with
-    straight on at all their speeds.
+    rates: (N, 2), speed, m/s, and rate of turning, rad/s, of each captured clip as the model
+    synthesises it. slopes: (3, d), regression of controls on 1 and rates. manners: (p + 1, d), mean
+    residual of each performer; zeros at the end, for an unseen performer. region: convex hull of
+    the rates, extended by walking straight at all speeds.
     """
 
     session: Session
@@ -37,17 +37,17 @@ class Gait:
     region: Region
 
     def typical(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
-        """Controls (K, d) that are usual at speeds (K,), m/s, and rates of turning (K,), rad/s, for
-        performers (K,) by their place on the card, or -1 for nobody in particular.
+        """Return the conditional mean of the controls (K, d) at given rates.
 
-        The conditional mean over the captured clips by linear regression, so that a control which
-        speed and turning leave open, such as the length of a stride, is as clips have it there.
+        speeds: (K,), m/s. turning: (K,), rad/s. who: performers (K,) by index on the card, -1 for
+        an unseen performer. The mean is a linear regression over the captured clips, which also
+        determines controls that do not affect speed or turning, such as the stride length.
         """
         return _design(speeds, turning) @ self.slopes + self.manners[who]
 
     def controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
-        """The same, moved along the regression until the model does what was wanted."""
-        labels = stride.labels(self.session, who)
+        """Return the controls (K, d), along the regression, that lead to these rates."""
+        labels = stride.PerformerLabels(self.session, who)
         speed, turn = speeds, turning
         for _ in range(ROUNDS):
             done = stride.strides(self.session, self.typical(speed, turn, who), labels)
@@ -56,7 +56,10 @@ class Gait:
 
 
 def of(session: Session) -> Gait:
-    """Gait of a model; InvalidField where it is not of a cycle, stays in place or has one speed."""
+    """Return the gait of a model.
+
+    Raises InvalidField if it is not cyclic, stays in place or has one speed.
+    """
     card = session.card
     if not card.cyclic:
         raise InvalidField("model", f"{card.name} is no cycle, expected one that can be repeated")
@@ -68,7 +71,7 @@ def of(session: Session) -> Gait:
     rates = np.column_stack([own.speeds, own.turning])
     _refuse_one_speed(card.name, rates[:, 0])
     slopes = np.linalg.lstsq(_design(*rates.T), controls, rcond=None)[0]
-    manners = _manners(controls - _design(*rates.T) @ slopes, who, len(card.performers))
+    manners = mean_residuals(controls - _design(*rates.T) @ slopes, who, len(card.performers))
     return Gait(session, rates, slopes, manners, region.hull(_with_straight(rates)))
 
 
@@ -82,8 +85,11 @@ def _refuse_one_speed(name: str, speeds: Floats) -> None:
 
 
 def _with_straight(rates: Floats) -> Floats:
-    """Rates and straight on at the slowest and the fastest: a stride cut from a straight walk turns
-    by a few degrees either way, which nobody would take for the least that the walker can turn."""
+    """Return the rates with straight walking added at the slowest and the fastest speed.
+
+    A stride cut from a straight walk turns by a few degrees, which is no lower bound of the
+    turning.
+    """
     ends = np.array([rates[:, 0].min(), rates[:, 0].max()])
     return np.vstack([rates, np.column_stack([ends, np.zeros(2)])])
 
@@ -92,8 +98,11 @@ def _design(speeds: Floats, turning: Floats) -> Floats:
     return np.column_stack([np.ones(len(speeds)), speeds, turning])
 
 
-def _manners(residuals: Floats, who: Indices, performers: int) -> Floats:
-    """Mean residuals (p + 1, d) of performers, as if one clip more were usual; zeros at the end."""
+def mean_residuals(residuals: Floats, who: Indices, performers: int) -> Floats:
+    """Return the mean residuals (p + 1, d) of performers, with zeros at the end.
+
+    Each mean is shrunk by one additional clip with a residual of zero.
+    """
     theirs = np.arange(performers)[:, None] == who
     means = theirs @ residuals / (theirs.sum(axis=1, keepdims=True) + 1.0)
     return np.vstack([means, np.zeros(residuals.shape[1])])

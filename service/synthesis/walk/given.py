@@ -1,4 +1,4 @@
-"""Ways that somebody prescribes: through waypoints, at a speed."""
+"""Paths from given routes: waypoints and a speed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,22 +13,25 @@ from service.synthesis.walk import plane
 from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.paths import STEP, Paths
 
-# Points of a curve to each STEP of the straight lines between its waypoints.
+# Points of a curve per STEP of the straight lines between its waypoints.
 DENSE = 10
-# A way of so many metres is walked in hours, and through so many points it is drawn in seconds.
+# Largest length, m, which takes hours to walk, and most waypoints, whose spline takes seconds.
 LONGEST, MOST_WAYPOINTS = 10_000.0, 1_000
 
 
 @dataclass(frozen=True)
 class Route:
-    """Waypoints (P, 2) to the left and forward, x and z, m, in order, and one speed, m/s."""
+    """Waypoints (P, 2) in order, x to the left and z forward, m, and one speed, m/s."""
 
     waypoints: Floats
     speed: float
 
 
 def parse(plain: Any) -> list[Route]:
-    """Routes of [{"waypoints": [[x, z], ...], "speed": v}, ...]; InvalidField for what is none."""
+    """Return the routes of [{"waypoints": [[x, z], ...], "speed": v}, ...].
+
+    Raises InvalidField for malformed values.
+    """
     if not isinstance(plain, list) or not plain:
         raise InvalidField("paths", "expected a list of one or more routes")
     return [_parsed(f"paths/{index}", entry) for index, entry in enumerate(plain)]
@@ -47,18 +50,17 @@ def _parsed(field: str, entry: Any) -> Route:
 
 
 def through(gait: Gait, routes: Sequence[Route]) -> Paths:
-    """Paths of routes: natural cubic splines, whose bends change without a jump and which meet
-    every waypoint.
+    """Return the paths of routes: natural cubic splines through all waypoints.
 
-    A speed is kept where the way bends: InvalidField names the route and the place where the model
-    was never seen to turn so sharply at it, a speed that it was never seen to walk at, and
-    waypoints that no curve leads through.
+    Curvature is continuous, and the speed is constant. Raises InvalidField, which names the route
+    and the place, for a turn that is sharper than sampled at this speed, for a speed outside the
+    sampled range, and for unusable waypoints.
     """
     for index, route in enumerate(routes):
         _check(gait, index, route)
     curves = [_headings(route.waypoints) for route in routes]
     places = max(len(headings) for headings, _ in curves) + 1
-    # What follows the end of a way is never walked.
+    # Padding beyond the end of a path is not walked.
     rows = [np.pad(headings, (0, places - len(headings)), "edge") for headings, _ in curves]
     paths = Paths(
         np.array([complex(*route.waypoints[0, ::-1]) for route in routes]),
@@ -100,7 +102,10 @@ def _check(gait: Gait, index: int, route: Route) -> None:
 
 
 def _headings(waypoints: Floats) -> tuple[Floats, float]:
-    """Headings (K,) of a curve through waypoints (P, 2) every STEP of it, and its length, m."""
+    """Return headings (K,), rad, at every STEP of a spline, and its length, m.
+
+    waypoints: (P, 2), m, on the spline.
+    """
     knots = np.pad(np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)), (1, 0))
     count = DENSE * int(np.ceil(knots[-1] / STEP)) + 1
     points, slopes = _spline(knots, waypoints, np.linspace(0.0, knots[-1], count))
@@ -111,10 +116,10 @@ def _headings(waypoints: Floats) -> tuple[Floats, float]:
 
 
 def _spline(knots: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Natural cubic spline of values (P, 2) at knots (P,): itself and its slope at (S,)."""
+    """Return the natural cubic spline of values (P, 2) at knots (P,): values and slopes at (S,)."""
     gaps = np.diff(knots)
     seconds = np.zeros_like(values)
-    # Slopes agree at the inner knots: three neighbours' second derivatives in each equation.
+    # Slopes are continuous at the inner knots: three neighbouring second derivatives per equation.
     system = np.diag((gaps[:-1] + gaps[1:]) / 3.0)
     system += np.diag(gaps[1:-1] / 6.0, 1) + np.diag(gaps[1:-1] / 6.0, -1)
     chords = np.diff(values, axis=0) / gaps[:, None]

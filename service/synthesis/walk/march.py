@@ -1,7 +1,7 @@
-"""Many walkers over time: first where each is, in which phase and with which controls, then poses.
+"""Locomotion plans: positions, phases and controls of all characters over time, then their poses.
 
-Planning is cheap, and made for all characters and frames at once. Posing is asked for whichever
-pairs of character and frame are wanted.
+A plan is cheap and computed for all characters and frames at once. Poses are computed for any pairs
+of character and frame.
 """
 
 from dataclasses import dataclass, replace
@@ -23,10 +23,11 @@ Numbers = TypeVar("Numbers", Floats, Plane)
 
 @dataclass(frozen=True)
 class Plan:
-    """What N characters do at F frames of a rate, all but their poses.
+    """Locomotion of N characters at F frames, without their poses.
 
-    controls (N, F, d), who (N,): performers by place on the card or -1, phases (N, F): of the
-    cycle, in [0, 1). places (N, F), headings (N, F), rad: of the frames that go along with them.
+    controls: (N, F, d). who: (N,), performers by index on the card or -1. phases: (N, F), of the
+    cycle, in [0, 1). places: (N, F) and headings: (N, F), rad, of the frames that travel with the
+    characters. rate: frames a second.
     """
 
     controls: Floats
@@ -42,7 +43,7 @@ class Plan:
         return plane.at_height(self.places, np.zeros(self.places.shape))
 
     def at_home(self) -> "Plan":
-        """The same, each character in the frame that it begins in."""
+        """Return the plan with each character in the frame of its start."""
         first, facing = self.places[:, :1], self.headings[:, :1]
         places = (self.places - first) * plane.facing(-facing)
         return replace(self, places=places, headings=self.headings - facing)
@@ -56,9 +57,9 @@ def roam(
     starts: tuple[Plane, Floats],
     rate: float,
 ) -> Plan:
-    """Plan of controls (N, F, d): the way is what the model makes of them.
+    """Return the plan of controls (N, F, d); the trajectories follow from the model's travel.
 
-    phases (N,), starts: places (N,) and headings (N,), rad, at the first frame.
+    phases: (N,) and starts: places (N,) and headings (N,), rad, at the first frame.
     """
     own = _strides(gait, controls, who)
     turns = _steps(own.turning, rate)
@@ -72,17 +73,16 @@ def roam(
 def follow(
     gait: Gait, paths: Paths, who: Indices, phases: Floats, frames: int, rate: float
 ) -> Plan:
-    """Plan of paths: each character goes along its own at the speed that the model makes of the
-    controls, turned as the path is.
+    """Return the plan of characters along paths, at the speed of the synthesised gait.
 
-    phases (N,): of the cycle, at the first frame. Raises InvalidField for a path that ends too
+    phases: (N,), of the cycle at the first frame. Raises InvalidField for a path that ends too
     soon.
     """
     known = paths.speeds.shape
     everyone = np.repeat(who, known[1])
     turning = (paths.speeds * paths.bends).ravel()
     wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
-    labels = stride.labels(gait.session, everyone)
+    labels = stride.PerformerLabels(gait.session, everyone)
     speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
     gone = _gone(speeds, frames, rate)
     _refuse_short(paths, gone, (frames - 1) / rate)
@@ -93,7 +93,7 @@ def follow(
 
 
 def pose(session: Session, plan: Plan, who: Indices, frames: Indices, level: int = 0) -> Poses:
-    """Poses of K pairs of a character (K,) and a frame (K,), where the plan has them."""
+    """Return the poses of K pairs of a character (K,) and a frame (K,) of the plan."""
     performers = stride.labels(session, plan.who[who])
     pair = who, frames
     own = stride.poses(session, plan.controls[pair], performers, plan.phases[pair], level)
@@ -103,15 +103,15 @@ def pose(session: Session, plan: Plan, who: Indices, frames: Indices, level: int
 
 
 def _strides(gait: Gait, controls: Floats, who: Indices) -> Strides:
-    """Cycles whose fields are (N, F), of controls (N, F, d)."""
+    """Return the cycles of controls (N, F, d), with fields (N, F)."""
     frames = controls.shape[:2]
-    labels = stride.labels(gait.session, np.repeat(who, frames[1]))
+    labels = stride.PerformerLabels(gait.session, np.repeat(who, frames[1]))
     own = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
     return Strides(*(value.reshape(frames) for value in vars(own).values()))
 
 
 def _steps(paces: Numbers, rate: float) -> Numbers:
-    """What is done between frames (N, F - 1) at paces (N, F) a second, by the trapezoidal rule."""
+    """Return the increments (N, F - 1) of rates (N, F) per second, by the trapezoidal rule."""
     return 0.5 * (paces[:, 1:] + paces[:, :-1]) / rate
 
 
@@ -124,12 +124,12 @@ def _phases(own: Strides, first: Floats, rate: float) -> Floats:
 
 
 def _gone(speeds: Floats, frames: int, rate: float) -> Floats:
-    """Metres (N, F) gone along ways at whose known places one has speeds (N, K), or to the end."""
+    """Return the distances (N, F), m, along paths with speeds (N, K) at their known points."""
     arrived = _summed(0.5 * STEP * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
-    # One interpolation for all: each row's times come after those of the row before.
+    # One interpolation for all rows: each row's times are offset beyond those of the row before.
     apart = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
     ways = np.tile(STEP * np.arange(speeds.shape[1]), len(speeds))
-    # Whoever has arrived stays there: between two rows nothing is known.
+    # A character that has arrived stays there; the gap between two rows must not be interpolated.
     when = np.minimum(np.arange(frames) / rate, arrived[:, -1:])
     return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
 

@@ -1,10 +1,13 @@
-"""What one may ask of a crowd that walks, and the crowd."""
+"""Order of a walking crowd: validated parameters, and the crowd they result in."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from service.motion.crowd import CrowdClip
 from service.motion.errors import InvalidField
+from service.question.walk_question import FOV, HEIGHT, WalkQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.view import Camera
 from service.synthesis.walk import company, detail, wander
@@ -14,26 +17,26 @@ from service.synthesis.walk.given import Route
 from service.synthesis.walk.march import Plan
 
 MOST = 1_000_000
-"""Characters of one crowd, who may share their motions."""
-COUNT, SECONDS, FPS, SEED, PIXELS = 500, 10.0, 30.0, 0, 1.0
+"""Largest number of characters of one crowd, which may share motions."""
+FPS, PIXELS = 30.0, 1.0
 
 
 @dataclass(frozen=True)
 class Order:
-    """Who walks and how they are shown.
+    """Parameters of a walking crowd.
 
-    count: characters, each on a way of its own; or as many as there are routes. motions: how many
-    different ones they share, all of their own if none is said. seconds, fps: how long, and frames
-    a second. seed: of all that is random. level: of detail, the finest if not said, if not chosen
-    by a camera for errors of at most so many pixels.
+    count: characters, each on its own path; with routes, their number. routes: given routes.
+    motions: number of distinct motions that the characters share, None for one each. seconds:
+    duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
+    if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
     """
 
-    count: int = COUNT
+    count: int
     routes: Sequence[Route] = ()
     motions: int | None = None
-    seconds: float = SECONDS
+    seconds: float = 10.0
     fps: float = FPS
-    seed: int = SEED
+    seed: int = 0
     level: int | None = None
     camera: Camera | None = None
     pixels: float = PIXELS
@@ -55,10 +58,30 @@ class Order:
             raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
 
 
-def crowd(model: Synthesizer, gait: Gait, order: Order) -> CrowdClip:
-    """Crowd of an order, whose motions are made as they are asked for.
+def of(asked: WalkQuestion, routes: Sequence[Route] = ()) -> Order:
+    """Return the order of a question; its characters follow the routes if there are any."""
+    camera = None
+    if asked.camera is not None:
+        fov = FOV if asked.fov is None else asked.fov
+        height = HEIGHT if asked.height is None else asked.height
+        camera = Camera(np.array(asked.camera), fov, height)
+    return Order(
+        count=asked.count,
+        routes=routes,
+        motions=asked.motions,
+        seconds=asked.seconds,
+        fps=asked.fps,
+        seed=asked.seed,
+        level=asked.level,
+        camera=camera,
+        pixels=PIXELS if asked.pixels is None else asked.pixels,
+    )
 
-    Raises InvalidField for what cannot be done.
+
+def crowd(model: Synthesizer, gait: Gait, order: Order) -> CrowdClip:
+    """Return the crowd of an order, whose motions are computed on demand.
+
+    Raises InvalidField for parameters that the model or the limits do not permit.
     """
     plan = _plan(gait, order)
     return _crowd(gait, plan, _detail(model, plan, order), order)

@@ -1,4 +1,4 @@
-"""Ways over the floor that walkers follow: where they lead, and how fast."""
+"""Paths on the floor that characters follow, with speeds."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,16 @@ from service.motion.conventions import Floats, Indices
 from service.synthesis.walk import plane
 from service.synthesis.walk.plane import Plane
 
-# Between two places that a path is known at, m. The turn between them is even.
+# Distance between known points of a path, m. Heading is linear between them.
 STEP = 0.1
 
 
 @dataclass(frozen=True)
 class Paths:
-    """N ways, each known at K places that lie STEP apart along it.
+    """N paths, each known at K points that lie STEP apart along it.
 
-    starts (N,): where it begins. headings (N, K), rad, of the tangents, without jumps; between two
-    places the way is an arc. speeds (N, K), m/s. lengths (N,), m: where it ends.
+    starts: (N,), first points. headings: (N, K), rad, of the tangents, without jumps; between two
+    points a path is an arc. speeds: (N, K), m/s. lengths: (N,), m.
     """
 
     starts: Plane
@@ -32,13 +32,13 @@ class Paths:
 
     @property
     def places(self) -> Plane:
-        """Where the ways are known (N, K)."""
+        """Known points of the paths (N, K)."""
         turns = np.diff(self.headings, axis=1)
         steps = plane.facing(self.headings[:, :-1]) * plane.arc(np.array(STEP), turns)
         return self.starts[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
     def at(self, gone: Floats) -> tuple[Plane, Floats]:
-        """Places (N, F) and headings (N, F) of the tangent after (N, F) metres."""
+        """Return points (N, F) and headings (N, F), rad, of the tangents after (N, F) metres."""
         before, share = self._between(gone)
         turns = share * np.take_along_axis(np.diff(self.headings, axis=1), before, axis=1)
         first = np.take_along_axis(self.headings, before, axis=1)
@@ -46,7 +46,7 @@ class Paths:
         return np.take_along_axis(self.places, before, axis=1) + along, first + turns
 
     def along(self, values: Floats, gone: Floats) -> Floats:
-        """Values (N, K, ...) of the known places after (N, F) metres, (N, F, ...), linearly."""
+        """Return values (N, K, ...) of the known points after (N, F) metres: (N, F, ...)."""
         before, share = self._between(gone)
         rows = np.arange(len(values))[:, None]
         share = share.reshape(*share.shape, *[1] * (values.ndim - 2))

@@ -1,7 +1,7 @@
-"""Places on the floor as complex numbers z + i x: forward is real, left is imaginary.
+"""Points on the floor as complex numbers z + i x: forward is real, left is imaginary.
 
-A heading h, which turns about +Y, is then the factor exp(i h), and rigid motion over the floor is
-multiplication and addition.
+A heading h about +Y is the factor exp(i h), so rigid motion over the floor is multiplication and
+addition.
 """
 
 import numpy as np
@@ -14,31 +14,35 @@ Plane = npt.NDArray[np.complex128]
 
 
 def of(points: Floats) -> Plane:
-    """Places (...) of points (..., 3), m."""
+    """Return the floor points (...) below points (..., 3), m."""
     return points[..., 2] + 1j * points[..., 0]
 
 
 def at_height(places: Plane, height: Floats) -> Floats:
-    """Points (..., 3), m, that stand so high over places (...)."""
+    """Return points (..., 3), m, at a height above floor points (...)."""
     return np.stack(np.broadcast_arrays(places.imag, height, places.real), axis=-1)
 
 
 def facing(headings: Floats) -> Plane:
-    """Unit vectors (...) of headings, rad."""
+    """Return the unit vectors (...) of headings, rad."""
     return np.exp(1j * headings)
 
 
 def arc(way: Plane | Floats, turn: Floats) -> Plane:
-    """Where one gets to who goes a way of constant speed and turns evenly by `turn`, rad.
+    """Return the displacement of a path of constant speed and constant rate of turning.
 
-    The exponential map of rigid motion in the plane: a straight line where nothing turns, else an
-    arc whose length is that of the way.
+    way: length and direction of the path at its start. turn: change of heading, rad. This is the
+    exponential map of rigid motion in the plane: a straight line for no turn, else an arc of the
+    same length.
     """
     return way * _bent(turn)
 
 
 def straightened(gap: Plane, turn: Floats) -> Plane:
-    """The way whose arc leads over a gap: the inverse of `arc`, for less than a whole turn."""
+    """Return the way whose arc covers a displacement: the inverse of `arc`.
+
+    turn: of less than a whole turn, rad.
+    """
     return gap / _bent(turn)
 
 
@@ -48,6 +52,6 @@ def _bent(turn: Floats) -> Plane:
 
 
 def turned(rotations: Floats, headings: Floats) -> Floats:
-    """Rotations (..., J, 4) of bodies whose roots are turned on by headings (...) about +Y."""
+    """Return rotations (..., J, 4) with the roots turned by headings (...), rad, about +Y."""
     root = quat.mul(quat.about(UP, headings), rotations[..., 0, :])
     return np.concatenate([root[..., None, :], rotations[..., 1:, :]], axis=-2)

@@ -1,4 +1,4 @@
-"""Which speeds and rates of turning were sampled: the convex hull of them."""
+"""Convex hull of the sampled speeds and rates of turning."""
 
 from dataclasses import dataclass
 
@@ -7,37 +7,40 @@ import numpy.typing as npt
 
 from service.motion.conventions import Floats
 
-# How far outside an edge rounding may put what lies on it, m/s and rad/s.
+# Tolerance for the rounding of points on an edge, m/s and rad/s.
 SLACK = 1e-6
 
 
 @dataclass(frozen=True)
 class Region:
-    """A convex region of speeds, m/s, and rates of turning, rad/s: normals (E, 2) times a pair are
-    at most limits (E,). speeds: the least and the most."""
+    """Convex region of speeds, m/s, and rates of turning, rad/s.
+
+    normals: (E, 2) and limits: (E,); a pair is inside where normals times it are at most the
+    limits. speeds: the smallest and the largest.
+    """
 
     normals: Floats
     limits: Floats
     speeds: tuple[float, float]
 
     def holds(self, speeds: Floats, turning: Floats) -> npt.NDArray[np.bool_]:
-        """Whether pairs (...) lie within."""
+        """Return whether pairs (...) are inside the region."""
         pairs = np.stack(np.broadcast_arrays(speeds, turning), axis=-1)
         return np.all(pairs @ self.normals.T <= self.limits + SLACK, axis=-1)
 
     def turning(self, speeds: Floats) -> tuple[Floats, Floats]:
-        """Least and most rate of turning (...) at speeds (...) within the region."""
+        """Return the smallest and the largest rate of turning (...), rad/s, at speeds (...)."""
         right, left = self.normals[:, 1] < 0.0, self.normals[:, 1] > 0.0
         return self._ends(speeds, right).max(axis=-1), self._ends(speeds, left).min(axis=-1)
 
     def _ends(self, speeds: Floats, edges: npt.NDArray[np.bool_]) -> Floats:
-        """Rates of turning (..., E) at which some edges are met at speeds (...)."""
+        """Return the rates of turning (..., E) at which the edges lie at speeds (...)."""
         along, across = self.normals[edges].T
         return (self.limits[edges] - speeds[..., None] * along) / across
 
 
 def hull(pairs: Floats) -> Region:
-    """Convex hull of pairs (N, 2) of speed and rate of turning."""
+    """Return the convex hull of pairs (N, 2) of speed and rate of turning."""
     corners = _corners(np.unique(pairs, axis=0))
     edges = np.roll(corners, -1, axis=0) - corners
     normals = np.column_stack([edges[:, 1], -edges[:, 0]])
@@ -47,7 +50,7 @@ def hull(pairs: Floats) -> Region:
 
 
 def _corners(ordered: Floats) -> Floats:
-    """Corners, counter-clockwise, of sorted points (Andrew's monotone chain)."""
+    """Return the hull's corners, counter-clockwise, of sorted points (Andrew's monotone chain)."""
     below, above = _chain(ordered), _chain(ordered[::-1])
     return np.array([*below[:-1], *above[:-1]])
 

@@ -1,4 +1,4 @@
-"""How fast the feet of walkers slide on the ground, a stride at a time."""
+"""Foot skate of walking characters, per stride."""
 
 import numpy as np
 
@@ -11,11 +11,10 @@ from service.synthesis.walk.gait import Gait
 
 
 def of(card: ModelCard, motions: Motions, rate: float) -> Floats:
-    """Mean sliding speed (M, strides), m/s, of motions cut into lengths of a usual stride.
+    """Return the mean foot skate (M, strides), m/s, of motions cut into lengths of a mean stride.
 
-    A stride's own lowest height says where the ground is, as it does for a captured clip: what is
-    left over at the end is not looked at, but for a motion shorter than a stride. The card names
-    feet.
+    The ground is at the lowest height of each stride, as for captured clips. A remainder at the end
+    is ignored, unless the motion is shorter than a stride. Needs a card with feet.
     """
     frames = motions.rotations.shape[1]
     length = min(round(float(np.mean(card.durations)) * rate) + 1, frames)
@@ -24,13 +23,13 @@ def of(card: ModelCard, motions: Motions, rate: float) -> Floats:
         for part in (motions.bone_offsets, motions.root_position, motions.rotations)
     )
     local = skeleton.translations(bones, roots)
-    joints, _ = skeleton.forward(card.skeleton.parents, rotations, local)
+    joints = skeleton.positions(card.skeleton.parents, rotations, local)
     feet = joints[:, : frames // length * length, list(card.feet)]
     return ground.skate(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
 
 
 def of_strides(gait: Gait, rate: float) -> Floats:
-    """The same (N, 1) of one stride at the controls and performer of each captured clip."""
+    """Return the foot skate (N, 1), m/s, of one stride at each captured clip's controls."""
     card = gait.session.card
     controls = np.array(card.examples)
     length = round(float(np.mean(card.durations)) * rate) + 1
@@ -44,7 +43,7 @@ def of_strides(gait: Gait, rate: float) -> Floats:
 
 
 def usual(gait: Gait, rate: float) -> float:
-    """Mean of the model's own strides, m/s, every performer counting alike, as a crowd has them."""
+    """Return the mean foot skate of the model's strides, m/s, performers weighted equally."""
     speeds = of_strides(gait, rate)[:, 0]
     moved_by = stride.movers(gait.session.card)
     return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))

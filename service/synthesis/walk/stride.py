@@ -1,9 +1,8 @@
-"""What a model does in one cycle, and its poses apart from where they take place.
+"""One cycle of a model: its duration and travel, and poses relative to the travel.
 
-A cycle carries its walker along an arc: a way of constant speed and direction in his own axes while
-his heading turns evenly. Poses are given in a frame that goes along that arc evenly in time. In
-that frame a cycle ends in the very pose that it begins with, whichever way it goes, and all that
-sways about the arc is left in the pose.
+A cycle moves a character along an arc: at constant speed and direction in its own axes, while its
+heading turns evenly. Poses are given in a frame that moves along that arc evenly in time. In that
+frame the last pose of a cycle equals its first, and the sway about the arc is part of the pose.
 """
 
 from collections.abc import Iterator
@@ -11,24 +10,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.motion import cancel
 from service.motion.card import ModelCard
 from service.motion.conventions import Floats, Indices, Singles
 from service.synthesis.session import Session
 from service.synthesis.walk import plane
 from service.synthesis.walk.plane import Plane
 
-# Of more, onnxruntime's buffers outgrow the caches and each costs up to eight times as much.
+# For larger batches onnxruntime's buffers outgrow the caches, and a pose costs up to eight times as
+# much.
 BATCH = 1000
-# The graph takes a time after the end for the end, s.
+# A time after the end of every clip, s; the graph limits times to the end.
 AFTER = 1e9
 
 
 @dataclass(frozen=True)
 class Strides:
-    """One cycle each of B walkers.
+    """One cycle each of B characters.
 
-    durations (B,), s. ways (B,): covered in a cycle, m, in the walker's own axes. turns (B,):
-    change of heading, rad. starts (B,): where the model puts the root at the beginning.
+    durations: (B,), s. ways: (B,), travel along the arc, m, in the character's own axes. turns:
+    (B,), change of heading, rad. starts: (B,), root positions at the beginning.
     """
 
     durations: Floats
@@ -48,33 +49,52 @@ class Strides:
 
     @property
     def drifts(self) -> Floats:
-        """Angle (B,) to the left of the heading at which the walker goes, rad."""
+        """Direction of travel (B,) relative to the heading, positive to the left, rad."""
         return np.angle(self.ways)
 
 
 @dataclass(frozen=True)
+class PerformerLabels:
+    """Labels (B, p) of performers (B,), computed for the requested rows.
+
+    who: performers by index on the card, -1 for an unseen one. All rows at once would take more
+    memory than the rest of a plan.
+    """
+
+    session: Session
+    who: Indices
+
+    def __getitem__(self, rows: slice) -> Floats:
+        return labels(self.session, self.who[rows])
+
+
+@dataclass(frozen=True)
 class Poses:
-    """K poses in frames that go along: rotations (K, J, 4), heights (K,), m, of the root, and where
-    it is (K,) over the floor."""
+    """K poses in frames that travel with the characters.
+
+    rotations: (K, J, 4). heights: (K,), of the root, m. places: (K,), of the root over the floor.
+    """
 
     rotations: Floats
     heights: Floats
     places: Plane
 
 
-def strides(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
-    """Cycles of controls (B, d) as performers of labels (B, p) walk them at a level of detail."""
+def strides(
+    session: Session, controls: Floats, labels: Floats | PerformerLabels, level: int = 0
+) -> Strides:
+    """Return the cycles of controls (B, d) for performer labels (B, p), at a level of detail."""
     ends = np.full((len(controls), 1), AFTER)
     asked = ("duration", "travel", "root_position")
     durations, travel, roots = _ask(session, controls, ends, labels, level, *asked)
     gap, turns = travel[:, 0, 1] + 1j * travel[:, 0, 0], travel[:, 0, 2]
-    # Without its travel a cycle ends where it began.
+    # A cycle without its travel ends at its start.
     starts = plane.of(roots[:, 0]) - gap
     return Strides(durations, plane.straightened(gap, turns), turns, starts)
 
 
 def straight(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
-    """The same of clips that are no cycles: the straight way from the first pose to the last."""
+    """Return the straight line from first to last pose of clips that are not cyclic."""
     times = np.tile([0.0, AFTER], (len(controls), 1))
     asked = ("duration", "root_position")
     durations, roots = _ask(session, controls, times, labels, level, *asked)
@@ -85,7 +105,7 @@ def straight(session: Session, controls: Floats, labels: Floats, level: int = 0)
 def poses(
     session: Session, controls: Floats, labels: Floats, phases: Floats, level: int = 0
 ) -> Poses:
-    """Poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, from 0 to 1."""
+    """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
     own = strides(session, controls, labels, level)
     times = (phases * own.durations)[:, None]
     asked = ("rotations", "root_position")
@@ -94,39 +114,59 @@ def poses(
 
 
 def beside(own: Strides, phases: Floats, rotations: Floats, roots: Floats) -> Poses:
-    """Poses of rotations (K, J, 4) and roots (K, 3) at phases (K,) of K strides, or of one."""
+    """Return poses relative to the travel, at phases (K,) of the cycle.
+
+    own: K strides, or one for all. rotations: (K, J, 4) and roots: (K, 3), m, of the poses.
+    """
     turned = phases * own.turns
     gone = plane.of(roots) - own.starts - plane.arc(phases * own.ways, turned)
     return Poses(plane.turned(rotations, -turned), roots[:, 1], gone * plane.facing(-turned))
 
 
 def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
-    """Bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
+    """Return the bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
     begin = np.zeros((len(controls), 1))
     return _ask(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
 
 
 def movers(card: ModelCard) -> Indices:
-    """Whose each captured clip is (N,), by place on the card, or -1 where nobody is told apart."""
+    """Return the performers (N,) of the captured clips by index on the card; -1 without any."""
     return np.array(card.moved_by or [-1] * len(card.examples))
 
 
 def labels(session: Session, who: Indices) -> Floats:
-    """Labels (..., p) of performers by their place on the card; all zero at -1, for nobody."""
+    """Return the labels (..., p) of performers by index on the card; all zero for -1."""
     performers = len(session.card.performers)
     return np.vstack([np.eye(performers), np.zeros(performers)])[who]
 
 
 def _ask(
-    session: Session, controls: Floats, times: Floats, labels: Floats, level: int, *outputs: str
+    session: Session,
+    controls: Floats,
+    times: Floats,
+    labels: Floats | PerformerLabels,
+    level: int,
+    *outputs: str,
 ) -> list[Floats]:
-    """Outputs for any number of rows, a batch at a time."""
-    answers = [
-        session.run(controls[rows], times[rows], *outputs, labels=labels[rows], level=level)
-        for rows in _batches(len(controls))
-    ]
-    return [np.concatenate(parts).astype(np.float64) for parts in zip(*answers, strict=True)]
+    """Return the graph's outputs for any number of rows, computed in batches."""
+    found: list[Floats] = []
+    for rows in _batches(len(controls)):
+        cancel.check()
+        own = controls[rows], times[rows]
+        parts = session.run(*own, *outputs, labels=labels[rows], level=level)
+        if not found:
+            found = [np.empty((len(controls), *part.shape[1:])) for part in parts]
+        # Copied, not kept: small blocks between onnxruntime's large ones would prevent the
+        # allocator from reusing those, and memory would grow with each batch.
+        for whole, part in zip(found, parts, strict=True):
+            whole[rows] = part
+    return found
 
 
 def _batches(rows: int) -> Iterator[slice]:
-    return (slice(first, first + BATCH) for first in range(0, rows, BATCH))
+    first = 0
+    while first < rows:
+        # A matrix product with one row sums in another order, so no batch of several has one row.
+        count = BATCH - 1 if rows - first == BATCH + 1 else BATCH
+        yield slice(first, first + count)
+        first += count

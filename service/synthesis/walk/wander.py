@@ -1,7 +1,7 @@
-"""Ways that nobody prescribed: each character's own, within what was sampled.
+"""Random paths within the sampled speeds and rates of turning.
 
-All that is random of a character is one row of a table that is drawn row by row: it hangs on the
-seed and the character's number alone, not on how many others there are or for how long they walk.
+The random numbers of a character are one row of a table that is generated row by row: they depend
+on the seed and the character's index, not on the size of the crowd or the duration.
 """
 
 from dataclasses import dataclass
@@ -15,22 +15,22 @@ from service.synthesis.walk.gait import Gait
 from service.synthesis.walk.paths import STEP, Paths
 from service.synthesis.walk.plane import Plane
 
-# Characters stand this far apart at first, in a grid, each up to so far from its place, m.
+# Spacing of the initial grid, and largest offset of a character from its grid point, m.
 SPACING, JITTER = 2.0, 0.5
-# Turning and speed rise and fall over these lengths of the way, m, with these weights.
+# Wavelengths, m, and weights of the variation of turning and speed along a path.
 WAVES, WEIGHTS = np.array([23.0, 11.0, 6.1]), np.array([0.5, 0.3, 0.2])
-# The share of the turning sampled at a speed that is used, and how far a speed varies.
+# Share of the sampled turning that is used, and relative variation of the speed.
 BEND, HASTE = 0.8, 0.15
-# This share of the speeds sampled is left out at either end, where next to no turning was.
+# Share of the sampled speeds that is left out at either end, where little turning was sampled.
 MARGIN = 0.05
 
 
 @dataclass(frozen=True)
 class Cast:
-    """N characters.
+    """Performers, phases and random numbers of N characters.
 
-    who (N,): their performers by place on the card, -1 where none are told apart. phases (N,): of
-    the cycle, at the beginning. drawn (N, columns): numbers from 0 to 1 for their ways.
+    who: (N,), performers by index on the card, -1 for a model without any. phases: (N,), of the
+    cycle at the beginning. drawn: (N, columns), random numbers from 0 to 1 for the paths.
     """
 
     who: Indices
@@ -39,7 +39,7 @@ class Cast:
 
 
 def cast(gait: Gait, count: int, seed: int) -> Cast:
-    """Characters of a seed."""
+    """Return the characters of a seed."""
     table = _table(count, seed)
     performers = len(gait.session.card.performers)
     who = (table[:, 0] * performers).astype(np.int64) if performers else np.full(count, -1)
@@ -47,13 +47,13 @@ def cast(gait: Gait, count: int, seed: int) -> Cast:
 
 
 def stands(count: int, seed: int) -> Placement:
-    """Where so many characters stand at first, and where to they face: as their own ways begin."""
+    """Return the initial positions and headings of `count` characters' paths."""
     drawn = _table(count, seed)[:, 2:]
     return Placement(plane.at_height(_starts(drawn[:, :2]), np.zeros(count)), _facing(drawn))
 
 
 def paths(gait: Gait, characters: Cast, seconds: float) -> Paths:
-    """Ways on which characters wander for a time, long enough for the fastest."""
+    """Return random paths, long enough for `seconds` at the highest speed."""
     spot, pace = characters.drawn[:, :2], characters.drawn[:, 3]
     waves = 2.0 * np.pi * characters.drawn[:, 4:].reshape(len(spot), 2, len(WAVES))
     places = int(np.ceil(gait.region.speeds[1] * seconds / STEP)) + 3
@@ -61,7 +61,7 @@ def paths(gait: Gait, characters: Cast, seconds: float) -> Paths:
     usual = _usual(gait, characters.who, pace)
     speeds = _speeds(gait, usual, _wave(along, waves[:, 0]))
     bends = _bends(gait, speeds, _wave(along, waves[:, 1]))
-    # The trapezoidal rule: the bend of a step is the mean of those at its ends.
+    # The trapezoidal rule: the curvature of a step is the mean of those at its ends.
     turns = np.cumsum(0.5 * STEP * (bends[:, 1:] + bends[:, :-1]), axis=1)
     headings = _facing(characters.drawn)[:, None] + np.pad(turns, ((0, 0), (1, 0)))
     return Paths(_starts(spot), headings, speeds, np.full(len(spot), along[-1]))
@@ -76,8 +76,10 @@ def _facing(drawn: Floats) -> Floats:
 
 
 def _starts(spot: Floats) -> Plane:
-    """Starts (N,), m: a grid whose places are numbered in growing squares, so that a character's
-    does not hang on how many follow."""
+    """Return starts (N,), m, on a grid numbered in growing squares.
+
+    A character's start does not depend on how many characters follow.
+    """
     number = np.arange(len(spot))
     ring = np.sqrt(number).astype(np.int64)
     on = number - ring**2
@@ -87,13 +89,13 @@ def _starts(spot: Floats) -> Plane:
 
 
 def _wave(along: Floats, phases: Floats) -> Floats:
-    """Values (N, K) from -1 to 1 that rise and fall along (K,) m."""
+    """Return values (N, K) from -1 to 1 that vary smoothly along (K,) m."""
     angles = 2.0 * np.pi * along[:, None] / WAVES + phases[:, None]
     return np.sin(angles) @ WEIGHTS
 
 
 def _usual(gait: Gait, who: Indices, drawn: Floats) -> Floats:
-    """Speeds (N, 1) of captured clips, each of the character's own performer."""
+    """Return speeds (N, 1), m/s, of captured clips, each of the character's own performer."""
     moved_by = stride.movers(gait.session.card)
     order = np.argsort(moved_by, kind="stable")
     first, after = (np.searchsorted(moved_by[order], who, side) for side in ("left", "right"))
@@ -102,7 +104,7 @@ def _usual(gait: Gait, who: Indices, drawn: Floats) -> Floats:
 
 
 def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
-    """Speeds (N, K) that vary about the usual ones (N, 1)."""
+    """Return speeds (N, K), m/s, that vary about the mean ones (N, 1)."""
     ends = np.array(gait.region.speeds)
     low, high = ends + MARGIN * (ends[::-1] - ends)
     middle = np.clip(usual, low, high)
@@ -112,7 +114,7 @@ def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
 
 
 def _bends(gait: Gait, speeds: Floats, wave: Floats) -> Floats:
-    """Curvatures (N, K), 1/m: straight at rest of the wave."""
+    """Return curvatures (N, K), 1/m; straight where the wave is zero."""
     low, high = gait.region.turning(speeds)
     return _swung(BEND * wave, low, np.zeros(1), high) / speeds
 

@@ -1,4 +1,4 @@
-"""Who may ask, and what: API keys and bearer tokens, scopes, and what is said of those refused.
+"""Authentication and authorization: API keys, bearer tokens, scopes and the audit log.
 
-`door` is what the application calls; `policy` is made once from the settings.
+The application calls `door` for each request; `policy` is made once from the settings.
 """

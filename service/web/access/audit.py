@@ -1,7 +1,7 @@
-"""The audit log: one line of JSON for each access that was refused.
+"""Audit log: one line of JSON for each refused access.
 
-Who by the name of their key or a pseudonym of their token, the request's id, the contract's path
-and why. Never a key, a token, a query or what stood in the place of a name.
+A line holds the name of the key or a pseudonym of the token, the request id, the path template and
+the reason; it holds no key, no token, no query and no value of a path parameter.
 """
 
 import logging
@@ -13,7 +13,11 @@ log = logging.getLogger(__name__)
 
 
 class Call(NamedTuple):
-    """A request as the log names it; path is the contract's template, never what was asked for."""
+    """A request in the audit log.
+
+    request: its id. method: HTTP method. path: path template of the contract, not the requested
+    path.
+    """
 
     request: str
     method: str
@@ -21,6 +25,9 @@ class Call(NamedTuple):
 
 
 def refused(call: Call, status: int, who: str, why: str) -> None:
-    """Write down that somebody was refused."""
+    """Log a refused request.
+
+    status: of the response. who: name of the principal. why: reason of the refusal.
+    """
     told = {"audit": "refused", "status": status, **call._asdict(), "who": who, "why": why}
     log.warning("%s", orjson.dumps(told).decode())

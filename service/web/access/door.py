@@ -1,4 +1,4 @@
-"""The door: lets a request in, or says why not and writes it down."""
+"""Access control: checks the credentials of a request, and logs refusals in the audit log."""
 
 from collections.abc import Iterable
 
@@ -6,8 +6,8 @@ from service.synthesis.library import Library
 from service.web.access import audit
 from service.web.access.audit import Call
 from service.web.access.keys import PREFIX as KEY
-from service.web.access.policy import Policy, Rejected
-from service.web.access.principal import EVERYONE, METRICS, NOBODY, Principal
+from service.web.access.policy import Policy
+from service.web.access.principal import EVERYONE, METRICS, NOBODY, Principal, Rejected
 from service.web.problems import FORBIDDEN, UNAUTHENTICATED, RequestFault
 
 Headers = Iterable[tuple[bytes, bytes]]
@@ -16,7 +16,11 @@ _SCHEME = "bearer "
 
 
 def check(policy: Policy, headers: Headers, scope: str | None, call: Call) -> Principal:
-    """Who asks for something that needs a scope (None: nothing); raises RequestFault 401 or 403."""
+    """Return the principal of a request.
+
+    scope: the scope that the operation requires; None where it requires none. Raises RequestFault
+    401 for missing or invalid credentials, and 403 for credentials without the scope.
+    """
     if not policy.closed:
         return EVERYONE
     if scope is None or (scope == METRICS and policy.metrics_open):
@@ -33,9 +37,11 @@ def check(policy: Policy, headers: Headers, scope: str | None, call: Call) -> Pr
 
 
 def seen(library: Library, principal: Principal, asked: str | None, call: Call) -> Library:
-    """The library as somebody sees it: what they may not read does not exist.
+    """Return the library restricted to the models that the principal may read.
 
-    Forbidden and unknown models are answered alike, so that nobody learns names by asking.
+    asked: the model key in the request's path, if any; the audit log gets a line if the principal
+    may not read it. Forbidden and unknown models get the same response (404), so that requests
+    cannot probe for names.
     """
     if principal.models is None:
         return library
@@ -65,7 +71,7 @@ def _credentials(headers: Headers) -> str:
 
 
 def _unauthenticated(why: str) -> RequestFault:
-    # RFC 6750, 3.1: without credentials there is no error to name.
+    # RFC 6750, 3.1: a challenge to a request without credentials has no error code.
     error = "" if why == "no Authorization" else ', error="invalid_token"'
     challenge = {"WWW-Authenticate": f'Bearer realm="posefield"{error}'}
     return RequestFault(

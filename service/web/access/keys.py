@@ -1,7 +1,7 @@
-"""API keys: made here, shown once, and known afterwards only by their hash.
+"""API keys: generation, and verification by their SHA-256 hashes.
 
-A key is 256 random bits, so one SHA-256 is as good a hash as a slow one: slowness protects words
-that people choose, which can be guessed; nobody guesses 256 bits.
+A key is 256 random bits, so one SHA-256 suffices: slow password hashes protect against guessing,
+which is infeasible here.
 """
 
 import base64
@@ -17,7 +17,7 @@ from service.web.access import principal
 from service.web.access.principal import Principal
 
 PREFIX = "pf_"
-"""What every key begins with, so that scanners find one that was published."""
+"""Prefix of every key, by which secret scanners recognise a published one."""
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
@@ -25,7 +25,7 @@ _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class Known:
-    """A key as the service knows it."""
+    """A registered key: its SHA-256 digest and its principal."""
 
     digest: bytes
     principal: Principal
@@ -33,15 +33,18 @@ class Known:
 
 @dataclass(frozen=True)
 class Keys:
-    """The keys that there are, by the first bytes of their hashes."""
+    """Registered keys.
+
+    known: by the first 8 bytes of their digests.
+    """
 
     known: Mapping[bytes, Known]
 
     def find(self, key: str) -> Principal | None:
-        """Who a key belongs to, in a time that tells nothing of any key.
+        """Return the principal of a key; None for an unknown key.
 
-        How long it takes to find the first bytes of a hash tells at most those, and no key follows
-        from them; the rest is compared in constant time.
+        Timing reveals no key: the look-up can reveal at most the first bytes of a digest, from
+        which no key follows, and the whole digest is compared in constant time.
         """
         digest = hashlib.sha256(key.encode()).digest()
         known = self.known.get(digest[:8])
@@ -51,14 +54,14 @@ class Keys:
 
 
 def make() -> str:
-    """A new key."""
+    """Return a new random key."""
     return PREFIX + base64.urlsafe_b64encode(secrets.token_bytes(32)).rstrip(b"=").decode()
 
 
 def line(name: str, scopes: Iterable[str], key: str) -> str:
-    """What the service has to know of a key: `NAME SHA256 SCOPE...`.
+    """Return the line that registers a key with the service: `NAME SHA256 SCOPE...`.
 
-    Raises InvalidField for a name or scope that cannot be one.
+    Raises InvalidField for an invalid name or scope.
     """
     if not _NAME.fullmatch(name):
         raise InvalidField("name", f"{name!r}, expected {_NAME.pattern}")
@@ -68,10 +71,10 @@ def line(name: str, scopes: Iterable[str], key: str) -> str:
 
 
 def read(text: str, field: str) -> Keys:
-    """Keys of lines, or of what stands between semicolons; `#` begins a comment.
+    """Return the keys of a text with one key per line; `;` also separates, `#` begins a comment.
 
-    Raises InvalidField, which names the field and the line but never repeats it, for a line that is
-    none and for a second key of one name.
+    field: name of the source in messages. Raises InvalidField for an invalid line and for two keys
+    of one name; the message gives the line's number and quotes at most the key's name.
     """
     known: dict[bytes, Known] = {}
     names: set[str] = set()
@@ -91,7 +94,7 @@ def _lines(text: str, field: str) -> Iterator[tuple[str, str]]:
 
 
 def _of_line(text: str, where: str) -> Known:
-    # Not repeated in messages: whoever mixes the two up has put a key here instead of its hash.
+    # Messages do not quote the digest: an operator may have put the key itself in its place.
     name, digest, *scopes = (*text.split(), "", "")
     scopes = list(filter(None, scopes))
     if not _NAME.fullmatch(name):

@@ -1,118 +1,111 @@
-"""The public keys of those who sign tokens: a JWKS of a file or an address, watched."""
+"""Public keys of a token issuer: a JWKS (RFC 7517), read at start and refreshed by a thread."""
 
 import contextlib
-import json
 import logging
 import threading
-import urllib.request
-from collections.abc import Iterable, Iterator, Mapping
-from http.client import HTTPException
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import jwt
+import msgspec
 
 from service.motion.errors import FileError
 
 log = logging.getLogger(__name__)
 
-LIMIT = 1 << 20
-"""Bytes of a JWKS: real ones have a few thousand."""
-
-HURRY = 10.0
-"""Least seconds between two looks: a client who names unknown keys makes the service look."""
+# PyJWKClient's own cache fetches in the thread that looks a key up, here the event loop's, and is
+# empty once it has expired while the issuer is down: docs/decisions/0011.
+COOLDOWN = 10.0
+"""Minimum time between two reads of the source, s: unknown key ids cannot cause more reads."""
 
 _TIMEOUT = 5.0
-_HERE = {("http", host) for host in ("127.0.0.1", "localhost", "::1")}
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_FAULTS = (jwt.PyJWTError, OSError, ValueError, RecursionError)
+
+Keys = Mapping[str | None, jwt.PyJWK]
 
 
-class _NoRedirect(urllib.request.HTTPRedirectHandler):
-    """A redirect is a fault: the address was chosen by the operator, and no other is."""
+class _Document(msgspec.Struct):
+    """A JSON Web Key Set; its other members are ignored."""
 
-    def redirect_request(self, *_: object) -> None:
-        return None
-
-
-_OPENER = urllib.request.build_opener(_NoRedirect)
+    keys: list[dict[str, Any]]
 
 
-def load(source: str, algorithm: str) -> dict[str | None, jwt.PyJWK]:
-    """Keys by their `kid`, those of other algorithms and uses left out.
-
-    Raises FileError for a source that cannot be read or holds no such key.
-    """
-    try:
-        entries = json.loads(_content(source))["keys"]
-        keys = dict(_usable(entries, algorithm))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, HTTPException) as fault:
-        raise FileError(source, f"no key set: {fault!r}") from fault
-    if not keys:
-        raise FileError(source, f"no public key for {algorithm}, expected at least one")
-    return keys
-
-
-def _usable(
-    entries: Iterable[Mapping[str, Any]], algorithm: str
-) -> Iterator[tuple[str | None, jwt.PyJWK]]:
-    for entry in entries:
-        if entry.get("use", "sig") == "sig" and entry.get("alg", algorithm) == algorithm:
-            # Keys of other kinds stand beside them.
-            with contextlib.suppress(jwt.PyJWTError):
-                yield entry.get("kid"), jwt.PyJWK(dict(entry), algorithm)
-
-
-def _content(source: str) -> bytes:
-    parts = urlsplit(source)
-    if not parts.scheme:
-        return Path(source).read_bytes()
-    if parts.scheme != "https" and (parts.scheme, parts.hostname) not in _HERE:
-        raise ValueError(f"{parts.scheme}://{parts.hostname}, expected https")
-    with _OPENER.open(source, timeout=_TIMEOUT) as answer:
-        content: bytes = answer.read(LIMIT + 1)
-    if len(content) > LIMIT:
-        raise ValueError(f"more than {LIMIT} bytes")
-    return content
-
-
+@dataclass
 class KeySet:
-    """Keys of a source, replaced when it has others; what cannot be read changes nothing."""
+    """Public keys of a source for one algorithm, by `kid`.
 
-    def __init__(self, source: str, algorithm: str, seconds: float) -> None:
-        """Read the source once, then every so many seconds in a thread.
+    source: path or URL of a key set. Raises FileError for a source that cannot be read, is no key
+    set or has no key for the algorithm. A refresh that fails so keeps the previous keys.
+    """
 
-        Raises FileError as `load` does.
-        """
-        self.source, self.algorithm, self.seconds = source, algorithm, seconds
-        self.keys: Mapping[str | None, jwt.PyJWK] = load(source, algorithm)
-        self._unknown = threading.Event()
-        self._thread: threading.Thread | None = None
+    source: str
+    algorithm: str
+    keys: Keys = field(init=False)
+    _unknown: threading.Event = field(init=False, default_factory=threading.Event)
 
-    def start(self) -> None:
-        """Begin to look again; the thread ends with the process."""
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._watch, name="keys", daemon=True)
-            self._thread.start()
+    def __post_init__(self) -> None:
+        self.keys = self._read()
 
     def find(self, kid: str | None) -> jwt.PyJWK | None:
-        """Key of an id; without one, the only key there is. An unknown one is looked for."""
+        """Return the key of an id; without an id, the only key. None for an unknown key.
+
+        An unknown key makes `watch` refresh the keys.
+        """
         keys = self.keys
         found = next(iter(keys.values())) if kid is None and len(keys) == 1 else keys.get(kid)
         if found is None:
             self._unknown.set()
         return found
 
-    def _watch(self) -> None:
-        pause = threading.Event()
-        while True:
-            pause.wait(HURRY)
-            self._unknown.wait(max(self.seconds - HURRY, 0))
-            self._unknown.clear()
-            self.look()
+    def watch(self, seconds: float, cooldown: float = COOLDOWN) -> None:
+        """Refresh the keys periodically, in a loop without end.
 
-    def look(self) -> None:
-        """Read the source again."""
+        seconds: period, shortened by a request for an unknown key. cooldown: minimum time between
+        two reads, s.
+        """
+        while True:
+            time.sleep(cooldown)
+            self._unknown.wait(seconds - cooldown)
+            self._unknown.clear()
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Read the source again; log a failure and keep the previous keys."""
         try:
-            self.keys = load(self.source, self.algorithm)
+            self.keys = self._read()
         except FileError as fault:
             log.warning("the keys stay as they are: %s", fault)
+
+    def _read(self) -> Keys:
+        try:
+            keys = dict(_fitting(_document(self.source), self.algorithm))
+        except _FAULTS as fault:
+            raise FileError(self.source, f"no key set: {fault!r}") from fault
+        if not keys:
+            raise FileError(self.source, f"no public key for {self.algorithm}, expected one")
+        return keys
+
+
+def _document(source: str) -> _Document:
+    parts = urlsplit(source)
+    if not parts.scheme:
+        return msgspec.json.decode(Path(source).read_bytes(), type=_Document)
+    if parts.scheme != "https" and not (parts.scheme == "http" and parts.hostname in _LOOPBACK):
+        raise ValueError(f"{parts.scheme}://{parts.hostname}, expected https")
+    # The client follows no redirect: the operator has approved this address only.
+    client = jwt.PyJWKClient(source, cache_jwk_set=False, timeout=_TIMEOUT)
+    return msgspec.convert(client.fetch_data(), _Document)
+
+
+def _fitting(document: _Document, algorithm: str) -> Iterator[tuple[str | None, jwt.PyJWK]]:
+    for entry in document.keys:
+        if entry.get("use", "sig") == "sig" and entry.get("alg", algorithm) == algorithm:
+            # Key sets may also hold keys of other types.
+            with contextlib.suppress(jwt.PyJWTError):
+                key = jwt.PyJWK.from_dict(entry, algorithm)
+                yield key.key_id, key

@@ -1,53 +1,47 @@
-"""Whom the service answers, made once from its settings."""
+"""Access policy of the service, made once from its settings."""
 
-import importlib
 import ipaddress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from service.motion.errors import FileError, InvalidField
 from service.web.access import keys
 from service.web.access.keys import Keys
-from service.web.access.principal import Principal
 from service.web.settings import PREFIX, Settings
+
+if TYPE_CHECKING:
+    from service.web.access.tokens import Tokens
 
 ALGORITHMS = (
     *("RS256", "RS384", "RS512", "PS256", "PS384", "PS512"),
     *("ES256", "ES384", "ES512", "EdDSA"),
 )
-"""Of public keys only: a shared secret would let whoever checks tokens make them, too."""
-
-
-class Rejected(Exception):
-    """Credentials that do not hold; the message says why and nothing of what they are."""
-
-
-class Issuer(Protocol):
-    """Tokens of somebody else: service.web.access.tokens.Tokens."""
-
-    def find(self, token: str) -> Principal:
-        """Who a token speaks for; raises Rejected."""
+"""Accepted signature algorithms, all asymmetric: a shared secret could also issue tokens."""
 
 
 @dataclass(frozen=True)
 class Policy:
-    """Keys and tokens that let somebody in; without any of them everybody is."""
+    """Accepted credentials; without any, every request is allowed.
+
+    keys: API keys. tokens: verifier of bearer tokens, None without an issuer. metrics_open: the
+    metrics need no credentials.
+    """
 
     keys: Keys
-    tokens: Issuer | None
+    tokens: "Tokens | None"
     metrics_open: bool
 
     @property
     def closed(self) -> bool:
-        """Whether anybody has to say who they are."""
+        """True if requests need credentials."""
         return bool(self.keys.known) or self.tokens is not None
 
 
 def of(settings: Settings) -> Policy:
-    """Policy of the settings.
+    """Return the policy of the settings.
 
-    Raises InvalidField and FileError for keys, or a source of keys, that cannot be used.
+    Raises InvalidField and FileError for invalid keys or an unusable source of keys.
     """
     text = settings.keys
     if settings.keys_file:
@@ -57,7 +51,10 @@ def of(settings: Settings) -> Policy:
 
 
 def check_exposure(settings: Settings, policy: Policy) -> None:
-    """Raise InvalidField where others could ask without having to say who they are."""
+    """Raise InvalidField if the service would listen beyond loopback without credentials.
+
+    The setting `open` allows that.
+    """
     if policy.closed or settings.open or _is_loopback(settings.host):
         return
     raise InvalidField(
@@ -83,8 +80,8 @@ def _text(path: str) -> str:
         raise FileError(path, f"no file of keys: {fault}") from fault
 
 
-def _tokens(settings: Settings) -> Issuer | None:
-    """Checker of tokens; its libraries are an extra, imported where they are wanted."""
+def _tokens(settings: Settings) -> "Tokens | None":
+    """Return the verifier of tokens, None where the settings name no issuer."""
     given = {
         "JWT_KEYS": settings.jwt_keys,
         "JWT_ISSUER": settings.jwt_issuer,
@@ -100,5 +97,7 @@ def _tokens(settings: Settings) -> Issuer | None:
             f"{PREFIX}JWT_ALGORITHM",
             f"{settings.jwt_algorithm!r}, expected one of {', '.join(ALGORITHMS)}",
         )
-    issuer: Issuer = importlib.import_module("service.web.access.tokens").of(settings)
-    return issuer
+    # Imported here since its libraries are an optional dependency.
+    from service.web.access import tokens
+
+    return tokens.of(settings)

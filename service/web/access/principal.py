@@ -1,4 +1,4 @@
-"""Whoever asks, and what they may do."""
+"""Principals: authenticated clients and their permissions."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,38 +10,46 @@ METRICS = "metrics"
 _ALL = f"{READ}:*"
 
 
+class Rejected(Exception):
+    """Error of invalid credentials; the message gives the reason and quotes no credentials."""
+
+
 @dataclass(frozen=True)
 class Principal:
-    """Someone who asks: `models` are the names of those they may read, None for all."""
+    """A client and its permissions.
+
+    name: in logs. models: names of the models it may read, None for all. metrics: it may read the
+    metrics.
+    """
 
     name: str
     models: frozenset[str] | None
     metrics: bool
 
     def may_read(self, model: str) -> bool:
-        """Whether a model of that name exists for them."""
+        """Return True if the principal may read the model of that name."""
         return self.models is None or model in self.models
 
     def may(self, scope: str) -> bool:
-        """Whether they may ask for anything at all of a scope, READ or METRICS."""
+        """Return True if the principal has the scope, READ (for at least one model) or METRICS."""
         return self.metrics if scope == METRICS else self.models is None or bool(self.models)
 
 
 EVERYONE = Principal("everyone", None, True)
-"""Whoever asks a service that knows no keys."""
+"""Principal of every request to a service without keys and tokens."""
 
 NOBODY = Principal("nobody", frozenset(), False)
-"""Whoever has not said who they are."""
+"""Principal of a request without credentials."""
 
 
 def of(name: str, scopes: Iterable[str]) -> Principal:
-    """Principal of scopes `read:*`, `read:MODEL` and `metrics`; others mean nothing here."""
+    """Return the principal of scopes `read:*`, `read:MODEL` and `metrics`; ignore others."""
     given = frozenset(scopes)
     models = frozenset(s.removeprefix(f"{READ}:") for s in given if s.startswith(f"{READ}:"))
     return Principal(name, None if _ALL in given else models, METRICS in given)
 
 
 def is_scope(text: str) -> bool:
-    """Whether a word is a scope of this service."""
+    """Return True for a valid scope of this service."""
     kind, _, model = text.partition(":")
     return text in (METRICS, _ALL) or (kind == READ and NAME.fullmatch(model) is not None)

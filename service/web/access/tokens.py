@@ -1,10 +1,11 @@
 """Bearer tokens (JWT, RFC 7519) of an issuer that the operator trusts.
 
-What is checked is pinned by settings: one algorithm, one issuer, one audience. Nothing that a token
-says of itself is followed but the id of its key, and that only among the keys that are here.
+The settings fix one algorithm, one issuer and one audience. Of the token's header only the key id
+is used, which selects among the issuer's known keys.
 """
 
 import hashlib
+import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,93 +14,81 @@ from typing import Any
 import jwt
 
 from service.web.access import principal
-from service.web.access.keyset import KeySet
-from service.web.access.policy import Rejected
-from service.web.access.principal import Principal
+from service.web.access.keyset import Keys, KeySet
+from service.web.access.principal import Principal, Rejected
 from service.web.settings import Settings
 
 CACHED = 10_000
-"""Tokens that are remembered, in 2 MB. Only valid ones are: nobody fills it with rubbish."""
+"""Entries of the cache of verified tokens (2 MB); only valid tokens are cached."""
 
-
-@dataclass(frozen=True)
-class Terms:
-    """What a token has to say. leeway: seconds that clocks may differ; scopes: a claim's name."""
-
-    issuer: str
-    audience: str
-    algorithm: str
-    leeway: int
-    scopes: str
+# 9999-12-31T23:59:59Z, the last second that RFC 3339 can represent.
+LAST_MOMENT = 253_402_300_799
 
 
 @dataclass
 class Tokens:
-    """Tokens of one issuer; those found good are remembered until they end."""
+    """Verifier of the tokens of one issuer; caches valid tokens until they expire.
 
-    terms: Terms
+    most: entries of the cache.
+    """
+
+    settings: Settings
     keys: KeySet
-    _good: dict[bytes, tuple[float, Principal]] = field(default_factory=dict)
-    _under: Mapping[str | None, jwt.PyJWK] | None = None
+    most: int = CACHED
+    _valid: dict[bytes, tuple[float, Principal]] = field(init=False, default_factory=dict)
+    _under: Keys | None = field(init=False, default=None)
 
     def find(self, token: str) -> Principal:
-        """Who a token speaks for; raises Rejected."""
+        """Return the principal of a token; raises Rejected for an invalid one."""
         if self.keys.keys is not self._under:
-            # A key that has gone takes its tokens with it.
-            self._good, self._under = {}, self.keys.keys
+            # The keys were refreshed: tokens of a withdrawn key must be verified again, and fail.
+            self._valid, self._under = {}, self.keys.keys
         digest = hashlib.sha256(token.encode()).digest()
-        ends, known = self._good.get(digest, (0.0, None))
-        if known is not None and time.time() < ends:
-            return known
-        self._good.pop(digest, None)
-        return self._remember(digest, self._verified(token))
+        ends, known = self._valid.pop(digest, (0.0, None))
+        if known is None or time.time() >= ends:
+            ends, known = self._verified(token)
+            if len(self._valid) >= self.most:
+                del self._valid[next(iter(self._valid))]
+        self._valid[digest] = ends, known
+        return known
 
-    def _verified(self, token: str) -> Mapping[str, Any]:
-        terms = self.terms
+    def _verified(self, token: str) -> tuple[float, Principal]:
+        """Return the expiry time of a token, s since 1970, and its principal; raises Rejected."""
         try:
-            kid = jwt.get_unverified_header(token).get("kid")
-            key = self.keys.find(kid)
-            if key is None:
-                raise Rejected("signed by a key that is not known")
-            claims: Mapping[str, Any] = jwt.decode(
-                token,
-                key,
-                algorithms=[terms.algorithm],
-                audience=terms.audience,
-                issuer=terms.issuer,
-                leeway=terms.leeway,
-                options={"require": ["exp", "iss", "aud"]},
-            )
+            claims = self._claims(token)
+            ends = _moment(claims["exp"]) + self.settings.jwt_leeway
+            scopes = _scopes(claims.get(self.settings.jwt_scopes))
+            return ends, principal.of(_pseudonym(claims), scopes)
         except _FAULTS as fault:
             raise Rejected(_WORDS.get(type(fault), "not a token that can be verified")) from None
-        return claims
 
-    def _remember(self, digest: bytes, claims: Mapping[str, Any]) -> Principal:
-        known = principal.of(_pseudonym(claims), _scopes(claims.get(self.terms.scopes)))
-        if len(self._good) >= CACHED:
-            del self._good[next(iter(self._good))]
-        self._good[digest] = (float(claims["exp"]) + self.terms.leeway, known)
-        return known
+    def _claims(self, token: str) -> Mapping[str, Any]:
+        key = self.keys.find(jwt.get_unverified_header(token).get("kid"))
+        if key is None:
+            raise Rejected("signed by a key that is not known")
+        return jwt.decode(
+            token,
+            key,
+            algorithms=[self.settings.jwt_algorithm],
+            audience=self.settings.jwt_audience,
+            issuer=self.settings.jwt_issuer,
+            leeway=self.settings.jwt_leeway,
+            options={"require": ["exp", "iss", "aud"]},
+        )
 
 
 def of(settings: Settings) -> Tokens:
-    """Tokens of the settings, whose keys are read now and watched from now on.
+    """Return the verifier of the settings, and start the thread that refreshes its keys.
 
-    Raises FileError for keys that cannot be read.
+    Raises FileError for an unusable source of keys.
     """
-    found = KeySet(settings.jwt_keys, settings.jwt_algorithm, settings.jwt_refresh)
-    found.start()
-    terms = Terms(
-        settings.jwt_issuer,
-        settings.jwt_audience,
-        settings.jwt_algorithm,
-        settings.jwt_leeway,
-        settings.jwt_scopes,
-    )
-    return Tokens(terms, found)
+    keys = KeySet(settings.jwt_keys, settings.jwt_algorithm)
+    threading.Thread(target=keys.watch, args=(settings.jwt_refresh,), daemon=True).start()
+    return Tokens(settings, keys)
 
 
-# The last four: JSON that nests deeply, and claims of another type than they should have.
+# Beside PyJWT's own errors: signed tokens can hold deeply nested JSON, claims of another type,
+# times out of range and unpaired surrogates.
 _FAULTS = (jwt.PyJWTError, RecursionError, OverflowError, TypeError, ValueError)
 
 _WORDS: dict[type[Exception], str] = {
@@ -113,14 +102,24 @@ _WORDS: dict[type[Exception], str] = {
 }
 
 
+def _moment(claim: object) -> float:
+    """Return a NumericDate (RFC 7519, 2), s.
+
+    Raises ValueError for text, Booleans and large numbers, which PyJWT accepts.
+    """
+    if isinstance(claim, bool) or not isinstance(claim, int | float) or claim > LAST_MOMENT:
+        raise ValueError(f"exp is {type(claim).__name__}, expected a number up to {LAST_MOMENT}")
+    return float(claim)
+
+
 def _pseudonym(claims: Mapping[str, Any]) -> str:
-    """Name for the log: subjects may be addresses of people."""
+    """Return a name for the logs, a hash: the subject may be personal data."""
     subject = f"{claims['iss']}\n{claims.get('sub', '')}"
     return "token-" + hashlib.sha256(subject.encode()).hexdigest()[:12]
 
 
 def _scopes(claim: object) -> list[str]:
-    """Words of a claim, which is a text (RFC 8693) or a list of texts."""
+    """Return the scopes of a claim: a string (RFC 8693) or a list of strings."""
     if isinstance(claim, str):
         return claim.split()
     return [word for word in claim if isinstance(word, str)] if isinstance(claim, list) else []

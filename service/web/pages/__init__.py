@@ -1,5 +1,6 @@
-"""Documents that are the same for everybody who asks: made once, when the service starts."""
+"""Static documents: the contract and the HTML pages."""
 
+from collections.abc import Callable
 from functools import partial
 
 import orjson
@@ -8,19 +9,30 @@ from starlette.responses import Response
 
 from service.web import contract
 from service.web.contract import Contract
-from service.web.pages import docs, problems, viewer
+from service.web.pages import standalone
 from service.web.service import Handler, Page, Service
 
 
 def made(agreed: Contract) -> dict[str, Page]:
-    """The page of each operation that answers with one."""
+    """Return the pages by operationId."""
     return {
-        "getContract": Page(agreed.source, contract.MEDIA_TYPE),
-        "getContractJson": Page(orjson.dumps(agreed.document), "application/json"),
-        "getDocs": docs.page(agreed),
-        "getProblems": problems.page(),
-        "getViewer": viewer.page(),
+        "getContract": Page(contract.MEDIA_TYPE, lambda: agreed.source),
+        "getContractJson": Page("application/json", lambda: orjson.dumps(agreed.document)),
+        "getDocs": _html(partial(standalone.built, standalone.DOCS)),
+        "getProblems": _html(_problems),
+        "getViewer": _html(partial(standalone.built, standalone.VIEWER)),
     }
+
+
+def _html(make: Callable[[], bytes]) -> Page:
+    return Page("text/html", make, standalone.headers)
+
+
+def _problems() -> bytes:
+    # Jinja and the Markdown parser take 40 ms to import.
+    from service.web.pages import problems
+
+    return problems.content()
 
 
 async def _answer(name: str, service: Service, request: Request) -> Response:

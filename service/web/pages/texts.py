@@ -1,4 +1,4 @@
-"""What each kind of problem means, when it comes and what to do about it, for those who meet it."""
+"""Texts of the problems page: cause, remedy and an example of each kind of problem."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,10 @@ from service.web.problems import TABLE, Kind
 
 @dataclass(frozen=True)
 class Text:
-    """comes: when it does. remedy: what to do then. detail, place: of an example."""
+    """Text of one kind of problem.
+
+    comes: cause. remedy: advice to the client. detail, place: of the example.
+    """
 
     comes: str
     remedy: str
@@ -35,15 +38,8 @@ TEXTS: dict[Kind, Text] = {
     problems.BAD_BODY: Text(
         "The body is no JSON, or has a field that is unknown, missing or of another type.",
         "Compare the field that `pointer` names with the schema of the operation's body.",
-        "Object contains unknown field `frames`",
+        "frames: Object contains unknown field `frames`",
         {"pointer": "/frames"},
-    ),
-    problems.MALFORMED: Text(
-        "What arrived is not HTTP/1.1 in its strict form: a broken request line or header, more"
-        " than one `Host`, a length that is given twice. Parsers differ on such requests, so "
-        "none is guessed at. The connection is closed.",
-        "Look at what stands between: a client that is not written by hand never sends this.",
-        "2 Host headers, expected one",
     ),
     problems.UNAUTHENTICATED: Text(
         "The service asks for a key or token, and there is none, or one that is unknown, "
@@ -86,11 +82,6 @@ TEXTS: dict[Kind, Text] = {
         "Accept 'text/html', expected one of application/json, application/vnd.msgpack, "
         "application/x-npz, application/vnd.apache.arrow.stream",
     ),
-    problems.TOO_SLOW: Text(
-        "The head or body of the request did not arrive in time. The connection is closed.",
-        "Send again. Large bodies have longer, as long as 4 KiB a second arrive.",
-        "its body was expected within 20 seconds",
-    ),
     problems.BODY_TOO_LARGE: Text(
         "The body is larger than the operation takes. It was not read to its end, and the "
         "connection is closed.",
@@ -98,9 +89,9 @@ TEXTS: dict[Kind, Text] = {
         "more than 65536 bytes, expected at most 65536",
     ),
     problems.URL_TOO_LONG: Text(
-        "The URL is longer than the service reads. The connection is closed.",
+        "The URL is longer than the service reads.",
         "Ask by POST: each question that a URL can hold can also be a JSON body.",
-        "more than 8192 bytes, expected at most 8192",
+        "expected at most 8192 bytes",
     ),
     problems.NOT_JSON: Text(
         "The body's `Content-Type` is missing or not one that the operation takes.",
@@ -133,9 +124,16 @@ TEXTS: dict[Kind, Text] = {
         {"parameter": "target"},
     ),
     problems.HEAD_TOO_LARGE: Text(
-        "All header lines together are longer than the service reads. The connection is closed.",
+        "All header lines together are longer than the service reads.",
         "Send fewer or shorter headers; cookies are never looked at.",
         "expected at most 16384 bytes in at most 100 headers",
+    ),
+    problems.UNKNOWN_HOST: Text(
+        "The header `Host` names neither an address nor a name that the operator has listed. "
+        "A page of another origin could otherwise read a service on the same machine (DNS "
+        "rebinding).",
+        "Ask under a listed name, or list the name in `POSEFIELD_HOSTS`.",
+        "'evil.example', expected an address or one of localhost (POSEFIELD_HOSTS)",
     ),
     problems.INTERNAL: Text(
         "The service failed. The request is not at fault.",
@@ -160,10 +158,5 @@ TEXTS: dict[Kind, Text] = {
         "question, or the service has been told to end.",
         "Send requests to another instance. What is still sent to this one is answered.",
         "there is no model",
-    ),
-    problems.NO_CONNECTION_LEFT: Text(
-        "As many connections are open as the service keeps. This one is closed.",
-        "Try again after `Retry-After`; keep connections open and share them between requests.",
-        "500 are open, expected fewer",
     ),
 }

@@ -1,0 +1,50 @@
+"""Size of a crowd before it is encoded: of its file and of its largest layer.
+
+usd-core holds a layer in memory until it has been exported. The constants of characters are sizes
+in memory, which are many times those in binary files (decision 0029).
+"""
+
+from dataclasses import dataclass
+
+# Bytes of a character that refers to the prototype, of one with its own skeleton and body, and of a
+# motion without its frames.
+CHARACTER, FLAT, MOTION = 2_600, 32_000, 8_000
+# Bytes of a pose, and of each of its joints: seven numbers.
+POSE, JOINT = 40, 4 * (3 + 4)
+# Bytes of a joint of a pose, and of a joint's part of a body, as text.
+TEXT_JOINT, TEXT_BODY = 120, 1_200
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Number of joints, of characters, of motions, and of frames of each motion."""
+
+    joints: int
+    characters: int
+    motions: int
+    frames: int
+
+
+def file(counts: Counts, ending: str, flat: bool) -> int:
+    """Return an upper bound of the bytes of a crowd as usda, usdc or usdz."""
+    binary = _characters(counts, flat) + counts.motions * _motion(counts)
+    if ending != "usda":
+        return binary
+    played = counts.characters if flat else counts.motions
+    text = TEXT_JOINT * (counts.joints + 1) * counts.frames * played
+    return max(binary, text + TEXT_BODY * counts.joints * counts.characters * flat)
+
+
+def layer(counts: Counts, ending: str, flat: bool) -> int:
+    """Return an upper bound of the bytes of the largest layer of a crowd."""
+    if ending == "usdz" and not flat:
+        return max(_characters(counts, flat), _motion(counts))
+    return file(counts, ending, flat)
+
+
+def _characters(counts: Counts, flat: bool) -> int:
+    return counts.characters * (FLAT if flat else CHARACTER)
+
+
+def _motion(counts: Counts) -> int:
+    return MOTION + counts.frames * (POSE + JOINT * counts.joints)
