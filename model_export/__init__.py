@@ -1,1 +1,1 @@
-"""The training job: a folder of example motions in, one .onnx file out."""
+"""Training: a folder of example motions to one .onnx model file."""

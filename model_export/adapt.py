@@ -1,8 +1,8 @@
-"""A trained model and a few clips of somebody new to a model that knows them too.
+"""Adaptation of a trained model to a new performer from a few clips.
 
-Nothing of the original data is needed: the model's own samples are motions, which it holds reduced.
-The new clips are aligned to what the model expects of somebody never seen, what of them its bases
-cannot say extends these, and every field is solved again with the parameters that it has.
+The original clips are not needed: the model's samples, in reduced form, stand for them. The new
+clips are aligned to the model's prediction for an unseen performer, their residuals extend the
+bases, and every coefficient model is solved again with its existing parameters.
 """
 
 from collections.abc import Sequence
@@ -25,9 +25,10 @@ from service.motion.conventions import Floats
 
 @dataclass(frozen=True)
 class Adapted:
-    """A model that knows one performer more, and what was seen on the way.
+    """A model with one more performer, and intermediate results.
 
-    missed (k,): mean squared joint distance, m², of each new clip from what all others predict.
+    missed: mean squared joint distance (k,), m², of each new clip from its leave-one-out
+    prediction.
     """
 
     model: Model
@@ -37,13 +38,13 @@ class Adapted:
 
 
 def adapt(known: Known, examples: Sequence[Example], performer: str) -> Adapted:
-    """Model that also knows a performer of some examples, by a name that it does not know yet."""
+    """Return the model extended by a performer with an unused name and some examples."""
     begun = canonical.begin(known, examples)
     return solve(known, canonical.move(known, begun), performer)
 
 
 def solve(known: Known, moved: Moved, performer: str) -> Adapted:
-    """The same of examples that have been moved to the model's canonical time."""
+    """Return the adapted model for examples that are already in the model's canonical time."""
     with threads.one():
         parents, weights = known.skeleton.parents, known.joint_weights
         extended = extend.extend(known.model, parents, weights, moved.numbers, known.truncation)
@@ -60,7 +61,7 @@ def _solved(model: Model, moved: Moved, extended: Extended, laid: Laid) -> Adapt
     solved = {
         name: new_fields.solve(laid, model.bank, name, values) for name, values in new.items()
     }
-    # In the order in which the model has them.
+    # Keep the model's order of quantities.
     others = {name: solved.get(name, bones) for name in model.bank.others}
     missed, sill = _missed(model.bank, laid, moved, extended)
     bank = FieldBank(laid.low, laid.high, laid.performers, pose, others, sill)
@@ -71,8 +72,10 @@ def _solved(model: Model, moved: Moved, extended: Extended, laid: Laid) -> Adapt
 
 
 def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tuple[Floats, float]:
-    """Mean squared joint distance (k,), m², of the new clips from what all others predict, and the
-    sill, m², with them."""
+    """Return leave-one-out errors of the new clips, and the sill updated with them.
+
+    The errors are mean squared joint distances (k,), m²; the sill is in m².
+    """
     hyper, points, k = laid.hyper(old.pose.hyper), laid.samples.points, len(moved.examples)
     left_out = kriging.leave_out(hyper, points, laid.samples.groups)
     variances = kriging.left_out_variances(hyper, points, left_out)[-k:]
@@ -86,7 +89,7 @@ def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tup
 
 
 def _travel_residuals(old: FieldBank, laid: Laid, new: Floats) -> Floats:
-    """Residuals (k, 3) of the new clips' travel, left out."""
+    """Return leave-one-out residuals (k, 3) of the new clips' travel, m."""
     field, both = old.others["travel"], np.vstack([old.at_samples("travel"), new])
     if isinstance(field, Kriging):
         hyper, groups = laid.hyper(field.hyper), laid.samples.groups

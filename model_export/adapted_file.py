@@ -1,4 +1,4 @@
-"""An adapted model to one file: levels of detail, card, and the gate that every file passes."""
+"""Model file of an adapted model: levels of detail, model card and parity check."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -24,8 +24,10 @@ from service.motion.errors import InvalidField
 
 @dataclass(frozen=True)
 class Newcomer:
-    """Somebody new to a model: name, clips, and the licence of these, with notes on how they were
-    read."""
+    """Clips of a new performer.
+
+    performer: name. examples: the clips. licence: of the clips. notes: findings of the import.
+    """
 
     performer: str
     examples: Sequence[Example]
@@ -34,8 +36,7 @@ class Newcomer:
 
 
 def refuse_name(card: ModelCard, performer: str) -> None:
-    """Raise InvalidField for a model that tells nobody apart, and a name that it knows or that is
-    none."""
+    """Raise InvalidField for a model without performers, or for a known or invalid name."""
     if not card.performers:
         raise InvalidField(
             "performer", f"model {card.name} tells no performers apart, expected one that does"
@@ -51,10 +52,10 @@ def refuse_name(card: ModelCard, performer: str) -> None:
 
 
 def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
-    """File of a model that knows a newcomer too; the same file and clips give the same bytes.
+    """Return the exported model with the new performer; equal inputs give equal bytes.
 
-    Raises InvalidField for a name that it cannot be asked for by, TrainingError for clips of
-    another action, and as `export` does.
+    Raises InvalidField for an invalid or known name, TrainingError for clips of another action, and
+    ExportRefused as `export.finished` does.
     """
     refuse_name(reopened.card, newcomer.performer)
     with threads.one():
@@ -71,9 +72,9 @@ def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
 
 
 def _ladder(reopened: Reopened, adapted: Adapted) -> Laddered:
-    """Model with levels as good as those of the one that it was made of.
+    """Build the levels of detail with the error bounds of the parent model's levels.
 
-    Joints are compared with those of the finest level: what that had lost before is added.
+    Joints are compared with the finest level; the errors of the parent's finest level are added.
     """
     shop = _workshop(reopened, adapted)
     finest, *coarser = reopened.card.levels
@@ -86,8 +87,7 @@ def _ladder(reopened: Reopened, adapted: Adapted) -> Laddered:
 
 
 def _as_lost(found: Level, finest: Level) -> Level:
-    """Level whose errors count in those of the old finest one: both are of different parts of the
-    motions, so that their squares add."""
+    """Add the errors of the parent's finest level in quadrature; the two are independent."""
 
     def both(name: str) -> float:
         return _short(np.hypot(getattr(found, name), getattr(finest, name)))
@@ -137,8 +137,10 @@ def _card(
     levels: tuple[Level, ...],
     parity: float,
 ) -> ModelCard:
-    """The old card with what is new. The family's skeleton at rest stays what it was: whoever has
-    bound a character to it need not do it again."""
+    """Return the parent's card updated for the new performer.
+
+    The rest pose of the skeleton stays that of the parent, so bound characters stay valid.
+    """
     old, bank, clips = reopened.card, adapted.model.bank, adapted.moved.examples
     own = tuple(tuple(map(float, clip.controls)) for clip in clips)
     seconds = (*old.durations, *adapted.moved.aligned.durations.tolist())
@@ -164,7 +166,7 @@ def _card(
 
 
 def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
-    """Controls with what was sampled of them (N, d)."""
+    """Return the controls with ranges, defaults and values from samples (N, d)."""
     return tuple(
         replace(
             control,
@@ -184,10 +186,10 @@ def _diagnostics(
     left_out: Sequence[float],
     parity: float,
 ) -> dict[str, Any]:
-    """The old ones, but for what the new clips change.
+    """Return the parent's diagnostics with those updated that depend on the new clips.
 
-    What only the parent's own data say stays the parent's: `explained` and what truncation cost
-    here, `joint_sigma` and `beside` on the card.
+    `explained`, the truncation cost, `joint_sigma` and `beside` depend on the parent's data alone
+    and are copied.
     """
     old, model = reopened.card.diagnostics, adapted.model
     freedoms, frames, samples = old["tensor"]
@@ -215,7 +217,7 @@ def _notes(reopened: Reopened, adapted: Adapted, newcomer: Newcomer) -> list[str
 
 
 def _provenance(reopened: Reopened, newcomer: Newcomer) -> Mapping[str, Any]:
-    """Where the old model came from, what it was, and where the new clips come from."""
+    """Return the parent's provenance with its digest and the source of the new clips appended."""
     old = reopened.card.provenance
     step = {
         "parent_sha256": reopened.digest,

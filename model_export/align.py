@@ -1,8 +1,7 @@
-"""Clips of different timing to one canonical time, and the warps that lead there and back.
+"""Temporal alignment of clips by dynamic time warping (Mukai & Kuriyama 2006, section 2).
 
-Every clip is compared with a reference by what its joints do around the root. The first reference
-is the medoid, the clip nearest to all others; in further rounds every clip has its own, what the
-aligned others predict for it.
+Clips are compared by joint positions relative to the root. In the first round the reference of
+every clip is the medoid; in later rounds it is the prediction from the other aligned clips.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,9 +16,9 @@ from service.motion import blend, quat, skeleton
 from service.motion.clip import Clip
 from service.motion.conventions import UP, Floats
 
-# Frames at which clips are compared: a medoid needs no more, a warp gains nothing from more.
+# Numbers of frames for the medoid and for warps; more frames do not improve the result.
 COARSE, FINE = 25, 100
-# A landmark is one sample among 501 that the warp has to meet.
+# A landmark is one of 501 samples; the weight makes the fitted warp pass through it.
 LANDMARK_WEIGHT = 200.0
 
 
@@ -27,9 +26,8 @@ LANDMARK_WEIGHT = 200.0
 class Aligned:
     """Clips in canonical time.
 
-    rotations (N, T, J, 4) and root_path (N, T, 3). logs (N, knots): the log increments of each
-    clip's warp from its own time to canonical time. durations (N,), s. reference: index of the
-    medoid.
+    rotations: (N, T, J, 4). root_path: (N, T, 3), m. logs: log increments (N, knots) of each clip's
+    warp from its own time to canonical time. durations: (N,), s. reference: index of the medoid.
     """
 
     rotations: Floats
@@ -40,7 +38,7 @@ class Aligned:
 
 
 Predict = Callable[[Floats], Floats]
-"""Values (N, m) of all clips to what is predicted for each of them (N, m)."""
+"""Map from values (N, m) of all clips to the prediction (N, m) of each of them."""
 
 
 def align(
@@ -51,10 +49,11 @@ def align(
     joint_weights: Floats,
     predict: Predict,
 ) -> Aligned:
-    """Examples warped to one canonical time and resampled to `frames` frames.
+    """Warp examples to one canonical time and resample them to `frames` frames.
 
-    joint_weights (J,): importance of each joint's position in the comparison. The mean warp is
-    the identity: canonical time is the family's own average, not the reference's.
+    joint_weights: weights (J,) of the joints' positions in the comparison. predict: maps values (N,
+    m) of all clips to the prediction (N, m) of each clip from the others. The mean of the inverse
+    warps is the identity, so canonical time is the average timing of the family.
     """
     traces = [trace(example.clip, np.sqrt(joint_weights)) for example in examples]
     marks = _marks(examples)
@@ -72,8 +71,11 @@ def align(
 
 @dataclass(frozen=True)
 class Canon:
-    """A canonical time that is there already: its frames, the basis of its warps, and the times
-    (M,) of landmarks in it. joint_weights (J,): importance of each joint's position."""
+    """Canonical time of a trained model.
+
+    frames: number of canonical frames. basis: basis of the warps. landmarks: their canonical times
+    (M,). joint_weights: weights (J,) of the joints' positions.
+    """
 
     frames: int
     basis: WarpBasis
@@ -82,9 +84,9 @@ class Canon:
 
 
 def align_to(examples: Sequence[Example], references: Floats, canon: Canon) -> Aligned:
-    """Examples warped to a canonical time, each by its reference.
+    """Warp examples to an existing canonical time, each to its own reference.
 
-    references (N, FINE, features): traces in even steps of canonical time.
+    references: traces (N, FINE, features) at uniform steps of canonical time.
     """
     traces = [trace(example.clip, np.sqrt(canon.joint_weights)) for example in examples]
     knees = _knees(_marks(examples), canon.landmarks)
@@ -117,27 +119,33 @@ def _even(frames: int) -> Floats:
 
 
 def trace(clip: Clip, weights: Floats) -> Floats:
-    """Joint positions (F, J * 3) around the root, seen from its heading, m, times weights (J,)."""
+    """Return joint positions (F, J * 3), m, relative to root and heading, times weights (J,)."""
     positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
     facing = quat.about(UP, -heading(clip))[:, None]
     return (quat.rotate(facing, positions) * weights[:, None]).reshape(len(clip), -1)
 
 
 def at(values: Floats, u: Floats) -> Floats:
-    """Rows (S, features) of values (F, features) at fractions u (S,) of the way through."""
+    """Interpolate rows of values (F, features) linearly at fractions u (S,) of their length.
+
+    Returns (S, features).
+    """
     return blend.between(values, u * (len(values) - 1))
 
 
 @dataclass(frozen=True)
 class _Knees:
-    """Clip times (N, M + 2) and canonical times (M + 2,) between which time runs evenly."""
+    """Breakpoints of piecewise linear time maps.
+
+    own: clip times (N, M + 2). canonical: canonical times (M + 2,).
+    """
 
     own: Floats
     canonical: Floats
 
     @property
     def weights(self) -> Floats:
-        """What each sample of a warp is worth in its fit (N, 501)."""
+        """Return the weight (N, 501) of each sample in the fit of a warp."""
         weights = np.ones((len(self.own), len(DENSE)))
         for row, own in zip(weights, self.own[:, 1:-1], strict=True):
             row[np.rint(own * (len(DENSE) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
@@ -145,13 +153,13 @@ class _Knees:
 
 
 def _knees(marks: Floats, canonical: Floats) -> _Knees:
-    """Knees of landmarks (N, M) whose canonical times are (M,)."""
+    """Return breakpoints for landmarks (N, M) with canonical times (M,)."""
     ends = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
     return _Knees(np.hstack([ends[0], marks, ends[1]]), np.array([0.0, *canonical, 1.0]))
 
 
 def _straight(traces: list[Floats], knees: _Knees, frames: int) -> Floats:
-    """Traces (N, frames, features) with their landmarks brought together by straight lines."""
+    """Resample traces to (N, frames, features), with landmarks aligned by piecewise linear maps."""
     times = [np.interp(_even(frames), knees.canonical, own) for own in knees.own]
     return np.stack([at(trace, u) for trace, u in zip(traces, times, strict=True)])
 
@@ -162,10 +170,12 @@ def _medoid(traces: Floats) -> int:
 
 
 def _round(traces: Floats, reference: Floats, knees: _Knees, basis: WarpBasis) -> Floats:
-    """Log increments (N, knots) of the warps to a reference (F, features), or one a clip (N, F,
-    features)."""
+    """Return log increments (N, knots) of the warps to a reference.
+
+    reference: (F, features), or one per clip (N, F, features).
+    """
     straight = np.stack([np.interp(DENSE, own, knees.canonical) for own in knees.own])
-    # Time warping may carry a landmark away: it is brought back, and what lies between with it.
+    # Time warping may shift a landmark: the phases are rescaled so that it returns to its time.
     phases = [
         np.interp(phase, np.interp(knees.canonical, _even(FINE), phase), knees.canonical)
         for phase in dtw.warp(traces, reference)
@@ -175,14 +185,17 @@ def _round(traces: Floats, reference: Floats, knees: _Knees, basis: WarpBasis) -
 
 
 def _gauge(logs: Floats, knees: _Knees, basis: WarpBasis) -> Floats:
-    """The same warps followed by the one that makes their mean inverse the identity."""
+    """Return the warps composed with their mean inverse.
+
+    The mean inverse of the results is the identity.
+    """
     mean_inverse = np.mean([basis.invert(log, DENSE) for log in logs], axis=0)
     even = [np.interp(basis.evaluate(log, DENSE), DENSE, mean_inverse) for log in logs]
     return np.stack([basis.fit(warp, w) for warp, w in zip(even, knees.weights, strict=True)])
 
 
 def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
-    """Rotations (S, J, 4) and root path (S, 3) at fractions u (S,) of the clip's duration."""
+    """Return rotations (S, J, 4) and root path (S, 3) at fractions u (S,) of the duration."""
     place = np.clip(u, 0.0, 1.0) * (len(clip) - 1)
     before = np.minimum(place.astype(np.int64), len(clip) - 2)
     share = place - before
@@ -191,6 +204,6 @@ def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
 
 
 def positions(aligned: Aligned, parents: tuple[int, ...], offsets: Floats) -> Floats:
-    """Joint positions (N, T, J, 3) of aligned clips with bone offsets (N, J, 3), m."""
+    """Return joint positions (N, T, J, 3), m, of aligned clips with bone offsets (N, J, 3), m."""
     translations = skeleton.translations(offsets, aligned.root_path)
-    return skeleton.forward(parents, aligned.rotations, translations)[0]
+    return skeleton.positions(parents, aligned.rotations, translations)

@@ -1,4 +1,4 @@
-"""Whose bones a clip has, and in which unit."""
+"""Checks of bone lengths: unit of a file, and clips with another performer's bones."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from service.motion.conventions import Floats
 
-# Grown people are told apart by less than this factor in size.
+# Adults differ by less than this factor in size.
 SIZE = 1.5
-# Units that files come in, m, and the word for them.
+# Names of the units that files use, and their length in metres.
 UNITS = {
     "millimetres": 0.001,
     "centimetres": 0.01,
@@ -19,18 +19,19 @@ UNITS = {
     "feet": 0.3048,
     "metres": 1.0,
 }
-# As near as a unit's factor has to be to the one found.
+# Largest ratio between the factor found and a unit's factor.
 NEAR = 1.15
-# Bones of one performer differ by less than this from clip to clip, m, and from those of another
-# by so much more.
+# Bones of one performer differ by less than SAME, m, between clips, and from those of another
+# performer by more than CLEAR times that spread.
 SAME, CLEAR = 0.002, 3.0
 
 
 @dataclass(frozen=True)
 class Foreign:
-    """A clip whose bones differ by `apart` from those of its performer's other clips, m.
+    """A clip whose bones differ from those of its performer's other clips.
 
-    alike: another performer who has them, within `within`, m, where there is one.
+    apart: root mean square distance, m. others: number of the performer's other clips. alike:
+    another performer with matching bones, or "". within: distance from that performer's bones, m.
     """
 
     apart: float
@@ -40,22 +41,23 @@ class Foreign:
 
 
 def sizes(offsets: Floats) -> Floats:
-    """Length (N,) of all bones (N, J, 3) together, over the family's median."""
+    """Return the total bone length (N,) of offsets (N, J, 3) relative to the family's median."""
     lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
     return np.asarray(lengths / np.median(lengths))
 
 
 def unit(metres_per_unit: float, size: float) -> str:
-    """The unit that a file must be in to come out so many times too large, if there is one."""
+    """Return the unit of a file whose skeleton is `size` times too large; "" if none fits."""
     fits = {name: abs(np.log(metres_per_unit / size / m)) for name, m in UNITS.items()}
     name = min(fits, key=lambda name: fits[name])
     return name if fits[name] < np.log(NEAR) else ""
 
 
 def foreign(offsets: Floats, performers: tuple[str, ...], clip: int) -> Foreign | None:
-    """Whether a clip's bones (N, J, 3) are not its performer's.
+    """Return how a clip's bones (N, J, 3) differ from its performer's; None if they match.
 
-    Of two clips that differ neither is believed, but for one that has another performer's bones.
+    If a performer has only two clips and they differ, neither is reported unless it matches another
+    performer's bones.
     """
     whose = np.array(performers)
     own = np.flatnonzero((whose == whose[clip]) & (np.arange(len(whose)) != clip))
@@ -73,7 +75,7 @@ def foreign(offsets: Floats, performers: tuple[str, ...], clip: int) -> Foreign 
 
 
 def _nearest(offsets: Floats, whose: npt.NDArray[np.str_], clip: int) -> tuple[float, str]:
-    """The other performer whose bones are most like a clip's, and how far they are, m."""
+    """Return the distance, m, and name of the other performer with the most similar bones."""
     names = sorted(set(whose.tolist()) - {whose[clip], ""})
     means = [np.median(offsets[whose == name], axis=0) for name in names]
     gaps = [(apart(offsets[clip], mean), name) for mean, name in zip(means, names, strict=True)]
@@ -81,5 +83,5 @@ def _nearest(offsets: Floats, whose: npt.NDArray[np.str_], clip: int) -> tuple[f
 
 
 def apart(a: Floats, b: Floats) -> float:
-    """Root mean square distance of points (..., 3)."""
+    """Return the root mean square distance of points (..., 3)."""
     return float(np.sqrt(np.mean(np.sum(np.square(a - b), axis=-1))))

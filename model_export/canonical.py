@@ -20,19 +20,20 @@ from service.motion.conventions import Floats, Indices
 from service.motion.errors import TrainingError
 from service.motion.skeleton import Skeleton
 
-# A clip this many times as far from what the model expects as sigma, which is what it expects of
-# somebody never seen, is of another action. On three real families performers who were held out lie
-# at most 1.1, 0.9 and 1.8 times as far, clips of another family at least 2.3 times.
+# A clip farther from the prediction than this many times sigma of an unseen performer is taken for
+# another action. On three real families held-out performers lie within 1.1, 0.9 and 1.8 times
+# sigma, and clips of another family beyond 2.3 times.
 STRANGE = 2.0
 
 
 @dataclass(frozen=True)
 class Known:
-    """A model of one level, and what of its making it does not hold itself.
+    """A model of one level with the training data that adaptation needs.
 
-    skeleton: the family's. landmarks (M,): their canonical times. joint_weights (J,). in_phase:
-    cycles were brought to begin together. in_place: the root does not travel. truncation: what
-    cutting the tensor cost, root mean square, m. groups (n,): samples that are left out together.
+    skeleton: of the family. landmarks: their canonical times (M,). joint_weights: (J,). in_phase:
+    True if cycles were shifted to a common phase. in_place: True if the root does not travel.
+    truncation: root mean square error of the truncated tensor, m. groups: group (n,) of each
+    sample; a group is left out together.
     """
 
     model: Model
@@ -46,13 +47,13 @@ class Known:
 
     @property
     def canon(self) -> Canon:
-        """Its canonical time."""
+        """Return the model's canonical time."""
         timing = self.model.timing
         return Canon(timing.frames, timing.basis, self.landmarks, self.joint_weights)
 
 
 def known(recipe: Recipe, trained: Trained) -> Known:
-    """What is known of a model that has just been trained."""
+    """Return the data that adaptation needs of a model that has just been trained."""
     own, marks = trained.model, [example.landmarks for example in trained.examples]
     return Known(
         own,
@@ -70,9 +71,10 @@ def known(recipe: Recipe, trained: Trained) -> Known:
 class Moved:
     """New clips in a model's canonical time and chart.
 
-    examples: as they begin there. numbers (k, T, D): pose vectors. offsets (k, J, 3), m. travels:
-    (k, 3) of cycles, empty else. distances (k,): of each from what the model expected of somebody
-    never seen, root mean square over joints, seen from the root, and frames, m.
+    examples: clips at the model's phase. numbers: pose vectors (k, T, D). offsets: (k, J, 3), m.
+    travels: (k, 3), m, of cycles, otherwise empty. distances: root mean square distance (k,), m,
+    over joints and frames of each clip from the prediction for an unseen performer, relative to the
+    root.
     """
 
     examples: tuple[Example, ...]
@@ -85,7 +87,7 @@ class Moved:
 
 
 def begin(known: Known, examples: Sequence[Example]) -> tuple[Example, ...]:
-    """Examples that begin where a model's cycles do, if those were brought to begin together."""
+    """Shift examples to the phase of the model's cycles if those were aligned in phase."""
     if not known.in_phase:
         return tuple(examples)
     with threads.one():
@@ -94,7 +96,7 @@ def begin(known: Known, examples: Sequence[Example]) -> tuple[Example, ...]:
 
 
 def move(known: Known, examples: Sequence[Example]) -> Moved:
-    """Examples in the canonical time of a model, where they begin as its own do."""
+    """Warp examples, already at the model's phase, to its canonical time and chart."""
     with threads.one():
         return _move(known, examples)
 
@@ -120,7 +122,7 @@ def _references(known: Known, examples: Sequence[Example]) -> Floats:
 
 
 def _expected(known: Known, example: Example) -> Floats:
-    """Trace (FINE, features) of what the model expects of an example, on the example's bones."""
+    """Return the trace (FINE, features) of the model's prediction with the example's bones."""
     model = known.model
     place = np.linspace(0.0, model.timing.frames - 1.0, FINE)[None]
     nobody = np.zeros((1, len(model.bank.performers)))
@@ -133,7 +135,7 @@ def _expected(known: Known, example: Example) -> Floats:
 def _distances(
     known: Known, examples: Sequence[Example], logs: Floats, references: Floats
 ) -> Floats:
-    """Root mean square distances (k,), m, of clips from their references (k, FINE, features)."""
+    """Return RMS distances (k,), m, of clips from their references (k, FINE, features)."""
     times, weights = np.linspace(0.0, 1.0, FINE), known.joint_weights
     found = []
     for example, log, reference in zip(examples, logs, references, strict=True):
@@ -145,8 +147,11 @@ def _distances(
 
 
 def refuse_strangers(known: Known, moved: Moved) -> None:
-    """Raise TrainingError for the first clip of bones of another size, and for the first that lies
-    too far from all that the model expects."""
+    """Raise TrainingError for the first clip that does not fit the family.
+
+    Checked are the size of the bones, and the distance from the prediction, at most STRANGE times
+    sigma.
+    """
     _refuse_sizes(known.model, moved.examples)
     for example, distance, sigma in zip(
         moved.examples, moved.distances, _sigmas(known.model, moved.examples), strict=True
@@ -161,7 +166,10 @@ def refuse_strangers(known: Known, moved: Moved) -> None:
 
 
 def _refuse_sizes(model: Model, examples: Sequence[Example]) -> None:
-    """What a clip's bones say of its unit, which controls that are measured of it may hide."""
+    """Raise TrainingError for bones of another size, which reveal another unit.
+
+    Controls measured from the motion can hide a wrong unit.
+    """
     own = model.proportions.numpy(model.bank.at_samples("offsets"))
     usual = np.median(np.linalg.norm(own, axis=-1).sum(axis=-1))
     for example in examples:
@@ -174,8 +182,10 @@ def _refuse_sizes(model: Model, examples: Sequence[Example]) -> None:
 
 
 def _sigmas(model: Model, examples: Sequence[Example]) -> Floats:
-    """Sigma (k,) of somebody never seen at the nearest controls that were sampled, m: farther out
-    it would excuse anything."""
+    """Return sigma (k,), m, of an unseen performer at the nearest sampled controls.
+
+    Controls are clipped to the sampled range because sigma grows without bound outside it.
+    """
     bank, asked = model.bank, np.stack([example.controls for example in examples])
     nobody = np.zeros((len(asked), len(bank.performers)))
     points = bank.points(np.clip(asked, bank.low, bank.high), nobody)

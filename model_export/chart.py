@@ -1,7 +1,7 @@
-"""Poses as numbers: root translation and rotation vectors about each joint's mean rotation.
+"""Pose vectors: root translation and rotation vectors about each joint's mean rotation.
 
-An arm that is raised can pass half a turn from its mean. There rotation vectors are ambiguous: they
-are followed past half a turn, so that no clip jumps, and every such joint is reported.
+Rotation vectors are ambiguous beyond half a turn from the mean, which a raised arm can reach. They
+are unwrapped so that no clip is discontinuous, and every such joint is reported.
 """
 
 from dataclasses import dataclass
@@ -9,42 +9,57 @@ from dataclasses import dataclass
 import numpy as np
 
 from model_export.flips import Finding
-from service.motion import quat
+from service.motion import quat, quat_planes
 from service.motion.conventions import Floats
+from service.motion.skeleton import BLOCK
 
-# From here on a joint is named: close to where rotation vectors become ambiguous, rad.
+# Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
 FAR = 0.9 * np.pi
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Means (J, 4) about which rotation vectors are taken."""
+    """Chart of poses. means: rotations (J, 4) about which rotation vectors are taken."""
 
     means: Floats
 
     def numbers(self, rotations: Floats, root_path: Floats) -> Floats:
-        """Pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4) and root paths (N, T, 3)."""
+        """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3)."""
         vectors = _unwrapped(quat.log(quat.mul(quat.conj(self.means), rotations)))
         return np.concatenate([root_path, vectors.reshape(*root_path.shape[:2], -1)], axis=-1)
 
     def poses(self, numbers: Floats) -> tuple[Floats, Floats]:
-        """Rotations (..., J, 4) and root positions (..., 3) of pose vectors (..., 3 + 3 J)."""
-        vectors = numbers[..., 3:].reshape(*numbers.shape[:-1], -1, 3)
-        return quat.mul(self.means, quat.exp(vectors)), numbers[..., :3]
+        """Return rotations (..., J, 4), root positions (..., 3) of pose vectors (..., 3 + 3 J)."""
+        *lead, freedoms = numbers.shape
+        rows = numbers.reshape(-1, freedoms)
+        rotations = np.empty((len(rows), 4 * len(self.means)))
+        for start in range(0, len(rows), BLOCK):
+            block = slice(start, start + BLOCK)
+            planes = self.rotation_planes(np.ascontiguousarray(rows[block, 3:].T))
+            rotations[block] = planes.reshape(rotations.shape[1], -1).T
+        return rotations.reshape(*lead, -1, 4), numbers[..., :3]
+
+    def rotation_planes(self, vectors: Floats) -> Floats:
+        """Return rotations (J, 4, ...) of rotation vectors about the means (3 J, ...)."""
+        planes = vectors.reshape(len(self.means), 3, *vectors.shape[1:]).swapaxes(0, 1)
+        rotations = np.empty((len(self.means), 4, *vectors.shape[1:]))
+        means = self.means.T.reshape(4, -1, *(1 for _ in vectors.shape[1:]))
+        quat_planes.product(means, quat_planes.exp(planes), out=rotations.swapaxes(0, 1))
+        return rotations
 
     def far(self, rotations: Floats) -> list[Finding]:
-        """Joints of rotations (N, T, J, 4) that come close to half a turn from their means."""
+        """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
         return _far(quat.log(quat.mul(quat.conj(self.means), rotations)))
 
 
 def fit(rotations: Floats) -> tuple[Chart, list[Finding]]:
-    """Chart about the chordal means of rotations (N, T, J, 4), and what is far from them."""
+    """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints."""
     own_chart = Chart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
     return own_chart, own_chart.far(rotations)
 
 
 def _jumps(vectors: Floats) -> Floats:
-    """Which (N, J) rotation vectors jump by more than half a turn between neighbours."""
+    """Return a mask (N, J) of rotation vectors with a jump of over half a turn between frames."""
     steps = np.linalg.norm(np.diff(vectors, axis=1), axis=-1)
     jumps: Floats = np.any(steps > np.pi, axis=1)
     return jumps
@@ -68,9 +83,9 @@ def _unwrapped(vectors: Floats) -> Floats:
 
 
 def _followed(path: Floats) -> Floats:
-    """Rotation vectors (T, 3) that run on from where they are shortest, in both directions.
+    """Unwrap rotation vectors (T, 3) in both directions from the frame nearest to the mean.
 
-    Starting where a clip is nearest to the mean puts all clips on one sheet.
+    Starting at that frame puts all clips on the same branch.
     """
     path = path.copy()
     start = int(np.argmin(np.linalg.norm(path, axis=-1)))
@@ -82,7 +97,7 @@ def _followed(path: Floats) -> Floats:
 
 
 def _nearest_turn(vector: Floats, neighbour: Floats) -> Floats:
-    """The same rotation with whole turns added so that it lies nearest to a neighbour."""
+    """Return the same rotation with whole turns added so that it lies nearest to a neighbour."""
     angle = float(np.linalg.norm(vector))
     if angle < 1e-9:
         return vector

@@ -1,72 +1,143 @@
-"""Where joblib's jobs are run: here in processes, or on a Dask cluster that has posefield too."""
+"""Jobs on a Dask cluster, by the public interface of `distributed`.
 
-import asyncio
-from collections.abc import Callable, Iterator, Sequence
+The shared arguments are the result of a task, not scattered: scattered data are lost with the last
+worker that holds them, a task runs again (docs/decisions/0040-cluster-jobs.md).
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
-import joblib
-from distributed import Client
-from distributed.client import FutureCancelledError
-from distributed.scheduler import KilledWorker
-from joblib._dask import DaskDistributedBackend
+import dask
+from distributed import CancelledError, Client, Future, KilledWorker, get_worker, wait
+from distributed.comm import CommClosedError
 
+from model_export.jobs import Arguments
 from service import scheduler
 from service.motion.errors import ClusterError
 
 KIT = scheduler.Kit(
     ("service", "model_export"),
-    ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn", "numba", "joblib"),
+    ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn"),
 )
-"""What an evaluation and a model's bytes hang on."""
+"""Packages whose versions determine a result."""
+AHEAD = 2
+"""Jobs submitted per thread of the workers, so that a worker need not wait for its next one."""
+POLL = 1.0
+"""Seconds without a finished job after which the workers are counted."""
+PATIENCE = 60.0
+"""Seconds without any worker, or for fetching one result."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Workers of a Dask scheduler. patience: seconds without any worker until ClusterError."""
+
+    client: Client
+    address: str
+    patience: float = PATIENCE
+
+    def run(
+        self,
+        function: Callable[..., Any],
+        arguments: Iterable[Arguments],
+        shared: Arguments = (),
+    ) -> Iterator[Any]:
+        """Run jobs as `Jobs.run` does. A job whose worker dies runs again on another.
+
+        Raises ClusterError if a job killed every worker that ran it, if no worker is left, if the
+        scheduler stops, and if a worker that joined later has other packages.
+        """
+        given = _Given(function, shared, scheduler.installed(KIT))
+        waiting = iter(arguments)
+        with _reported(self.address):
+            data = self.client.submit(_same, given, pure=False)
+            running = self._submitted(data, islice(waiting, self._room(0)))
+            while running:
+                for future in self._done(running):
+                    yield from self._fetched(future, running)
+                running |= self._submitted(data, islice(waiting, self._room(len(running))))
+
+    def _room(self, running: int) -> int:
+        """Return the number of jobs to submit.
+
+        At least one thread is assumed, because a worker can connect later.
+        """
+        threads = sum(self.client.nthreads().values())
+        return max(AHEAD * max(threads, 1) - running, 0)
+
+    def _submitted(self, data: Future, arguments: Iterable[Arguments]) -> set[Future]:
+        return {self.client.submit(_job, data, own, pure=False) for own in arguments}
+
+    def _done(self, running: set[Future]) -> set[Future]:
+        """Return the futures of finished jobs; empty if none finishes within POLL."""
+        try:
+            with self.client.as_current():
+                return set(wait(running, timeout=POLL, return_when="FIRST_COMPLETED").done)
+        except TimeoutError:
+            self._expect_workers()
+            return set()
+
+    def _fetched(self, future: Future, running: set[Future]) -> Iterator[Any]:
+        """Yield a job's result; nothing if it was lost with its worker, and the job runs again."""
+        try:
+            result = future.result(timeout=self.patience)
+        except TimeoutError:
+            if future.status == "error":
+                raise
+            self._expect_workers()
+        else:
+            running.remove(future)
+            yield result
+
+    def _expect_workers(self) -> None:
+        try:
+            self.client.wait_for_workers(1, timeout=self.patience)
+        except TimeoutError as error:
+            message = f"has had no workers for {self.patience:g} s"
+            raise ClusterError(self.address, message) from error
 
 
 @contextmanager
-def jobs(address: str, shared: Sequence[Any] = ()) -> Iterator[None]:
-    """Inside, joblib runs its jobs on the workers of the scheduler at an address.
+def connect(address: str, patience: float = PATIENCE) -> Iterator[Cluster]:
+    """Connect to the scheduler at an address such as tcp://host:8786.
 
-    shared: arguments that many jobs have in common, sent to every worker once.
-    A job whose worker dies is run again by another. Raises ClusterError where the cluster cannot be
-    used, where a job has killed every worker that it ran on, and where all workers died at once.
+    Raises ClusterError if it cannot be used.
     """
-    with scheduler.connect(address, KIT) as client:
-        backend = _Backend(client=client, scatter=list(shared))
-        try:
-            with joblib.parallel_config(backend=backend):
-                yield
-        except KilledWorker as fault:
-            raise ClusterError(address, scheduler.killed(fault)) from fault
-        except FutureCancelledError as fault:
-            message = f"lost all workers at once, and the data with them ({fault})"
-            raise ClusterError(address, message) from fault
+    # The size of a job's arguments is known; the warning is meant for authors of Dask programs.
+    quiet = {"distributed.admin.large-graph-warning-threshold": "1 TiB"}
+    with dask.config.set(quiet), scheduler.connect(address, KIT) as client:
+        yield Cluster(client, address, patience)
 
 
-class _Backend(DaskDistributedBackend):  # type: ignore[misc]  # joblib has no types
-    """joblib's own, but for jobs that failed outside of their code: it would wait for them for
-    ever (joblib 1.6)."""
+@dataclass(frozen=True)
+class _Given:
+    """Common part of the jobs of a run. kit: versions that every worker must have."""
 
-    client: Client
-    _callbacks: dict[Any, Callable[[Any], None]]
-
-    async def _collect(self) -> None:
-        while self._continue:
-            async for future, result in self.waiting_futures:
-                self._results.pop(future).set_result(result)
-                self._callbacks.pop(future)(_Fault(result[1]) if _failed(future) else result)
-            await asyncio.sleep(0.01)
-
-    def retrieve_result_callback(self, out: Any) -> Any:
-        if isinstance(out, _Fault):
-            raise out.fault
-        return super().retrieve_result_callback(out)
+    function: Callable[..., Any]
+    shared: Arguments
+    kit: Mapping[str, str]
 
 
-class _Fault:
-    """An error in place of a result."""
-
-    def __init__(self, fault: BaseException) -> None:
-        self.fault = fault
+def _same(given: _Given) -> _Given:
+    return given
 
 
-def _failed(future: Any) -> bool:
-    return bool(future.status == "error")
+def _job(given: _Given, own: Arguments) -> Any:
+    # Workers that joined later have not been checked.
+    if unlike := scheduler.differences(scheduler.installed(KIT), given.kit):
+        raise ClusterError(get_worker().address, unlike)
+    return given.function(*given.shared, *own)
+
+
+@contextmanager
+def _reported(address: str) -> Iterator[None]:
+    """Raise the errors of Dask as ClusterError."""
+    try:
+        yield
+    except KilledWorker as error:
+        raise ClusterError(address, scheduler.killed(error)) from error
+    except (CancelledError, CommClosedError) as error:
+        raise ClusterError(address, "the scheduler has gone") from error

@@ -1,4 +1,4 @@
-"""Controls of a recipe: typed into the table, or measured of the motion itself."""
+"""Control parameters of a recipe: read from a column of the table, or measured from the motion."""
 
 from typing import Annotated, Any, Literal
 
@@ -23,10 +23,10 @@ Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Text = Annotated[str, Field(min_length=1)]
 
 ROOT_HEIGHT = "root_height"
-"""A short name for the height of the root."""
+"""Quantity that measures the height of the root."""
 MOMENTS = tuple(moment for moment in measure.MOMENTS if moment != "landmark")
 """Moments that need no column of the table."""
-# What a quantity takes besides its name, and what of it has to be said.
+# Keys that a quantity accepts besides its name, and those that it requires.
 PLACE, MOMENT, PAIR = ("joint", "at"), ("at",), ("joints",)
 TAKES = {
     **dict.fromkeys(measure.AXES, PLACE),
@@ -37,13 +37,13 @@ NEEDS = {quantity: keys for quantity, keys in TAKES.items() if keys != PAIR}
 
 
 class Part(BaseModel):
-    """A part of a recipe, in which nothing stands that is not known."""
+    """Base of the parts of a recipe; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Auto(Part):
-    """How a control is measured."""
+    """Measurement that yields a control."""
 
     quantity: Literal[measure.Quantity, "root_height"] = Field(
         description="left, height, forward: a joint's place in the frame of the first pose, m; "
@@ -67,12 +67,12 @@ class Auto(Part):
 
     @property
     def unit(self) -> str:
-        """Unit of what is measured."""
+        """Return the unit of the measured quantity."""
         return measure.UNITS.get(self.quantity, "m")
 
     @property
     def places(self) -> list[str]:
-        """Joints whose middle is looked at."""
+        """Return the joints whose mean position is measured."""
         return [self.joint] if isinstance(self.joint, str) else list(self.joint or ())
 
     @model_validator(mode="after")
@@ -111,11 +111,11 @@ class ControlColumn(_Named):
 
 
 class ControlMeasured(_Named):
-    """One control parameter that is measured of each clip."""
+    """One control parameter that is measured from each clip."""
 
     auto: Auto
     unit: Text = Field(
-        # Known by what is measured; left out, it is that.
+        # The quantity determines the unit.
         default_factory=lambda read: read["auto"].unit,
         description="the unit of what is measured, which need not be said",
     )
@@ -132,7 +132,7 @@ class ControlMeasured(_Named):
 
 
 COLUMN, MEASURED = "(column)", "(auto)"
-"""Which kind of control a fault lies in: names that no key can have."""
+"""Tags of the kinds of control in the path of an error: names that no key can have."""
 
 
 def _kind(control: Any) -> str | None:

@@ -1,4 +1,4 @@
-"""What a truncation costs: numbers stored, or multiply-adds per pose."""
+"""Cost of a truncation: numbers stored, or multiply-adds per pose."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,47 +13,49 @@ from model_export.tensor import MotionTensor
 
 @dataclass(frozen=True)
 class Price:
-    """What ranks (r1, r2, r3) cost: r1 r2 r3 of the core, so much for each rank of each mode, and
-    so much for each pair of ranks of the first two modes."""
+    """Cost of ranks (r1, r2, r3): the core's r1 r2 r3 plus linear terms.
+
+    ranks: cost per rank of each mode. pair: cost per pair of ranks of the first two modes.
+    """
 
     ranks: tuple[int, int, int]
     pair: int = 0
 
     def of(self, r1: Any, r2: Any, r3: Any) -> Any:
-        """Cost of ranks, whole numbers or arrays that broadcast against each other."""
+        """Return the cost of ranks, integers or arrays that broadcast against each other."""
         alone = sum(price * rank for price, rank in zip(self.ranks, (r1, r2, r3), strict=True))
         return r1 * r2 * r3 + self.pair * r1 * r2 + alone
 
 
 def numbers(own_tensor: MotionTensor, controls: int) -> Price:
-    """Numbers stored in the file for the motion: core, bases and kriging weights.
+    """Return the price in numbers stored for the motion: core, bases and kriging weights.
 
     A rank of the first mode is a direction of the D' degrees of freedom that vary, one of the
     second a column over the frames, one of the third a weight for every sample and every drift
-    function. Not counted: what does not grow with the ranks (the means, the samples' controls, the
-    fields of duration, warp and bones) and sigma's matrix.
+    function. Parts that do not grow with the ranks are left out: the means, the samples' controls,
+    the coefficient models of duration, warp and bones, and sigma's matrix.
     """
     return stored(own_tensor.values.shape, controls)
 
 
 def stored(shape: Sequence[int], controls: int) -> Price:
-    """The same of a tensor of degrees of freedom, frames and samples."""
+    """Return the price in stored numbers for a tensor shape (D', T, N)."""
     freedoms, frames, samples = shape
     return Price((freedoms, frames, samples + controls + 1))
 
 
 def operations(own_tensor: MotionTensor, controls: int) -> Price:
-    """Multiply-adds of one pose, of what grows with the ranks.
+    """Return the price in multiply-adds of one pose, counting terms that grow with the ranks.
 
-    Kriging weights, core, the line between two frames, its product with the motion, and directions
-    of three numbers for the root and a quaternion for each joint.
+    Counted are the kriging weights, the core, the interpolation between two frames, its product
+    with the motion, and directions of three numbers for the root and a quaternion for each joint.
     """
     joints, samples = len(own_tensor.chart.means), own_tensor.values.shape[2]
     return Price((4 * joints + 3, 1, samples + controls + 1), pair=1)
 
 
 def read(model: Model, level: int) -> int:
-    """Numbers of the file that a level reads: core, bases, kriging weights and samples."""
+    """Return how many numbers a level reads: core, bases, kriging weights and samples."""
     bank, rung = model.bank, model.decoder.rungs[level]
     r1, r2, r3 = rung.ranks
     samples, varies = bank.samples(level), np.any(model.decoder.at(level).unwhiten != 0.0, axis=1)
@@ -73,7 +75,7 @@ def _weights(bank: FieldBank, level: int) -> int:
 
 
 def work(model: Model, level: int) -> int:
-    """Multiply-adds of one pose of a level, from controls to quaternions."""
+    """Return the multiply-adds of one pose of a level, from controls to quaternions."""
     bank, rung = model.bank, model.decoder.rungs[level]
     (r1, r2, r3), columns = rung.ranks, bank.columns(level)
     distances = columns * (2 + 2 * len(bank.low) + len(bank.performers))
@@ -87,18 +89,21 @@ PRICES = {"numbers": numbers, "operations": operations}
 
 @dataclass(frozen=True)
 class Compression:
-    """Numbers of the raw tensor of D' × T × N over those of the core alone, and over all stored."""
+    """Compression ratios of the raw tensor (D', T, N).
+
+    core: relative to the core alone. stored: relative to all stored numbers.
+    """
 
     core: float
     stored: float
 
 
 def compression(own_tensor: MotionTensor, ranks: Sequence[int], controls: int) -> Compression:
-    """Compression at ranks (r1, r2, r3); what counts as stored says `numbers`."""
+    """Return the compression at ranks (r1, r2, r3); `numbers` defines what counts as stored."""
     return compressed(own_tensor.values.shape, ranks, controls)
 
 
 def compressed(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
-    """The same of a tensor of a shape (D', T, N)."""
+    """Return the compression of a tensor of shape (D', T, N) at ranks (r1, r2, r3)."""
     raw, held = float(np.prod(shape)), stored(shape, controls).of(*ranks)
     return Compression(raw / float(np.prod(ranks)), raw / float(held))

@@ -1,7 +1,6 @@
-"""Covariances of unit sill and unit range in ONNX, each beside its formula in NumPy.
+"""Covariances of unit sill and unit range, in ONNX and in NumPy.
 
-Each takes the squared distance, which is what the graph has at hand. The variogram is one minus the
-covariance.
+Each takes the squared distance. The variogram is one minus the covariance.
 """
 
 from collections.abc import Callable
@@ -14,7 +13,7 @@ from service.motion.covariance import FORMULAS, RATE32, RATE52
 
 @dataclass(frozen=True)
 class Covariance:
-    """One covariance: of squared distances (…) in NumPy, of a graph's value in ONNX."""
+    """A covariance of squared distances: a NumPy function, and a builder of its ONNX nodes."""
 
     numpy: Callable[[Floats], Floats]
     onnx: Callable[[Net, str], str]

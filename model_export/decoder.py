@@ -1,23 +1,30 @@
-"""From reduced coefficients and canonical time to rotations, root position and bone offsets."""
+"""Decoder from reduced coefficients and canonical time to rotations, root and bone offsets."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from model_export.chart import Chart
 from model_export.hosvd import Multilinear
 from model_export.ladder import Numbers
 from model_export.net import Net
 from service.motion import blend, quat
 from service.motion.conventions import Floats, Indices
 
-# Added to squared half angles, so that the sine over the angle has a value at zero.
+# Added to squared half angles, so that sin(a) / a is defined at zero.
 TINY = 1e-12
+# Numbers of decoded motion per block: 16 MB.
+MOTIONS = 2_000_000
 
 
 @dataclass(frozen=True)
 class Rung:
-    """What a level of detail keeps: ranks, and joints that move, in order; the others stay at the
-    family's mean."""
+    """Size of a level of detail.
+
+    ranks: (r1, r2, r3). joints: indices of the moving joints, in order; all others stay at the
+    family's mean.
+    """
 
     ranks: tuple[int, int, int]
     joints: tuple[int, ...]
@@ -25,13 +32,13 @@ class Rung:
 
 @dataclass(frozen=True)
 class Decoder:
-    """Reduced tensor to poses.
+    """Reduced motion tensor and the maps from its coefficients to poses.
 
     reduced: core (r1, r2, r3) and bases of degrees of freedom, frames and samples, in the metric's
-    coordinates. mean (D,): pose vector that the tensor is centred on. unwhiten (D, D'): from the
-    metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means (J, 4):
-    rotations about which the rotation vectors are taken. coarse: ranks and joints of each coarser
-    level of detail.
+    coordinates. mean: pose vector (D,) on which the tensor is centred. unwhiten: map (D, D') from
+    the metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means:
+    rotations (J, 4) about which the rotation vectors are taken. coarse: ranks and joints of each
+    coarser level.
     """
 
     reduced: Multilinear
@@ -42,12 +49,12 @@ class Decoder:
 
     @property
     def rungs(self) -> tuple[Rung, ...]:
-        """Ranks and joints of all levels."""
+        """Return the ranks and joints of all levels, the finest first."""
         r1, r2, r3 = self.reduced.core.shape
         return (Rung((r1, r2, r3), tuple(range(len(self.means)))), *self.coarse)
 
     def at(self, level: int) -> "Decoder":
-        """Decoder of a level: leading parts of core and bases, and joints that do not move."""
+        """Return the decoder of one level: truncated core and bases, and fixed joints."""
         rung = self.rungs[level]
         moves = np.zeros((1 + len(self.means), 3))
         moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
@@ -58,28 +65,55 @@ class Decoder:
 
     @property
     def directions(self) -> Floats:
-        """Pose vectors (r1, D) that the first mode's coefficients are multiplied with."""
+        """Return the pose vectors (r1, D) that the first mode's coefficients multiply."""
         return self.reduced.bases[0].T @ self.unwhiten.T
 
     def numpy(self, coefficients: Floats, place: Floats) -> tuple[Floats, Floats]:
-        """Rotations (B, S, J, 4) and root positions (B, S, 3) at canonical frames (B, S).
+        """Return rotations (B, S, J, 4) and root positions (B, S, 3) at canonical frames (B, S).
 
-        coefficients (B, r3). Between frames the time basis is linear (Mukai & Kuriyama 2006, 2).
+        coefficients: (B, r3). The time basis is interpolated linearly between frames (Mukai &
+        Kuriyama 2006, section 2).
         """
         numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
-        vectors = numbers[..., 3:].reshape(*place.shape, -1, 3)
-        return quat.mul(self.means, quat.exp(vectors)), numbers[..., :3]
+        return Chart(self.means).poses(numbers)
+
+    def at_frame(self, coefficients: Floats, frame: int) -> tuple[Floats, Floats]:
+        """Return rotations (B, J, 4) and root positions (B, 3) at one canonical frame of all.
+
+        The core is contracted with that frame first, which saves nearly all of the work of `numpy`.
+        """
+        core = np.tensordot(self.reduced.bases[1][frame], self.reduced.core, axes=(0, 1))
+        numbers = self.mean + coefficients @ (core.T @ self.directions)
+        return Chart(self.means).poses(numbers)
+
+    def of_joints(self, joints: Sequence[int]) -> "Decoder":
+        """Return the decoder of some joints alone, including the root, at its finest level."""
+        kept = [0, *(1 + joint for joint in joints)]
+        rows = np.ravel(np.arange(len(self.mean)).reshape(-1, 3)[kept])
+        return replace(
+            self,
+            mean=self.mean[rows],
+            unwhiten=self.unwhiten[rows],
+            means=self.means[list(joints)],
+            coarse=(),
+        )
 
     def reduced_poses(self, coefficients: Floats, place: Floats) -> Floats:
-        """Coefficients (B, S, r1) of the first mode."""
-        table = self.reduced.bases[1]
+        """Return coefficients (B, S, r1) of the first mode."""
+        table, (r1, r2, r3) = self.reduced.bases[1], self.reduced.core.shape
         time = blend.between(table, place)
-        # The core first, as a product of matrices: 17 times as fast as one sum at full rank.
-        motion = np.tensordot(coefficients, self.reduced.core, axes=(1, 2))
-        return time @ motion.swapaxes(1, 2)
+        # Contracting the core first as a matrix product is 17 times as fast as one einsum.
+        core = self.reduced.core.transpose(2, 0, 1).reshape(r3, -1)
+        poses = np.empty((*place.shape, r1))
+        step = max(1, MOTIONS // core.shape[1])
+        for start in range(0, len(place), step):
+            block = slice(start, start + step)
+            motion = (coefficients[block] @ core).reshape(-1, r1, r2)
+            poses[block] = time[block] @ motion.swapaxes(1, 2)
+        return poses
 
     def entries(self) -> dict[str, list[Numbers]]:
-        """What the decoder's graph asks of a ladder."""
+        """Return the level-dependent slice ends and shapes of the decoder's graph, by name."""
         ranks, joints = [rung.ranks for rung in self.rungs], [len(r.joints) for r in self.rungs]
         return {
             "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
@@ -96,7 +130,10 @@ class Decoder:
     def onnx(
         self, net: Net, coefficients: str, place: str, ends: dict[str, str]
     ) -> tuple[str, str]:
-        """The same in a graph, from canonical frames (B, S, 1); `ends` are a ladder's."""
+        """Build `numpy` in a graph, from canonical frames (B, S, 1).
+
+        ends: graph values of the level's slice ends, by the names of `entries`.
+        """
         flat = self._reduced(net, coefficients, place, ends)
         directions = self._directions(net)
         three, end = net.indices(3), net.indices(len(self.mean))
@@ -113,10 +150,10 @@ class Decoder:
         )
 
     def _reduced(self, net: Net, coefficients: str, place: str, ends: dict[str, str]) -> str:
-        """Coefficients of the first mode (r1, B S).
+        """Build the coefficients of the first mode (r1, B S).
 
-        Poses lie innermost: a product of small matrices for each of them would take longer than
-        all that is in it.
+        Poses lie innermost: one small matrix product per pose would cost more in calls than in
+        arithmetic.
         """
         whole = net.weights("core", self.reduced.core.transpose(1, 0, 2))
         core = net("Slice", whole, net.indices(0, 0, 0), ends["core"])
@@ -128,7 +165,7 @@ class Decoder:
         return net("Reshape", poses, ends["flat"])
 
     def _time(self, net: Net, place: str, end: str) -> str:
-        """Time coefficients (r2, B, S): two columns of the table, and a line between them."""
+        """Build time coefficients (r2, B, S), linearly interpolated between frames."""
         table = net.weights("time_basis", self.reduced.bases[1].T)
         last = len(self.reduced.bases[1]) - 1
         zero, one = net.indices(0), net.indices(1)
@@ -142,16 +179,16 @@ class Decoder:
         return net("Add", net("Gather", first, column, axis=1), rise)
 
     def _directions(self, net: Net) -> str:
-        """Directions (D, r1), put together when the session loads: what is zero is not stored."""
+        """Build directions (D, r1) from stored nonzero rows when the session loads."""
         varies = np.any(self.unwhiten != 0.0, axis=1)
         stored = net.weights("directions", self.directions[:, varies].T)
         nothing = net.weights("no_direction", np.zeros((1, len(self.directions))))
-        # Degrees of freedom that never vary take the row of zeros behind the others.
+        # Degrees of freedom that never vary take the row of zeros after the others.
         row = np.where(varies, np.cumsum(varies) - 1, np.count_nonzero(varies))
         return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
 
     def _rotations(self, net: Net, flat: str, directions: str, ends: dict[str, str]) -> str:
-        """Quaternions (B S, J, 4) of the first mode's coefficients (r1, B S)."""
+        """Build quaternions (B S, J, 4) from the first mode's coefficients (r1, B S)."""
         turning = turned_onnx(net, self.means, directions)
         offset = turned(self.means, self.mean[3:])
         if any(len(rung.joints) < len(self.means) for rung in self.rungs):
@@ -166,7 +203,11 @@ class Decoder:
         )
 
     def _some(self, net: Net, flat: str, turning: str, offset: Floats, ends: dict[str, str]) -> str:
-        """The same where some level keeps joints still: those that move longest come first."""
+        """Build quaternions where some level fixes joints.
+
+        Joints are sorted by the number of levels that move them, so that a slice selects a level's
+        joints.
+        """
         order = self._order()
         joints, zero = len(order), net.indices(0)
         rows = np.arange(4 * joints).reshape(joints, 4)[order].ravel()
@@ -189,17 +230,17 @@ class Decoder:
         return innermost_joints(net, back, joints)
 
     def _order(self) -> Indices:
-        """Joints in the order in which coarser levels let go of them, the last first."""
+        """Return the joints sorted by the number of coarser levels that keep them, descending."""
         kept = [[j in rung.joints for j in range(len(self.means))] for rung in self.coarse]
         return np.argsort(-np.sum(kept, axis=0), kind="stable")
 
 
 def turned(means: Floats, vectors: Floats) -> Floats:
-    """mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
+    """Return mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
 
-    mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The product in brackets
-    is linear in v and keeps its length: it is folded into the directions of the model, and no
-    quaternion is ever multiplied.
+    mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The bracket is linear in
+    v and keeps its length, so it is folded into the model's directions and the graph needs no
+    quaternion products.
     """
     pure = np.zeros((*vectors.shape[:-1], len(means), 4))
     pure[..., 1:] = 0.5 * vectors.reshape(*vectors.shape[:-1], -1, 3)
@@ -207,7 +248,7 @@ def turned(means: Floats, vectors: Floats) -> Floats:
 
 
 def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
-    """The same in a graph, of columns of rotation vectors (3 J, r), as columns (4 J, r)."""
+    """Build `turned` in a graph: columns of rotation vectors (3 J, r) to columns (4 J, r)."""
     # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
     axes = quat.mul(np.eye(4)[:, None], 0.5 * np.eye(4)[1:]).swapaxes(1, 2).reshape(4, 12)
     rotations = net("Squeeze", net.weights("mean_rotations", means[:, :, None]), net.indices(2))
@@ -218,7 +259,7 @@ def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
 
 
 def quaternions(net: Net, rows: str, means: str) -> str:
-    """Graph's quaternions (J, 4, P) of turned rotation vectors (4 J, P) about means (J, 4, 1).
+    """Build quaternions (J, 4, P) from turned rotation vectors (4 J, P) about means (J, 4, 1).
 
     Poses lie innermost, so that every operation runs over long rows.
     """
@@ -231,7 +272,7 @@ def quaternions(net: Net, rows: str, means: str) -> str:
 
 
 def _of_half_angles(net: Net, squares: str) -> tuple[str, str]:
-    """Cosines of half angles and shares sin(a) / a, of squares (J, 1, P) of the half angles."""
+    """Build cosines of half angles a and ratios sin(a) / a, from their squares (J, 1, P)."""
     half = net("Sqrt", net("Add", net.padded(squares), net.number(TINY)))
     shape = net("Shape", squares)
     share = net("Div", net("Sin", half), half)
@@ -239,24 +280,27 @@ def _of_half_angles(net: Net, squares: str) -> tuple[str, str]:
 
 
 def innermost_joints(net: Net, rotations: str, joints: int) -> str:
-    """Quaternions (P, J, 4) of those with poses innermost (J, 4, P)."""
+    """Build quaternions (P, J, 4) from quaternions (J, 4, P) with poses innermost."""
     finished = net("Reshape", rotations, net.indices(4 * joints, -1))
     return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, joints, 4))
 
 
 @dataclass(frozen=True)
 class Proportions:
-    """Bone offsets as a mean (J, 3) and directions (r, J, 3), m: performers differ in few ways."""
+    """Bone offsets as a linear model, m: performers differ in few dimensions.
+
+    mean: (J, 3). directions: (r, J, 3).
+    """
 
     mean: Floats
     directions: Floats
 
     def numpy(self, coefficients: Floats) -> Floats:
-        """Bone offsets (B, J, 3) of coefficients (B, r), m."""
+        """Return bone offsets (B, J, 3), m, of coefficients (B, r)."""
         return self.mean + np.einsum("br,rjk->bjk", coefficients, self.directions)
 
     def onnx(self, net: Net, coefficients: str) -> str:
-        """The same in a graph."""
+        """Build `numpy` in a graph."""
         flat = net(
             "Gemm",
             coefficients,

@@ -1,6 +1,7 @@
-"""Whether a clip would belong if it were another clip: mirrored, its sides exchanged, or turned.
+"""Detection of mirrored, side-swapped or turned clips among those that do not fit their family.
 
-All is compared by where joints are around the root, with the heading of the first frame taken out.
+Clips are compared by joint positions relative to the root, with the heading of the first frame
+removed.
 """
 
 from collections.abc import Iterator
@@ -11,16 +12,19 @@ import numpy as np
 from model_export.bones import apart
 from service.motion.conventions import UP, Floats
 
-# A disguise is named where the clip without it lies at less than this share of its distance.
+# A transform is reported if undoing it reduces the distance below this share.
 BETTER = 0.5
-# Left and right as names begin.
+# Prefixes of the names of left and right joints.
 SIDES = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"))
 
 
 @dataclass(frozen=True)
 class Disguise:
-    """What would have to be done to a clip, and how far it would then lie from what was expected,
-    m; it does lie `before` away."""
+    """A transform of a clip and its effect.
+
+    said: the transform in words. before, after: distance from the prediction without and with the
+    transform undone, m.
+    """
 
     said: str
     before: float
@@ -28,9 +32,9 @@ class Disguise:
 
 
 def found(own: Floats, expected: Floats, names: tuple[str, ...], left: Floats) -> Disguise | None:
-    """The disguise of a clip with joints at own (T, J, 3), expected elsewhere, if it wears one.
+    """Return the transform that explains a clip's distance from its prediction; None if none does.
 
-    left (3,): unit vector to the family's left.
+    own, expected: joint positions (T, J, 3), m. left: unit vector (3,) to the family's left.
     """
     before = apart(own, expected)
     undone = [
@@ -54,7 +58,7 @@ def _without(
 
 
 def others(names: tuple[str, ...]) -> tuple[int, ...]:
-    """Index (J) of each joint's counterpart on the other side; its own in the middle."""
+    """Return the index (J,) of each joint's counterpart on the other side, or its own."""
     counterparts: dict[str, str] = {}
     for a, b in SIDES:
         for name in names:
@@ -65,29 +69,32 @@ def others(names: tuple[str, ...]) -> tuple[int, ...]:
 
 
 def leftwards(joints: Floats, names: tuple[str, ...]) -> Floats:
-    """Unit vector (3,) to the left of joints (N, T, J, 3), level; x where no sides are named."""
+    """Return the horizontal unit vector (3,) to the left of joints (N, T, J, 3).
+
+    It is x if no joint names contain sides.
+    """
     swapped = np.array(others(names))
     rights = [i for i, other in enumerate(swapped) if names[i][0] in "Rr" and other != i]
     if not rights:
         return np.array([1.0, 0.0, 0.0])
-    # The median over clips: a clip that is mirrored has no say.
+    # The median over clips ignores a few mirrored clips.
     across = (joints[:, :, swapped[rights]] - joints[:, :, rights]).mean(axis=(1, 2))
     level = np.median(across, axis=0) * (1.0 - UP)
     return np.asarray(level / np.linalg.norm(level))
 
 
 def _turn(own: Floats, expected: Floats) -> Floats:
-    """Rotation matrix that brings own nearest to expected (Kabsch 1976)."""
+    """Return the rotation matrix that best aligns own with expected (Kabsch 1976)."""
     u, _, v = np.linalg.svd(np.einsum("tjk,tjl->kl", expected, own))
     sign = np.sign(np.linalg.det(u @ v))
     return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ v)
 
 
 def _told(turn: Floats) -> str:
-    """A rotation in words: what is taken for up, where that is not up."""
+    """Describe a rotation in words: the wrong up axis, or the angle about the vertical."""
     tilt = np.degrees(np.arccos(np.clip(UP @ turn @ UP, -1.0, 1.0)))
     if tilt > 45.0:
-        # What the turn brings up is what the file has for up.
+        # The axis that the rotation maps to up is the file's up axis.
         up = turn.T @ UP
         axis = int(np.argmax(np.abs(up)))
         return f"with {'-' if up[axis] < 0 else ''}{'xyz'[axis]} for up"

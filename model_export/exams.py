@@ -1,7 +1,8 @@
-"""How far a level's answers lie from those of the model that nothing is cut from."""
+"""Errors of a level of detail relative to the model before truncation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,29 +12,53 @@ from model_export.hosvd import Multilinear
 from model_export.model import Model
 from model_export.recipe import Recipe
 from model_export.train import Trained
+from service.motion import skeleton
 from service.motion.conventions import Floats
 
-# The worst pose may be off by so many times what all are on the whole: levels are chosen by it.
+# Largest ratio of the worst pose's error to the allowed root mean square, when a level is chosen.
 TAIL = 5.0
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Distances of joints, m: root mean square, 99th percentile, largest; and the largest root mean
-    square over the joints of one pose."""
+    """Errors of joints relative to the model before truncation; statistics are computed on access.
 
-    rms: float
-    p99: float
-    max: float
-    pose: float
+    gaps: distances (Q, J), m.
+    """
+
+    gaps: Floats
+
+    @property
+    def rms(self) -> float:
+        """Return the root mean square, m."""
+        return float(np.sqrt(np.mean(np.square(self._poses))))
+
+    @property
+    def p99(self) -> float:
+        """Return the 99th percentile, m."""
+        return float(np.quantile(self.gaps, 0.99))
+
+    @property
+    def max(self) -> float:
+        """Return the largest distance, m."""
+        return float(self.gaps.max())
+
+    @property
+    def pose(self) -> float:
+        """Return the largest root mean square over the joints of one pose, m."""
+        return float(self._poses.max())
+
+    @cached_property
+    def _poses(self) -> Floats:
+        return np.sqrt(np.mean(np.square(self.gaps), axis=1))
 
 
 @dataclass(frozen=True)
 class Exam:
-    """Random questions, and the answers of the model that nothing is cut from.
+    """Random test inputs with the output of the model before truncation.
 
-    controls (Q, d), labels (Q, p), times (Q, 1). whole (Q, J, 3): joints, m; at_event (Q, 3): the
-    event's joint at its moment.
+    controls: (Q, d). labels: (Q, p). times: (Q, 1), s. whole: joint positions (Q, J, 3), m.
+    at_event: position (Q, 3) of the event's joint at the event, m.
     """
 
     controls: Floats
@@ -44,63 +69,87 @@ class Exam:
     whole: Floats
     at_event: Floats
 
-    def errors(self, model: Model, level: int, joints: Sequence[int]) -> Errors:
-        """Errors of a level over some joints."""
-        answer = model.evaluate(self.controls, self.times, self.labels, level)
-        found = answer.positions(self.parents)[:, 0]
-        gaps = np.linalg.norm(found - self.whole, axis=-1)[:, list(joints)]
-        poses = np.sqrt(np.mean(np.square(gaps), axis=1))
-        rms = float(np.sqrt(np.mean(np.square(poses))))
-        return Errors(rms, float(np.quantile(gaps, 0.99)), float(gaps.max()), float(poses.max()))
-
-    def effector(self, model: Model, level: int) -> float | None:
-        """Root mean square distance, m, of the event's joint at its event, where there is one."""
-        if self.moment is None:
-            return None
-        found = _event(model, self, level, self.moment)
-        return float(np.sqrt(np.mean(np.sum(np.square(found - self.at_event), axis=-1))))
+    def answers(self, model: Model, level: int) -> "Answers":
+        """Return a level's outputs at the test inputs."""
+        return Answers(self, model, level, model.fields(self.controls, self.labels, level))
 
     def keeps(self, model: Model, allowed: dict[str, float]) -> bool:
-        """Whether the last level keeps what is allowed, over the joints that it moves."""
+        """Return True if the last level stays within the allowed errors over its moving joints.
+
+        allowed: errors, m, by name in `Errors`, and of the effector.
+        """
         last = len(model.decoder.coarse)
-        found = vars(self.errors(model, last, model.decoder.rungs[last].joints))
-        if "rms" in allowed:
-            allowed = {**allowed, "pose": TAIL * allowed["rms"]}
-        if "effector" in allowed:
-            found = {**found, "effector": self.effector(model, last)}
-        return all(found[name] <= most for name, most in allowed.items())
+        answers = self.answers(model, last)
+        found = answers.errors(model.decoder.rungs[last].joints)
+        if "rms" in allowed and found.pose > TAIL * allowed["rms"]:
+            return False
+        joints = {name: most for name, most in allowed.items() if name != "effector"}
+        if any(getattr(found, name) > most for name, most in joints.items()):
+            return False
+        effector = answers.effector if "effector" in allowed else None
+        return effector is None or effector <= allowed["effector"]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Outputs of a level at the test inputs. fields: kriged values (Q, m) by name."""
+
+    exam: Exam
+    model: Model
+    level: int
+    fields: dict[str, Floats]
+
+    def errors(self, joints: Sequence[int]) -> Errors:
+        """Return the errors over some joints."""
+        found = self.model.timed(self.fields, self.exam.times, self.level)
+        gaps = np.linalg.norm(found.positions(self.exam.parents)[:, 0] - self.exam.whole, axis=-1)
+        return Errors(gaps[:, list(joints)])
+
+    @property
+    def effector(self) -> float | None:
+        """Return the RMS distance, m, of the event's joint at the event; None without event."""
+        exam = self.exam
+        if exam.moment is None:
+            return None
+        found = _event(self.model, self.fields, self.level, exam.moment, exam.parents)
+        return float(np.sqrt(np.mean(np.sum(np.square(found - exam.at_event), axis=-1))))
 
 
 def of(recipe: Recipe, trained: Trained, questions: int) -> Exam:
-    """Exam of a trained model's levels, of so many questions."""
+    """Return an exam of a trained model's levels with the given number of inputs."""
     moment = fidelity.moment(recipe, trained.examples)
     whole = uncut(trained.model, trained.full)
     return against(whole, trained.skeleton.parents, moment, questions)
 
 
 def against(whole: Model, parents: tuple[int, ...], moment: Moment | None, questions: int) -> Exam:
-    """Exam by the answers of a model that nothing is cut from."""
+    """Return an exam with outputs of a model before truncation."""
     bank = whole.bank
     points, d = thin.questions(bank, 1.0, questions), len(bank.low)
     controls = (points[:, :d] * (bank.high - bank.low) + bank.high + bank.low) / 2.0
     labels = points[:, d:]
     rng = np.random.Generator(np.random.PCG64(len(points)))
-    durations = whole.evaluate(controls, np.zeros((len(points), 1)), labels).duration
-    times = rng.uniform(0.0, 1.0, (len(points), 1)) * durations[:, None]
-    joints = whole.evaluate(controls, times, labels).positions(parents)[:, 0]
-    exam = Exam(controls, labels, times, parents, moment, joints, np.zeros((len(points), 3)))
-    return replace(exam, at_event=_event(whole, exam, 0, moment)) if moment else exam
+    fields = whole.fields(controls, labels, 0)
+    times = rng.uniform(0.0, 1.0, (len(points), 1)) * np.exp(fields["duration"])
+    joints = whole.timed(fields, times, 0).positions(parents)[:, 0]
+    event = _event(whole, fields, 0, moment, parents) if moment else np.zeros((len(points), 3))
+    return Exam(controls, labels, times, parents, moment, joints, event)
 
 
-def _event(model: Model, exam: Exam, level: int, moment: Moment) -> Floats:
-    """Where the event's joint is (Q, 3) at its canonical frame, m."""
-    place = np.full((len(exam.controls), 1), float(moment.frame))
-    answer = model.posed(exam.controls, place, exam.labels, level)
-    return answer.positions(exam.parents)[:, 0, moment.joint]
+def _event(
+    model: Model,
+    fields: dict[str, Floats],
+    level: int,
+    moment: Moment,
+    parents: tuple[int, ...],
+) -> Floats:
+    """Return positions (Q, 3), m, of the event's joint at its canonical frame."""
+    chain = skeleton.chain(parents, moment.joint)
+    return model.joint_at_frame(fields, chain, moment.frame, level)
 
 
 def uncut(model: Model, full: Multilinear) -> Model:
-    """A model before its tensor was cut."""
+    """Return the model with the tensor before truncation."""
     bank = model.bank
     pose = kriging.solve(bank.pose.hyper, bank.pose.samples, full.bases[2])
     return replace(

@@ -1,6 +1,7 @@
-"""A trained model to one file, and the gate that it passes before it may be written.
+"""Export of a trained model to one file, after a parity check.
 
-The gate asks the very session that the service will use, and compares joints in metres.
+The parity check runs the file in the service's own session and compares joints in metres with the
+float64 reference.
 """
 
 import hashlib
@@ -30,16 +31,19 @@ from service.synthesis.ports import OUTPUTS
 from service.synthesis.session import Session
 
 POINTS, BATCH = 10_000, 1_000
-# No joint of the graph's answer may lie farther from the reference's, m.
+# Largest distance of a joint of the graph from the reference's, m.
 ALLOWED = 1e-4
-# With more distinct values than this a control is a continuum, and they are not listed.
+# A control with more distinct values than this is continuous, and they are not listed.
 FEW_VALUES = 10
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A model of all its levels, its file's content and card, and the largest joint error that the
-    gate saw, m."""
+    """An exported model.
+
+    model: of all levels. content: bytes of its file. card: its model card. parity: largest joint
+    error of the parity check, m.
+    """
 
     model: Model
     content: bytes
@@ -49,10 +53,10 @@ class Exported:
 
 @threads.one()
 def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
-    """File of a trained model; the same data give the same bytes.
+    """Return the exported model with all its levels; equal data give equal bytes.
 
-    Raises TrainingError for levels of detail that there cannot be, ExportRefused where onnxruntime
-    answers anything else than the float64 reference does.
+    Raises TrainingError for levels of detail that cannot be made, and ExportRefused if the parity
+    check fails.
     """
     notes = [*notes, *samples.notes(recipe, trained.examples)]
     laddered = levels.build(recipe, trained)
@@ -62,13 +66,12 @@ def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
 
 
 def finished(model: Model, own_card: Callable[[float], ModelCard]) -> Exported:
-    """File of a model of all its levels, whose card says the largest joint error, m, that the gate
-    saw.
+    """Check a model of all its levels and return it with its file.
 
-    Raises ExportRefused as `gate` does.
+    own_card: makes the model card from the parity error, m. Raises ExportRefused as `gate` does.
     """
     about = _about()
-    # The gate's finding is part of the card, so the weights are judged before it is written.
+    # The card contains the parity error, so the weights are checked with a draft of the card.
     draft = own_card(0.0)
     parity = gate(model, model.onnx(card.dump(draft), about), draft)
     written = own_card(parity)
@@ -77,7 +80,7 @@ def finished(model: Model, own_card: Callable[[float], ModelCard]) -> Exported:
 
 @threads.one()
 def finest(recipe: Recipe, trained: Trained) -> bytes:
-    """File of the finest level alone, that no gate has judged: to be measured, not to be served."""
+    """Return an unchecked file of the finest level alone, for measurements only."""
     alone = recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": []})})
     laddered = levels.build(alone, trained)
     own_card = _card(recipe, trained, laddered.levels, [], parity=0.0)
@@ -89,9 +92,10 @@ def _about() -> dict[str, str]:
 
 
 def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
-    """Largest joint distance, m, between file and reference over random questions at every level.
+    """Return the largest joint distance, m, between file and reference at random inputs.
 
-    Raises ExportRefused where it exceeds what is allowed, and says by how much and where.
+    Every level is checked. Raises ExportRefused, naming the joint and the input, if the distance
+    exceeds ALLOWED.
     """
     opened = session.open_bytes(content, f"{own_card.name}.onnx")
     rng = np.random.Generator(np.random.PCG64(10_000))
@@ -113,10 +117,10 @@ def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
 
 @dataclass(frozen=True)
 class _Asked:
-    """Questions of the gate: points (B, d) in the controls' units, times (B, 1), s, labels (B, p),
-    and the level of detail.
+    """Inputs of the parity check.
 
-    All are numbers of float32: the graph sees no others, and so must the reference.
+    points: controls (B, d) in their own units. times: (B, 1), s. labels: (B, p). level: of detail.
+    All are float32 values, the only ones that the graph can receive.
     """
 
     points: Floats
@@ -125,7 +129,7 @@ class _Asked:
     level: int
 
     def said(self, own_card: ModelCard, row: int) -> str:
-        """One of the questions in words."""
+        """Describe one of the inputs in words."""
         names = (control.name for control in own_card.controls)
         point = dict(zip(names, self.points[row].tolist(), strict=True))
         own = np.flatnonzero(self.labels[row])
@@ -134,18 +138,21 @@ class _Asked:
 
 
 def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard, level: int) -> _Asked:
-    """Random controls, performers (nobody as often as each of them) and times of their clips."""
+    """Draw random controls, performers and times of their clips.
+
+    No performer is as likely as each of the performers.
+    """
     low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
     points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
     performers = len(own_card.performers)
     labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, BATCH)]
-    durations = model.evaluate(points, np.zeros((BATCH, 1)), labels).duration
+    durations = model.durations(points, labels)
     times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
     return _Asked(points, times.astype(np.float32).astype(np.float64), labels, level)
 
 
 def _gaps(model: Model, opened: Session, asked: _Asked) -> Floats:
-    """Distances (B, 1, J) between the joints of graph and reference, m."""
+    """Return distances (B, 1, J), m, between the joints of graph and reference."""
     question, parents = (asked.points, asked.times), opened.card.skeleton.parents
     expected = model.evaluate(*question, asked.labels, asked.level).positions(parents)
     answers = opened.run(*question, *OUTPUTS, labels=asked.labels, level=asked.level)
@@ -191,14 +198,17 @@ def _card(
 
 
 def _beside(trained: Trained) -> tuple[tuple[float, ...], ...]:
-    """Root of the covariance of what strays beside a cycle's poses, for a sigma of one metre."""
+    """Return the root of the covariance of log duration and travel residuals.
+
+    The residuals are scaled to a sigma of one metre.
+    """
     if "travel" not in trained.residuals:
         return ()
     strays = np.hstack([trained.residuals["duration"], trained.residuals["travel"]])
     sigmas = np.sqrt(trained.model.bank.sill * trained.pose.variances)
     standard = strays / sigmas[:, None]
     covariance = standard.T @ standard / len(standard)
-    # A walk of one duration, or a straight one, has no variance there.
+    # The covariance is singular for clips of one duration or without turns.
     root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(covariance)))
     return tuple(tuple(map(_round, row)) for row in root)
 
@@ -216,8 +226,7 @@ def _making(recipe: Recipe, trained: Trained) -> Making:
 
 
 def solved_with(hyper: Hyper) -> tuple[float, ...]:
-    """Nugget and drifts; six digits of the one, for all that is made of it takes it as it stands
-    there."""
+    """Return nugget and drifts; the nugget is rounded to six digits, as adaptation reads it."""
     return (float(f"{hyper.nugget:.6g}"), *hyper.drifts)
 
 
@@ -243,7 +252,7 @@ def _controls(recipe: Recipe, trained: Trained) -> tuple[Control, ...]:
 
 
 def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str, Any]:
-    """What training measured, in metres and plain shares, rounded to what is worth reading."""
+    """Return training statistics, in metres and shares, rounded."""
     cut = {f"truncation_{k}_m": v for k, v in asdict(trained.fidelity).items() if v is not None}
     kept, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
     compression = asdict(cost.compression(trained.tensor, kept, controls))
@@ -269,7 +278,7 @@ def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str,
 
 
 def plainly(hyper: Hyper) -> Hyper:
-    """The same in numbers of Python, which a card can hold."""
+    """Return the parameters with Python floats, which a model card can hold."""
     return replace(hyper, nugget=float(hyper.nugget), label=float(hyper.label))
 
 
@@ -280,7 +289,7 @@ def _round(value: Any) -> float:
 def found(
     findings: Sequence[Finding], examples: Sequence[Example], names: Sequence[str]
 ) -> list[str]:
-    """One sentence for every clip that a joint was cleaned in or watched in."""
+    """Return one note per clip and kind of finding."""
     said: dict[tuple[int, str], list[str]] = {}
     for finding in findings:
         entry = f"{names[finding.joint]} by {np.degrees(finding.angle):.0f} degrees"
@@ -310,10 +319,10 @@ def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
 
 
 def digest(files: Mapping[str, Example]) -> str:
-    """One hash over the content of every motion file, in the order of their names."""
+    """Return one SHA-256 digest over the names and contents of motion files, sorted by name."""
     total = hashlib.sha256()
     for name in sorted(files):
-        total.update(
-            name.encode() + b"\0" + hashlib.sha256(files[name].row.place.read_bytes()).digest()
-        )
+        with files[name].row.place.open("rb") as file:
+            own = hashlib.file_digest(file, "sha256").digest()
+        total.update(name.encode() + b"\0" + own)
     return total.hexdigest()

@@ -1,8 +1,8 @@
-"""A model's tensor with more clips in it than its bases were made for.
+"""Extension of a model's tensor by new clips.
 
-The old samples are what the model holds of them: reduced motions. What of the new clips the bases
-of degrees of freedom and frames cannot say becomes further columns of these, as many as keep what
-is left out within what the model itself was allowed to leave out.
+The existing samples are taken from the model in reduced form. The residuals of the new clips add
+columns to the bases of degrees of freedom and frames, as few as keep the remaining error within the
+truncation error that the model allows.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,16 @@ from model_export.model import Model
 from model_export.tensor import CONSTANT, MotionTensor
 from service.motion.conventions import Floats
 
-# A model that was cut nowhere may still leave out what nobody sees, m.
+# Error allowed for a model that was not truncated, m: invisible.
 LEAST = 1e-4
 
 
 @dataclass(frozen=True)
 class Extended:
-    """The old samples, then the new clips: tensor, its decomposition, and the ranks that lose
-    nothing of it."""
+    """The motion tensor of existing samples followed by new clips.
+
+    full: its decomposition at full rank. ranks: those that keep all of it.
+    """
 
     tensor: MotionTensor
     full: Multilinear
@@ -33,10 +35,11 @@ class Extended:
 
 @dataclass(frozen=True)
 class _Space:
-    """The metric of the model's poses, and its degrees of freedom in it.
+    """Metric of the model's poses, and a basis of its degrees of freedom.
 
-    varies (D,): which degrees of freedom do. root, inverse (D', D'): to the metric's coordinates
-    and back. directions (D', r1): orthonormal; turn (r1, r1): the core's coordinates to theirs.
+    varies: mask (D,) of degrees of freedom that vary. root, inverse: (D', D'), to the metric's
+    coordinates and back. directions: orthonormal (D', r1). turn: (r1, r1), from the core's
+    coordinates to those of the directions.
     """
 
     varies: Floats
@@ -49,15 +52,15 @@ class _Space:
 def extend(
     model: Model, parents: tuple[int, ...], joint_weights: Floats, numbers: Floats, allowed: float
 ) -> Extended:
-    """Tensor of a model's samples and new pose vectors (k, T, D).
+    """Return the tensor of a model's samples and new pose vectors (k, T, D).
 
-    joint_weights (J,); allowed: root mean square distance that leaving out may cost these, m.
+    joint_weights: (J,). allowed: root mean square error, m, that truncation may add.
     """
     decoder, weight = model.decoder, float(joint_weights.sum())
     old = _reduced(decoder)
     space = _space(model, parents, joint_weights, numbers, old)
     centred = (numbers - decoder.mean)[..., space.varies] @ space.root
-    # Half of the squared distance for either mode.
+    # Each of the two modes gets half of the squared error.
     clips, frames = numbers.shape[:2]
     budget = max(allowed, LEAST) ** 2 * weight * clips * frames / 2.0
     directions = _more(space.directions, centred, budget)
@@ -74,7 +77,7 @@ def extend(
 
 
 def _reduced(decoder: Decoder) -> Floats:
-    """Motions (r1, T, n) of the samples in the coordinates of the first mode."""
+    """Return motions (r1, T, n) of the samples in the coordinates of the first mode."""
     core, (_, times, samples) = decoder.reduced.core, decoder.reduced.bases
     return hosvd.mode_dot(hosvd.mode_dot(core, times, 1), samples, 2)
 
@@ -99,14 +102,16 @@ def _space(
 
 
 def _more(basis: Floats, rows: Floats, budget: float) -> Floats:
-    """Orthonormal basis (D, r) with as few further columns as leave a squared distance within a
-    budget out of rows (..., D)."""
+    """Extend an orthonormal basis (D, r) by the fewest columns that fit rows (..., D).
+
+    budget: largest squared distance of the rows from the extended basis.
+    """
     flat = rows.reshape(-1, rows.shape[-1])
     left = flat - flat @ basis @ basis.T
     values, vectors = np.linalg.eigh(left.T @ left)
     kept = np.count_nonzero(np.cumsum(np.maximum(values, 0.0)) > budget)
     found = vectors[:, len(values) - kept :]
-    # What rounding has left of the old columns in them.
+    # Rounding leaves components along the old columns; remove them.
     found, _ = np.linalg.qr(found - basis @ (basis.T @ found))
     return np.hstack([basis, hosvd.fix_signs(found)])
 

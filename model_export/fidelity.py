@@ -1,14 +1,15 @@
-"""What a truncation does to the joints: true distances, by forward kinematics.
+"""Joint errors of a truncation, by forward kinematics.
 
-The metric of the tensor is first-order, and counts a sphere of skin round every joint; where joints
-really end up is asked of the kinematics itself.
+The metric of the tensor is a first-order approximation; forward kinematics gives the true
+distances.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from model_export import hosvd
 from model_export.hosvd import Multilinear
 from model_export.ingest import Example
 from model_export.recipe import Recipe
@@ -21,10 +22,11 @@ from service.motion.errors import TrainingError
 
 @dataclass(frozen=True)
 class Fidelity:
-    """Distances between joints of the truncated and the whole tensor, m.
+    """Distances, m, between joints of the truncated and the full tensor.
 
-    rms: root mean square over clips, frames and joints, those by their weights. p99, max: over the
-    same, all joints alike. effector: root mean square over clips of the event's joint at its event.
+    rms: weighted root mean square over clips, frames and joints. p99, max: over the same,
+    unweighted. effector: root mean square over clips of the event's joint at its event; None
+    without event.
     """
 
     rms: float
@@ -35,7 +37,7 @@ class Fidelity:
 
 @dataclass(frozen=True)
 class Moment:
-    """A joint and the canonical frame at which its place counts."""
+    """A joint and the canonical frame of its event."""
 
     joint: int
     frame: int
@@ -43,9 +45,10 @@ class Moment:
 
 @dataclass(frozen=True)
 class Judge:
-    """Where the joints (N, T, J, 3) of the whole tensor are, m, and what a truncation is asked.
+    """Joint positions of the full tensor, for measuring truncations.
 
-    A cycle's travel is out of both sides. offsets (N, J, 3), m; weights (J,): of the joints.
+    whole: joint positions (N, T, J, 3), m, without a cycle's travel. offsets: (N, J, 3), m.
+    weights: joint weights (J,).
     """
 
     own_tensor: MotionTensor
@@ -56,28 +59,65 @@ class Judge:
     whole: Floats
 
     def of(self, reduced: Multilinear) -> Fidelity:
-        """Fidelity of a truncation of this tensor."""
-        found = positions(self.own_tensor, reduced.restored(), self.parents, self.offsets)
-        gaps = np.linalg.norm(found - self.whole, axis=-1)
-        squares = np.mean(np.square(gaps), axis=(0, 1))
-        return Fidelity(
-            float(np.sqrt(np.average(squares, weights=self.weights))),
-            float(np.quantile(gaps, 0.99)),
-            float(gaps.max()),
-            _effector(gaps, self.moment),
+        """Return the fidelity of a truncation of this tensor."""
+        found = self._distances(reduced)
+        return Fidelity(found.rms, found.p99, found.max, found.effector)
+
+    def strain(self, reduced: Multilinear, budgets: Mapping[str, float]) -> float:
+        """Return the largest error of a truncation over its budget, m, by name in `Fidelity`."""
+        found = self._distances(reduced)
+        return max(getattr(found, name) / budget for name, budget in budgets.items())
+
+    def _distances(self, reduced: Multilinear) -> "_Distances":
+        first, *others = reduced.bases
+        # Restore pose vectors directly: the whitened tensor would be as large again.
+        unwhitened = Multilinear(reduced.core, (self.own_tensor.unwhiten @ first, *others))
+        gaps = _joints(self.own_tensor, unwhitened.restored(), self.parents, self.offsets)
+        gaps -= self.whole
+        distances = np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
+        return _Distances(distances, self.weights, self.moment)
+
+
+@dataclass(frozen=True)
+class _Distances:
+    """Distances (N, T, J), m, with the statistics of `Fidelity`, each computed on access."""
+
+    gaps: Floats
+    weights: Floats
+    moment: Moment | None
+
+    @property
+    def rms(self) -> float:
+        squares = np.mean(np.square(self.gaps), axis=(0, 1))
+        return float(np.sqrt(np.average(squares, weights=self.weights)))
+
+    @property
+    def p99(self) -> float:
+        return float(np.quantile(self.gaps, 0.99))
+
+    @property
+    def max(self) -> float:
+        return float(self.gaps.max())
+
+    @property
+    def effector(self) -> float | None:
+        if self.moment is None:
+            return None
+        return float(
+            np.sqrt(np.mean(np.square(self.gaps[:, self.moment.frame, self.moment.joint])))
         )
 
 
 def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> Floats:
-    """Importance (J,) of each joint's position: what the recipe says, or one."""
+    """Return the weight (J,) of each joint's position from the recipe, by default one."""
     names = examples[0].clip.skeleton.names
     return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in names])
 
 
 def judge(recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor) -> Judge:
-    """Judge of the truncations of a recipe's tensor.
+    """Return a judge of the truncations of a recipe's tensor.
 
-    Raises TrainingError where the event's joint is none of the skeleton's.
+    Raises TrainingError if the skeleton lacks the event's joint.
     """
     parents, weights = examples[0].clip.skeleton.parents, joint_weights(recipe, examples)
     offsets = np.stack([example.offsets for example in examples])
@@ -88,21 +128,33 @@ def judge(recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor)
 def positions(
     own_tensor: MotionTensor, values: Floats, parents: tuple[int, ...], offsets: Floats
 ) -> Floats:
-    """Joint positions (N, T, J, 3) of whitened values (D', T, N), bone offsets (N, J, 3), m."""
-    rotations, root = own_tensor.chart.poses(own_tensor.numbers(values))
-    return skeleton.forward(parents, rotations, skeleton.translations(offsets, root))[0]
+    """Return joint positions (N, T, J, 3), m, of whitened values (D', T, N).
+
+    offsets: bone offsets (N, J, 3), m.
+    """
+    return _joints(own_tensor, hosvd.mode_dot(values, own_tensor.unwhiten, 0), parents, offsets)
 
 
-def _effector(gaps: Floats, moment: Moment | None) -> float | None:
-    if moment is None:
-        return None
-    return float(np.sqrt(np.mean(np.square(gaps[:, moment.frame, moment.joint]))))
+def _joints(
+    own_tensor: MotionTensor, centred: Floats, parents: tuple[int, ...], offsets: Floats
+) -> Floats:
+    """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean."""
+    _, frames, samples = centred.shape
+    places = np.empty((len(parents), 3, frames, samples))
+    bones = offsets.transpose(1, 2, 0)[1:, :, None]
+    step = max(1, skeleton.BLOCK // samples)
+    for start in range(0, frames, step):
+        block = slice(start, start + step)
+        numbers = own_tensor.mean[:, None, None] + centred[:, block]
+        rotations = own_tensor.chart.rotation_planes(numbers[3:])
+        places[:, :, block] = skeleton.position_planes(parents, rotations, [numbers[:3], *bones])
+    return places.transpose(3, 2, 0, 1)
 
 
 def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
-    """Where and when the recipe's event is; None where it names none.
+    """Return the joint and canonical frame of the recipe's event; None without event.
 
-    Raises TrainingError where its joint is none of the skeleton's.
+    Raises TrainingError if the skeleton lacks its joint.
     """
     event = recipe.event
     if event is None:
@@ -114,7 +166,7 @@ def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
 
 
 def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
-    """The same for who knows no canonical frames; None where the recipe names no event."""
+    """Return the recipe's event: its joint and share of canonical time; None without event."""
     found = moment(recipe, examples)
     if found is None or recipe.event is None:
         return None
@@ -122,7 +174,7 @@ def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
 
 
 def _frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> int:
-    """Canonical frame of the event: landmarks were brought to the mean of their times."""
+    """Return the canonical frame of the event; a landmark lies at the mean of its times."""
     return round((recipe.motion.frames - 1) * _share(recipe, at, examples))
 
 

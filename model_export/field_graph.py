@@ -1,4 +1,4 @@
-"""The field bank as a graph: what `field_bank` says in NumPy."""
+"""ONNX graph of the bank of coefficient models; `field_bank` is its NumPy counterpart."""
 
 import numpy as np
 
@@ -12,7 +12,10 @@ from service.motion.conventions import Floats
 
 
 def entries(bank: FieldBank, ranks: list[int]) -> dict[str, list[Numbers]]:
-    """What the bank's graph asks of a ladder, where the pose has so many coefficients a level."""
+    """Return the level-dependent slice ends and shapes of the bank's graph, by name.
+
+    ranks: number of pose coefficients of each level.
+    """
     samples = len(bank.pose.samples)
     sizes = [[1, *bank.sizes(rank)] for rank in ranks]
     columns = [bank.columns(level) for level in range(len(ranks))]
@@ -24,17 +27,17 @@ def entries(bank: FieldBank, ranks: list[int]) -> dict[str, list[Numbers]]:
         "to": [[end] for end in ends[1:]],
         "weighing": list(shapes),
         "sizes": list(sizes),
-        # Coarser levels have no quadratic form: of what it is of, one and its zero are left.
+        # Coarser levels have no quadratic form; its slice keeps a single zero.
         "curved": [[own, own] for own in (1 + len(bank.low) + samples, *(1 for _ in ranks[1:]))],
         "own": [[bank.linear + samples], *([len(bank.performers) + 1] for _ in ranks[1:])],
     }
 
 
 def onnx(bank: FieldBank, net: Net, controls: str, ends: dict[str, str]) -> dict[str, str]:
-    """Values (B, m) of each field, the pose's in its place and `sigma` (B,) for its variance.
+    """Build values (B, m) of each quantity by name, with `sigma` (B,) in place of the variance.
 
-    Where performers are told apart, `performer` (B or 1, p) says who moves by their labels. It is a
-    constant that a caller may feed another value for: zeros, and so nobody that was seen.
+    With performers, the graph has the optional input `performer` (B or 1, p) of labels. Its default
+    is zeros, which stand for an unseen performer.
     """
     points = _points(bank, net, controls)
     linear = _linear(bank, net, controls, points)
@@ -56,7 +59,7 @@ def onnx(bank: FieldBank, net: Net, controls: str, ends: dict[str, str]) -> dict
 
 
 def _points(bank: FieldBank, net: Net, controls: str) -> str:
-    """One, and the controls (B, 1 + d), whose sampled range is -1 to 1."""
+    """Build one and the controls (B, 1 + d), scaled so that their sampled range is -1 to 1."""
     low, high = bank.low, bank.high
     gain = np.hstack([np.zeros((len(low), 1)), np.diag(2.0 / (high - low))])
     shift = np.concatenate([[1.0], -(high + low) / (high - low)])
@@ -66,7 +69,7 @@ def _points(bank: FieldBank, net: Net, controls: str) -> str:
 
 
 def _linear(bank: FieldBank, net: Net, controls: str, points: str) -> str:
-    """Labels before them (B, p + 1 + d), where there are any."""
+    """Build the points with labels in front (B, p + 1 + d), if there are performers."""
     if not bank.performers:
         return points
     performers = len(bank.performers)
@@ -77,22 +80,22 @@ def _linear(bank: FieldBank, net: Net, controls: str, points: str) -> str:
 
 
 def _covariances(bank: FieldBank, net: Net, points: str, linear: str, columns: str) -> str:
-    """Covariances of every field with every sample (B, F n), or their first columns.
+    """Build the covariances of every model at every sample (B, F n), or their first columns.
 
-    Squared distances come from one product with [p², q, 1, p]: no array (B, n, d) is ever made.
-    Its factors follow from samples and scales when the session loads, and are not stored.
+    Squared distances come from one product with [p², q, 1, p], without an array (B, n, d). Its
+    factors are computed from samples and scales when the session loads, and are not stored.
     """
-    # The one is squared with the controls, and stands where it is wanted once more.
+    # The points contain the constant one, so both products include it.
     both = net("Concat", net("Mul", points, points), linear, axis=1)
     zero, one = net.indices(0), net.indices(1)
     factors = net("Slice", _factors(bank, net), zero, columns, one)
-    # A distance of zero comes out a rounding error below it, where a root has no value.
+    # Rounding can make a squared distance of zero negative, and its square root NaN.
     squared = net("Relu", net("MatMul", both, factors))
     return COVARIANCES[bank.pose.hyper.covariance].onnx(net, squared)
 
 
 def _factors(bank: FieldBank, net: Net) -> str:
-    """Factors (1 + d + p + 1 + d, F n) of [1, p², q, 1, p] to squared distances."""
+    """Build factors (1 + d + p + 1 + d, F n) that map [1, p², q, 1, p] to squared distances."""
     d, n = len(bank.low), len(bank.pose.samples)
     scales = np.stack([field.hyper.scales for field in bank.kriged])
     worth = net.weights("squared_scales", np.square(scales)[:, :, None])
@@ -112,8 +115,11 @@ def _factors(bank: FieldBank, net: Net) -> str:
 
 
 def _labels(bank: FieldBank, net: Net, own: str) -> list[str]:
-    """Factors of labels (F, p, n) and of one (F, 1, n): label² (1 - q·e) of each field, for labels
-    q of who moves and e of a sample, and what is there without them (F, 1, n)."""
+    """Build the factors of labels (F, p, n) and of one (F, 1, n) in the squared distances.
+
+    They add label² (1 - q·e) for each model, for labels q of the input and e of a sample. own:
+    factor of one without labels (F, 1, n).
+    """
     p, d = len(bank.performers), len(bank.low)
     labels = np.square([field.hyper.label for field in bank.kriged])
     apart = net.weights("squared_labels", labels[:, None, None])
@@ -124,7 +130,7 @@ def _labels(bank: FieldBank, net: Net, own: str) -> list[str]:
 
 
 def _weights(bank: FieldBank, net: Net) -> str:
-    """Weights of all levels behind one another, the finest put together when the session loads."""
+    """Build the concatenated weights of all levels, the finest from parts at session load."""
     finest = net("Concat", _top(bank, net), *_duals(bank, net), axis=0)
     coarse = [_coarse(bank, net, level) for level in range(1, 1 + len(bank.coarse))]
     flat = net("Reshape", finest, net.indices(-1))
@@ -132,7 +138,7 @@ def _weights(bank: FieldBank, net: Net) -> str:
 
 
 def _coarse(bank: FieldBank, net: Net, level: int) -> str:
-    """Weights of a coarser level in a row, with those of a variance of one in front."""
+    """Build the flat weights of a coarser level, preceded by those of a constant one."""
     stored = net.weights(f"weights_{level}", bank.coarse[level - 1])
     one = np.zeros((len(bank.coarse[level - 1]), 1))
     one[len(bank.performers)] = 1.0
@@ -141,7 +147,7 @@ def _coarse(bank: FieldBank, net: Net, level: int) -> str:
 
 
 def _top(bank: FieldBank, net: Net) -> str:
-    """Weights (p + 1 + d, M) of labels, which have none, one and controls."""
+    """Build weights (p + 1 + d, M) of labels, one and controls; those of labels are zero."""
     d, slope, constant = len(bank.low), *bank.slope
     variance = np.concatenate([[constant], np.zeros(d - bank.drift), slope[: bank.drift]])
     fields = [*bank.others.values(), bank.pose]
@@ -154,7 +160,10 @@ def _top(bank: FieldBank, net: Net) -> str:
 
 
 def _duals(bank: FieldBank, net: Net) -> list[str]:
-    """Weights (n, M) of each field's covariances: the pose's, to itself and the variance, first."""
+    """Build weights (n, M) of each model's covariances.
+
+    Those of the pose come first; the variance uses them too.
+    """
     total = 2 + sum(map(field_bank.width, bank.others.values()))
     pose = net.weights("pose_weights", _dual(bank.pose))
     beside = net("Pad", pose, net.indices(0, total - 1, 0, 0))
@@ -174,7 +183,7 @@ def _dual(field: Kriging) -> Floats:
 
 
 def _linear_part(field: Field, controls: int) -> Floats:
-    """Weights (1 + d, m) of one and the controls: zero where the drift has none."""
+    """Return weights (1 + d, m) of one and the controls, zero for terms outside the drift."""
     if isinstance(field, Constant):
         return np.vstack([field.mean, np.zeros((controls, len(field.mean)))])
     drift = field.dual[len(field.samples) :]
@@ -182,7 +191,7 @@ def _linear_part(field: Field, controls: int) -> Floats:
 
 
 def _variance(bank: FieldBank, net: Net, basis: str, straight: str, ends: dict[str, str]) -> str:
-    """Variance (B, 1) of the finest level, a quadratic form of one, controls and covariances."""
+    """Build the finest level's variance (B, 1), a quadratic form of one, controls, covariances."""
     start, one = net.indices(len(bank.performers)), net.indices(1)
     own = net("Slice", basis, start, ends["own"], one)
     around = 1 + len(bank.low) - bank.drift

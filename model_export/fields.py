@@ -1,28 +1,32 @@
-"""What is kriged beside the pose: bone offsets, duration, warp, travel."""
+"""Coefficient models of the quantities besides the pose: bone offsets, duration, warp, travel."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from model_export import kriging, tune
+from model_export import kriging, tune, variogram
 from model_export.decoder import Proportions
 from model_export.field_bank import Constant, Field
 from model_export.recipe import Kriging
 from model_export.samples import Samples
 from model_export.tune import Tuned
+from model_export.variogram import Experimental
 from service.motion.conventions import Floats
 
-# Bone offsets that a model need not tell apart, m.
+# Largest error of bone offsets that a model may make, m.
 SAME_BONE = 5e-4
-# A Gaussian field is conditioned worse than one of Matérn: what it gains has to be worth that.
+# A Gaussian covariance is conditioned worse than Matérn's; it must reduce the error to this share.
 CLEARLY = 0.95
-# Standard errors by which a field of the controls has to be better than none.
+# Standard errors by which a model of the controls must beat the constant.
 SURE = 2.0
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A field, the share of the variation that it explains, and residuals (N, m) left out."""
+    """A fitted coefficient model.
+
+    explained: share of the variation that it explains. residuals: leave-one-out residuals (N, m).
+    """
 
     field: Field
     explained: float
@@ -30,17 +34,40 @@ class Fitted:
 
 
 def chosen(settings: Kriging, samples: Samples, values: Floats) -> Tuned:
-    """Field of values (N, m) of the first covariance to be tried, or one of clearly less
-    leave-one-out error."""
-    first, *others = (tuned(settings, name, samples, values) for name in settings.covariances)
+    """Return the model of values (N, m) with the first covariance, or a clearly better one.
+
+    A covariance is clearly better if its leave-one-out error is below CLEARLY times the first's.
+    """
+    seen = _variograms(settings, samples, values)
+    first, *others = (
+        _tuned(settings, name, samples, values, seen) for name in settings.covariances
+    )
     best = min(others, key=lambda field: field.unexplained, default=first)
     return best if best.unexplained < CLEARLY * first.unexplained else first
 
 
 def tuned(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Tuned:
-    """Field of values (N, m) of least leave-one-out error among the drifts to be tried."""
+    """Return the model of values (N, m) with the drift of the least leave-one-out error."""
+    return _tuned(settings, covariance, samples, values, _variograms(settings, samples, values))
+
+
+def _variograms(settings: Kriging, samples: Samples, values: Floats) -> dict[int, Experimental]:
+    """Return the variogram of the residuals for each degree of drift; covariances share it."""
+    degrees = {max(drifts) for drifts in settings.drifts}
+    return {
+        degree: variogram.of_residuals(samples.half_ranges, values, degree) for degree in degrees
+    }
+
+
+def _tuned(
+    settings: Kriging,
+    covariance: str,
+    samples: Samples,
+    values: Floats,
+    seen: dict[int, Experimental],
+) -> Tuned:
     guesses = [
-        tune.first_guess(samples.half_ranges, values, covariance, drifts)
+        tune.first_guess(seen[max(drifts)], samples.controls, covariance, drifts)
         for drifts in settings.drifts
     ]
     found = [tune.tune(guess, samples, values, settings.nugget) for guess in guesses]
@@ -48,7 +75,10 @@ def tuned(settings: Kriging, covariance: str, samples: Samples, values: Floats) 
 
 
 def fit(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Fitted:
-    """Field of values (N, m): of the controls, or their mean where those do not explain them."""
+    """Return a model of values (N, m) in the controls.
+
+    It is their mean if the controls do not explain them.
+    """
     if np.ptp(values, axis=0).max() == 0.0:
         return Fitted(Constant(values[0]), 0.0, np.zeros_like(values))
     found = tuned(settings, covariance, samples, values)
@@ -60,9 +90,9 @@ def fit(settings: Kriging, covariance: str, samples: Samples, values: Floats) ->
 
 
 def _sure(found: Tuned, samples: Samples, values: Floats) -> bool:
-    """Whether leaving-one-out gains on the mean of the others by more than its standard error.
+    """Return True if the gain over the mean of the other samples exceeds SURE standard errors.
 
-    Scales and nugget were chosen for this very gain: a small one is what chance can give them.
+    Scales and nugget were chosen to maximize this gain, so that a small one can be chance.
     """
     from_mean = np.sum(np.square(samples.from_mean(values)), axis=1)
     gains = from_mean - np.sum(np.square(found.residuals), axis=1)
@@ -70,7 +100,7 @@ def _sure(found: Tuned, samples: Samples, values: Floats) -> bool:
 
 
 def proportions(offsets: Floats) -> tuple[Proportions, Floats]:
-    """Mean and directions of bone offsets (N, J, 3), and each clip's coefficients (N, r)."""
+    """Return mean and directions of bone offsets (N, J, 3), and each clip's coefficients (N, r)."""
     mean = offsets.mean(axis=0)
     centred = (offsets - mean).reshape(len(offsets), -1)
     left, values, right = np.linalg.svd(centred, full_matrices=False)
@@ -79,14 +109,16 @@ def proportions(offsets: Floats) -> tuple[Proportions, Floats]:
         rank += 1
     turned = signs(right[:rank])
     directions = (turned[:, None] * right[:rank]).reshape(rank, -1, 3)
-    # The root has no bone; the decomposition leaves a rounding error where it was.
+    # The root has no bone; clear the rounding error of the decomposition.
     directions[:, 0] = 0.0
     return Proportions(mean, directions), left[:, :rank] * values[:rank] * turned
 
 
 def signs(rows: Floats) -> Floats:
-    """Sign (r,) of the largest entry of each row, so that none hangs on the machine; of a row of no
-    length, one."""
+    """Return the sign (r,) of the largest entry of each row, 1 for a zero row.
+
+    Multiplying by it makes the rows independent of the machine.
+    """
     largest = np.argmax(np.round(np.abs(rows), 9), axis=1)
     return np.where(rows[np.arange(len(rows)), largest] < 0, -1.0, 1.0)
 

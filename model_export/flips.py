@@ -1,8 +1,9 @@
-"""Half turns that a mocap solver makes and a body does not, found and undone.
+"""Detection and removal of half turns that come from the mocap solver.
 
-A marker that hides for a moment leaves the twist of a finger or a toe open, and the solver comes
-back half a turn off: between two frames, or for a whole take. Only joints that move next to nothing
-are touched, so that no visible position changes by more than a few centimetres; each is reported.
+An occluded marker leaves the twist of a finger or a toe undetermined, and the solver can be half a
+turn off afterwards, between two frames or for a whole take. Only joints that move little are
+corrected, so that no joint position changes by more than a few centimetres; each correction is
+reported.
 """
 
 from dataclasses import dataclass, replace
@@ -13,20 +14,20 @@ from service.motion import quat, skeleton
 from service.motion.clip import Clip
 from service.motion.conventions import Floats
 
-# A joint moves nothing that anyone sees where all below it lies within a hand's length, m.
+# Rotations of a joint are hardly visible if all its descendants lie within a hand's length, m.
 HAND = 0.15
-# No joint turns this far between two frames of a capture, rad.
+# Angle between two frames above which a rotation is a jump, rad.
 JUMP = 1.5
-# A whole clip this far from the family's mean, rad, is a solver's flip and not a motion.
+# Angle from the family's mean above which a whole clip counts as flipped, rad.
 FLIPPED = 0.75 * np.pi
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What was noticed of one joint in one clip, and by which angle, rad.
+    """A correction or warning for one joint of one clip. angle: rad.
 
-    kind: "jump" undone between two frames, "flip" undone for the whole clip, "wrap" followed past
-    half a turn from the mean, or "far", close to that.
+    kind: "jump" corrected between two frames, "flip" corrected for the whole clip, "wrap" unwrapped
+    past half a turn from the mean, or "far", close to half a turn.
     """
 
     kind: str
@@ -36,16 +37,16 @@ class Finding:
 
 
 def small_joints(parents: tuple[int, ...], offsets: Floats) -> Floats:
-    """Which joints (J,) carry nothing farther than a hand, by bone offsets (J, 3), m."""
+    """Return a mask (J,) of joints whose descendants lie within HAND, by bone offsets (J, 3), m."""
     rest = np.broadcast_to(quat.IDENTITY, (*offsets.shape[:-1], 4))
-    positions, _ = skeleton.forward(parents, rest, offsets)
+    positions = skeleton.positions(parents, rest, offsets)
     gaps = np.linalg.norm(positions[:, None] - positions, axis=-1)
     small: Floats = (gaps * skeleton.descendants(parents)).max(axis=1) < HAND
     return small
 
 
 def without_jumps(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
-    """Clip whose small joints go on turning from where they were before a jump."""
+    """Return the clip with jumps of small joints removed, and the corrections."""
     steps = quat.mul(quat.conj(clip.rotations[:-1]), clip.rotations[1:])
     turned = np.linalg.norm(quat.log(steps), axis=-1)
     small = small_joints(clip.skeleton.parents, clip.translations[0])
@@ -59,8 +60,10 @@ def without_jumps(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
 
 
 def without_flips(rotations: Floats, small: Floats) -> tuple[Floats, list[Finding]]:
-    """Aligned rotations (N, T, J, 4) with clips turned back as one whose small joint is half a
-    turn off throughout."""
+    """Return aligned rotations (N, T, J, 4) with flips of small joints removed, and findings.
+
+    A flip is a small joint that is half a turn from its mean throughout a clip.
+    """
     means = quat.mean(rotations.reshape(-1, *rotations.shape[2:]))
     return without_flips_from(means, rotations, small)
 
@@ -68,7 +71,7 @@ def without_flips(rotations: Floats, small: Floats) -> tuple[Floats, list[Findin
 def without_flips_from(
     means: Floats, rotations: Floats, small: Floats
 ) -> tuple[Floats, list[Finding]]:
-    """The same, half a turn off a family's means (J, 4)."""
+    """Return the result of `without_flips` relative to given means (J, 4)."""
     away = quat.mul(quat.conj(means), rotations)
     least = np.linalg.norm(quat.log(away), axis=-1).min(axis=1)
     clean, findings = rotations.copy(), []

@@ -1,7 +1,8 @@
-"""Higher-order singular value decomposition with signs that do not hang on the machine.
+"""Higher-order singular value decomposition with deterministic signs.
 
-Symbols follow De Lathauwer, De Moor, Vandewalle, "A multilinear singular value decomposition"
-(SIAM J. Matrix Anal. 2000): a tensor A is its core S times one orthonormal matrix a mode.
+Symbols follow De Lathauwer, De Moor, Vandewalle, "A multilinear singular value decomposition" (SIAM
+J. Matrix Anal. 2000): a tensor A is its core S times one orthonormal matrix per mode. Mukai &
+Kuriyama 2006, section 2, apply it to the motion tensor.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 from service.motion.conventions import Floats
 from service.motion.errors import TrainingError
 
-# Directions that carry less than this share of the first are rounding.
+# Directions with less than this share of the first singular value are rounding errors.
 NOTHING = 1e-9
 
 
@@ -24,11 +25,11 @@ class Multilinear:
     bases: tuple[Floats, ...]
 
     def truncated(self, ranks: tuple[int, ...]) -> "Multilinear":
-        """The leading part of every basis: the levels of one decomposition are nested.
+        """Return the decomposition cut to the leading columns of every basis.
 
-        Squared error is at most the sum over modes of the squared singular values cut off, and at
-        least the largest of these sums (property 10). Raises TrainingError for a rank that the
-        decomposition does not have.
+        The squared error is at most the sum over modes of the squared singular values cut off, and
+        at least the largest of these sums (De Lathauwer et al. 2000, property 10). Raises
+        TrainingError for a rank beyond the decomposition's.
         """
         if any(not 1 <= rank <= size for rank, size in zip(ranks, self.core.shape, strict=True)):
             raise TrainingError(f"ranks {ranks}, expected 1 to {self.core.shape}")
@@ -38,12 +39,12 @@ class Multilinear:
 
     @property
     def motions(self) -> Floats:
-        """Slices along the last mode, each as a row (N, r) whose distances are theirs."""
+        """Return the slices along the last mode as rows (N, r) with equal distances."""
         return self.bases[-1] * self._lengths
 
     def slices(self, motions: Floats) -> Floats:
-        """Slices (..., B) of the tensor that rows (B, r) like `motions` stand for."""
-        # Directions that carry next to nothing are rounding, and have no length to be divided by.
+        """Return the slices (..., B) of the tensor for rows (B, r) of coordinates as `motions`."""
+        # Directions with tiny singular values are rounding errors; do not divide by these.
         lengths = self._lengths
         carried = lengths > NOTHING * lengths[0]
         worth = np.where(carried, 1.0 / np.where(carried, lengths, 1.0), 0.0)
@@ -52,23 +53,23 @@ class Multilinear:
 
     @property
     def _lengths(self) -> Floats:
-        """Singular values (r,) of the last mode."""
+        """Return the singular values (r,) of the last mode."""
         return np.linalg.norm(unfold(self.core, self.core.ndim - 1), axis=1)
 
     def restored(self) -> Floats:
-        """The tensor that core and bases stand for."""
+        """Return the tensor: the core multiplied by all bases."""
         return reduce(lambda x, mb: mode_dot(x, mb[1], mb[0]), enumerate(self.bases), self.core)
 
 
 def unfold(tensor: Floats, mode: int) -> Floats:
-    """Mode-n unfolding: the mode's fibres as columns (size of the mode, all the rest)."""
+    """Return the mode-n unfolding: the mode's fibres as columns (size of the mode, rest)."""
     return np.moveaxis(tensor, mode, 0).reshape(tensor.shape[mode], -1)
 
 
 def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
-    """Mode-n product: matrix (rows, size of the mode) applied to every fibre of the mode.
+    """Return the mode-n product: matrix (rows, size of the mode) applied to every fibre.
 
-    The tensor is never rearranged in memory, which would take longer than the product.
+    The tensor is not rearranged in memory, which would take longer than the product.
     """
     before, after = tensor.shape[:mode], tensor.shape[mode + 1 :]
     if not after:
@@ -78,16 +79,19 @@ def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
 
 
 def decompose(tensor: Floats) -> Multilinear:
-    """HOSVD at full rank: the core is all-orthogonal, its slices ordered by their norm.
+    """Return the HOSVD at full rank, with an all-orthogonal core and slices ordered by norm.
 
     Each basis holds the eigenvectors of its unfolding's Gram matrix, largest first; the largest
-    entry of every column is positive, so the result does not hang on LAPACK's choice of sign.
+    entry of every column is positive, so the result does not depend on LAPACK's choice of sign.
     """
     return _projected(tensor, tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim)))
 
 
 def decompose_at(tensor: Floats, ranks: tuple[int, ...]) -> Multilinear:
-    """The same as `decompose` truncated, without the rest of the core: in half the time."""
+    """Return `decompose` truncated to ranks, in half the time.
+
+    Only the required part of the core is computed.
+    """
     pairs = zip(range(tensor.ndim), ranks, strict=True)
     bases = tuple(_basis(unfold(tensor, mode))[:, :rank] for mode, rank in pairs)
     return _projected(tensor, bases)
@@ -104,16 +108,17 @@ def _basis(unfolded: Floats) -> Floats:
 
 
 def fix_signs(columns: Floats) -> Floats:
-    """Columns (D, r) of either sign, turned so that the largest entry of each is positive."""
-    # Rounded, so that two entries of equal size in theory do not change places by an ulp.
+    """Return columns (D, r) with signs such that the largest entry of each is positive."""
+    # Rounded, so that rounding errors do not decide between two entries of equal size.
     largest = np.argmax(np.round(np.abs(columns), 9), axis=0)
     return columns * np.sign(columns[largest, np.arange(columns.shape[1])])
 
 
 def squared_errors(core: Floats) -> Floats:
-    """Exact squared error of every truncation: entry (i, j, …) is that of ranks (i+1, j+1, …).
+    """Return the exact squared error of every truncation: entry (i, j, …) for ranks (i+1, j+1, …).
 
-    Orthonormal bases make it what the prefix of the core leaves out: |A|² minus a cumulative sum.
+    The bases are orthonormal, so the error is the squared norm of the core outside its prefix: |A|²
+    minus a cumulative sum.
     """
     energy: Floats = np.square(core)
     for axis in range(core.ndim):

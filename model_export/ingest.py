@@ -1,4 +1,4 @@
-"""Rows of the table to clips in one frame: cut, metres, Y up, heading and origin taken out."""
+"""Clips from rows of the table: cut, in metres, Y up, with heading and origin removed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,28 +7,30 @@ from pathlib import Path
 
 import numpy as np
 
-from model_export import flips, measured, table
+from model_export import bvh, flips, measured, table
 from model_export.flips import Finding
 from model_export.recipe import Recipe, Source
 from model_export.table import Row
-from service.motion import bvh, quat
+from service.motion import quat
 from service.motion.clip import Clip
 from service.motion.conventions import UP, Floats
 from service.motion.errors import RecipeError
 from service.motion.skeleton import Skeleton
 
-# Bones that a mocap solver stretches by less than this are taken as rigid without a word, m.
+# Bones that stretch by less than this are taken as rigid without a note, m.
 RIGID = 1e-4
+# Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
+# second, which take 2.4 GB.
+MOST_POSES = 30_000_000
 
 
 @dataclass(frozen=True)
 class Example:
-    """One clip with what it is an example of.
+    """A clip with its controls.
 
-    controls (d,), typed and measured, in the recipe's order. landmarks: fractions of the clip, in
-    order. jumps: what a solver did to small
-    joints between two frames, and is undone. shift: the share of a cycle by which it begins later
-    than it was cut.
+    controls: (d,), from the table and measured, in the recipe's order. landmarks: fractions of the
+    clip, in order. jumps: removed jumps of small joints between two frames. shift: share of a cycle
+    by which the clip was shifted to begin later.
     """
 
     row: Row
@@ -40,31 +42,52 @@ class Example:
 
     @property
     def offsets(self) -> Floats:
-        """Bone offsets (J, 3) of the performer, the root's zero, m."""
+        """Return the bone offsets (J, 3), m, of the performer, zero for the root."""
         return measured.bones(self.clip)
 
 
 def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
-    """Examples of a recipe, and notes on what had to be assumed or smoothed over.
+    """Return the examples of a recipe, and notes on assumptions and corrections.
 
-    Raises RecipeError for a row that cannot be followed, BvhError for a file that cannot be read.
+    Raises RecipeError for an invalid row, BvhError for a file that cannot be read.
     """
     rows = table.read(recipe, folder)
-    files: dict[str, bvh.BvhFile] = {}
+    files = read(rows)
+    unnoted = set(files) if recipe.source.root_offset is None else set()
     notes: list[str] = []
     examples = []
     for row in rows:
         key = str(row.place)
-        if key not in files:
-            files[key] = bvh.read(row.place)
-            notes += offset_notes(files[key], row) if recipe.source.root_offset is None else []
+        if key in unnoted:
+            unnoted.remove(key)
+            notes += offset_notes(files[key], row)
         examples.append(_example(recipe, files[key], row, notes))
     _refuse_other_trees(examples)
     return examples, notes
 
 
+def read(rows: Sequence[Row]) -> dict[str, bvh.BvhFile]:
+    """Return the motion files of rows by their places, each read once.
+
+    Raises BvhError for a file that cannot be read and RecipeError for more than MOST_POSES in all.
+    """
+    files: dict[str, bvh.BvhFile] = {}
+    poses = 0
+    for row in rows:
+        key = str(row.place)
+        if key not in files:
+            files[key] = bvh.read(row.place)
+            poses += len(files[key].values) * len(files[key].joints)
+        if poses > MOST_POSES:
+            raise row.fault(
+                f"found {poses} poses of a joint in the files up to {row.place}, expected at most "
+                f"{MOST_POSES}"
+            )
+    return files
+
+
 def offset_notes(file: bvh.BvhFile, row: Row) -> list[str]:
-    """What was taken a root's OFFSET for, where it is not zero."""
+    """Return a note on the interpretation of a root's OFFSET that is not zero."""
     if not np.any(file.joints[0].offset):
         return []
     return [
@@ -84,7 +107,10 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> E
 
 
 def whole(file: bvh.BvhFile, source: Source) -> Clip:
-    """Clip of all frames of a file; a root's OFFSET of which nothing is said is replaced."""
+    """Return the clip of all frames of a file.
+
+    By default position channels replace the root's OFFSET.
+    """
     return bvh.to_clip(
         file,
         metres_per_unit=source.metres_per_unit,
@@ -94,9 +120,9 @@ def whole(file: bvh.BvhFile, source: Source) -> Clip:
 
 
 def cut(clip: Clip, row: Row) -> tuple[Clip, int]:
-    """Frames of a file that a row names, and the last of them.
+    """Return the frames that a row names, and the index of the last of them in the file.
 
-    Raises RecipeError for a frame that the file does not have, and a single one.
+    Raises RecipeError for a frame that the file lacks, and for a single frame.
     """
     last = len(clip) - 1 if row.last_frame is None else row.last_frame
     if last >= len(clip):
@@ -111,7 +137,7 @@ def cut(clip: Clip, row: Row) -> tuple[Clip, int]:
 def canonical(
     clip: Clip, row: Row, cyclic: bool, in_place: bool
 ) -> tuple[Clip, tuple[Finding, ...], list[str]]:
-    """Clip with its heading and origin taken out, what was undone of it, and what is to be noted.
+    """Return the clip with heading and origin removed, the corrections, and notes.
 
     A cycle is closed.
     """
@@ -119,14 +145,14 @@ def canonical(
     stretch = np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0)
     if stretch > RIGID:
         notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
-    # Before a cycle is closed, which would spread a jump over all of it.
+    # Before the cycle is closed, because closing it would spread a jump over all frames.
     clip, jumps = flips.without_jumps(clip, 0)
     clip = _loop(set_out(clip)) if cyclic else _origin_out(clip)
     return stay(clip) if in_place else clip, tuple(jumps), notes
 
 
 def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
-    """Clip without the dropped joints and all that hangs below them."""
+    """Return the clip without the dropped joints and their descendants."""
     joints = clip.skeleton
     needed = _needed(recipe)
     missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
@@ -146,12 +172,12 @@ def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
 
 
 def closed(joints: Skeleton, kept: Sequence[int]) -> bool:
-    """Whether every kept joint's parent is kept too."""
+    """Return True if the parent of every kept joint is kept too."""
     return all(joints.parents[joint] in kept or joints.parents[joint] < 0 for joint in kept)
 
 
 def keep(clip: Clip, kept: Sequence[int]) -> Clip:
-    """Clip of some of its joints, in order; none hangs on one that is left out."""
+    """Return the clip of some of its joints, in order; `kept` must be closed under parents."""
     joints = clip.skeleton
     tips = [i for i, joint in enumerate(joints.tip_joints) if joint in kept]
     smaller = Skeleton(
@@ -165,7 +191,7 @@ def keep(clip: Clip, kept: Sequence[int]) -> Clip:
 
 
 def _needed(recipe: Recipe) -> set[str]:
-    """Joints that a recipe speaks of."""
+    """Return the joints that a recipe names."""
     event = {recipe.event.joint} if recipe.event else set()
     motion = recipe.motion
     autos = [control.auto for control in recipe.measured]
@@ -174,7 +200,7 @@ def _needed(recipe: Recipe) -> set[str]:
 
 
 def landmarks(row: Row, last: int) -> tuple[float, ...]:
-    """Landmarks of a row as fractions of its clip, whose last frame of the file is given."""
+    """Return the landmarks of a row as fractions of its clip. last: its last frame in the file."""
     frames = (row.first_frame, *row.landmarks, last)
     if any(later <= earlier for earlier, later in pairwise(frames)):
         raise row.fault(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")
@@ -200,7 +226,7 @@ def _difference(a: Skeleton, b: Skeleton) -> str:
 
 
 def place(clip: Clip, origin: Floats, heading: Floats) -> Clip:
-    """Clip turned by -heading (…) about the vertical after origin (…, 3) is taken from its root."""
+    """Return the clip with origin (…, 3) subtracted from its root, turned by -heading (…), rad."""
     turn = np.broadcast_to(quat.about(UP, -np.asarray(heading)), (len(clip), 4))
     rotations, translations = clip.rotations.copy(), clip.translations.copy()
     rotations[:, 0] = quat.mul(turn, clip.rotations[:, 0])
@@ -209,7 +235,7 @@ def place(clip: Clip, origin: Floats, heading: Floats) -> Clip:
 
 
 def heading(clip: Clip) -> Floats:
-    """Angle (F,) of the root about the vertical, without jumps, rad."""
+    """Return the unwrapped angle (F,), rad, of the root about the vertical."""
     return np.unwrap(quat.twist(clip.rotations[:, 0], UP))
 
 
@@ -222,9 +248,9 @@ def _origin_out(clip: Clip) -> Clip:
 
 
 def set_out(clip: Clip) -> Clip:
-    """Clip of a gait over the origin, facing ahead at the start of the line through its heading.
+    """Return the clip of a gait, starting at the origin with its mean heading forward.
 
-    Its pelvis swings: the first frame alone does not say where the walker is going.
+    The pelvis swings, so the heading is a line fitted over all frames, taken at the start.
     """
     time = np.arange(len(clip)) / (len(clip) - 1)
     _, at_start = np.polyfit(time, heading(clip), 1)
@@ -232,7 +258,7 @@ def set_out(clip: Clip) -> Clip:
 
 
 def stay(clip: Clip) -> Clip:
-    """Clip without the straight line of its travel over the floor."""
+    """Return the clip with the linear part of its travel over the floor removed."""
     translations = clip.translations.copy()
     travel = _floor(clip.root_path[-1] - clip.root_path[0])
     translations[:, 0] -= np.linspace(0.0, 1.0, len(clip))[:, None] * travel
@@ -240,9 +266,9 @@ def stay(clip: Clip) -> Clip:
 
 
 def _loop(clip: Clip) -> Clip:
-    """Clip whose last pose is its first again, but for where the root has got to and its heading.
+    """Close a cycle: make the last pose equal the first except for travel and heading.
 
-    Half of the gap is given to either end and fades linearly to nothing in the middle.
+    Half of the gap is added at either end and fades linearly to zero in the middle.
     """
     share = np.linspace(0.5, -0.5, len(clip))
     line = np.polynomial.Polynomial.fit(np.arange(len(clip)), heading(clip), 1)

@@ -1,8 +1,8 @@
-"""Universal kriging of many values at once, in its dual form.
+"""Universal kriging of many values at once, in its dual form (Mukai & Kuriyama 2006, section 2).
 
-The dual weights of the system (service/motion/field.py) answer a query by one product, its inverse
-gives the variance. The nugget is filtered: it stands on the diagonal only and not
-in the query, so that the answer is continuous in the controls.
+The dual weights of the system (service/motion/field.py) answer a query by one product; its inverse
+gives the variance. The nugget is filtered: it is on the diagonal of the system only, so that the
+prediction is continuous in the controls.
 """
 
 from dataclasses import dataclass
@@ -11,24 +11,26 @@ import numpy as np
 
 from service.motion import field
 from service.motion.conventions import Floats
-from service.motion.errors import TrainingError
 
-# The service asks for these too; training knows them as a part of kriging.
+# Shared with the service; training imports them from here.
+from service.motion.cross_validation import LeaveOneOut as LeaveOneOut
+from service.motion.cross_validation import leave_out as leave_out
+from service.motion.cross_validation import left_out_variances as left_out_variances
+from service.motion.errors import TrainingError
 from service.motion.field import Hyper as Hyper
 from service.motion.field import covariances as covariances
 from service.motion.field import drift as drift
-from service.motion.field import leave_out as leave_out
-from service.motion.field import left_out_variances as left_out_variances
 from service.motion.field import noisy as noisy
 
 
 @dataclass(frozen=True)
 class Kriging:
-    """A solved field: samples (n, d + p), values' dual weights (n + k, m), and what does not depend
-    on the values: weighing (n + k, n) and the quadratic form (n + k, n + k) of the variance.
+    """A solved kriging model.
 
-    A point is d controls and p labels, of which the performer's own is one and the others zero;
-    all are zero for a performer who was never seen.
+    samples: (n, d + p). dual: weights (n + k, m) of the values. weighing: (n + k, n), maps values
+    to dual weights. form: quadratic form (n + k, n + k) of the variance.
+
+    A point is d controls and p labels, one-hot for a performer and zero for an unseen performer.
     """
 
     hyper: Hyper
@@ -38,21 +40,21 @@ class Kriging:
     form: Floats
 
     def predict(self, points: Floats) -> Floats:
-        """Values (B, m) at points (B, d + p)."""
+        """Return values (B, m) at points (B, d + p)."""
         return self._basis(points) @ self.dual
 
     def weights(self, points: Floats) -> Floats:
-        """What each sample counts for (B, n): they add up to one, and may be negative."""
+        """Return the weight of each sample (B, n); they sum to one, and may be negative."""
         return self._basis(points) @ self.weighing
 
     def variance(self, points: Floats) -> Floats:
-        """Kriging variance (B,) of the smooth field, as a share of the sill."""
+        """Return the kriging variance (B,) of the filtered model, as a share of the sill."""
         basis = self._basis(points)
         return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
     @property
     def values(self) -> Floats:
-        """What it was laid through (n, m)."""
+        """Return the sample values (n, m) that the model was solved for."""
         return values(self.hyper, self.samples, self.dual)
 
     def _basis(self, points: Floats) -> Floats:
@@ -60,7 +62,7 @@ class Kriging:
 
 
 def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
-    """Field through values (n, m) at samples (n, d + p); `check` the samples first.
+    """Return the kriging model of values (n, m) at samples (n, d + p); `check` the samples first.
 
     With more than one drift the weights are averaged, and the variance is that of their average.
     """
@@ -72,19 +74,17 @@ def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
 
 
 def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
-    """Values (n, m) at samples (n, d + p) of which dual weights (n + k, m) were made: the system
-    times them."""
+    """Return the sample values (n, m) for dual weights (n + k, m): the system times the weights."""
     n, degree = len(samples), max(hyper.drifts)
     functions = drift(samples, len(hyper.scales), degree)
     return noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
 
 
 def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:
-    """Refuse samples that no field can be laid through, saying which and why.
+    """Raise TrainingError for samples that make the kriging system singular.
 
-    Raises TrainingError for fewer samples than drift functions and one, a control with a single
-    value, controls of which one follows from the others, and, where nothing but a nugget could
-    tell them apart, two samples at one point.
+    These are fewer samples than drift functions plus one, a control with a single value, linearly
+    dependent controls, and, with a nugget of zero, two samples at one point.
     """
     count, needed = len(samples), len(names) * degree + 2
     if count < needed:

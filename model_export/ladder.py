@@ -1,4 +1,4 @@
-"""The levels of detail as a graph sees them: rows of whole numbers, of which `level` picks one."""
+"""Level-dependent integers of the graph, selected by its input `level`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ Numbers = Sequence[int]
 
 @dataclass(frozen=True)
 class Ladder:
-    """Lists of whole numbers by name, one for each level, the finest first.
+    """Lists of integers by name, one list per level, the finest first.
 
-    They are ends of slices, and shapes: every weight of a coarser level is the leading part of the
-    finest one's, but for what kriging was thinned to.
+    They are slice ends and shapes: every weight of a coarser level is a leading part of the finest
+    one's, except for the thinned kriging weights.
     """
 
     entries: dict[str, list[Numbers]]
 
     def onnx(self, net: Net) -> dict[str, str]:
-        """The chosen level's lists by name.
+        """Build the chosen level's lists by name.
 
-        `level` is a constant that a caller may feed another value for: zero, and so the finest.
+        `level` is an optional input of the graph; its default is zero, the finest level.
         """
         level = net.weights("level", np.array(0))
         rows = [list(chain(*lists)) for lists in zip(*self.entries.values(), strict=True)]

@@ -1,4 +1,4 @@
-"""Leaps: joints that get farther between two frames than anything around those frames explains."""
+"""Detection of jumps of joints between two frames that exceed the speed around them."""
 
 from dataclasses import dataclass
 
@@ -7,17 +7,20 @@ import numpy as np
 from service.motion.clip import Clip
 from service.motion.conventions import Floats
 
-# The pace around a frame is the median over so much time to either side, s: a leap, or a leap
-# there and one back, does not move it, and whoever sets off moves on.
+# The speed around a frame is the median over this time to either side, s. A jump, or a jump and its
+# return, does not change the median; the start of a motion does.
 AROUND = 0.035
-# A leap is so many times the pace around it, and goes so much farther, m.
+# A step is a jump if it exceeds the median by the factor TIMES and by FARTHER, m.
 TIMES, FARTHER = 8.0, 0.03
 
 
 @dataclass(frozen=True)
 class Leap:
-    """Where a clip's joint leaps farthest: from frame to frame + 1, by a distance, m, so many
-    times the pace around it. whole: whether most of the body leaps along."""
+    """The largest jump of a clip, from frame to frame + 1.
+
+    distance: of the joint, m. times: ratio to the median step around it. whole: True if more than
+    half of the joints jump too.
+    """
 
     frame: int
     joint: int
@@ -27,7 +30,7 @@ class Leap:
 
 
 def worst(clip: Clip) -> Leap | None:
-    """The farthest leap of a clip, where there is one."""
+    """Return the largest jump of a clip; None if there is none."""
     steps = np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1)
     pace = np.maximum(_pace(steps, max(2, round(AROUND * clip.rate))), FARTHER / TIMES / 4)
     beyond = steps - pace
@@ -40,7 +43,7 @@ def worst(clip: Clip) -> Leap | None:
 
 
 def _pace(steps: Floats, reach: int) -> Floats:
-    """Median (F - 1, J) of steps over `reach` frames to either side."""
+    """Return the median (F - 1, J) of steps over `reach` frames to either side."""
     padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0)
     return np.asarray(np.median(windows, axis=-1))

@@ -1,7 +1,7 @@
-"""The ladder of levels of detail: what each leaves out, and what that does to its answers.
+"""Levels of detail: their construction and their errors.
 
 Core and bases of a level are leading parts of the finer one's. Ranks are chosen from the exact
-error table, samples by the answers.
+error table, samples by the errors of the outputs.
 """
 
 from dataclasses import dataclass, replace
@@ -14,24 +14,24 @@ from model_export.exams import Exam
 from model_export.fidelity import Judge
 from model_export.hosvd import Multilinear
 from model_export.model import Model
-from model_export.ranks import Triple
+from model_export.ranks import Front, Triple
 from model_export.recipe import Detail, Recipe
 from model_export.thin import Lesson
 from model_export.train import Trained
 from service.motion.detail import Level
 from service.motion.errors import TrainingError
 
-# Truncation may take so much of a budget, and the samples that are not asked the rest; where these
-# need more, it takes less.
+# Shares of the error budget for truncation; thinning the samples uses the rest. The share that
+# gives the cheapest level is chosen.
 TRUNCATION = (0.85, 0.7, 0.5)
-# Questions to a level that is tried, and to one that was made: rare poses show in many alone.
+# Test inputs for a level under construction, and for a finished one; rare poses need many.
 QUESTIONS, FINALS = 1_000, 4_000
 SAMPLES = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
 
 
 @dataclass(frozen=True)
 class Laddered:
-    """A model of several levels of detail, and what each of them is; the finest comes first."""
+    """A model of several levels of detail and the description of each, the finest first."""
 
     model: Model
     levels: tuple[Level, ...]
@@ -39,11 +39,12 @@ class Laddered:
 
 @dataclass(frozen=True)
 class Workshop:
-    """What levels are made with: the whole tensor's decomposition, judges of truncations and of
-    answers, and what a level's weights are fitted to. finals: the exam of what was made.
+    """Inputs of the construction of levels.
 
-    model: of the finest level alone, its samples in the order in which they say most of the pose.
-    budgets: of the finest level, m, by name.
+    full: decomposition of the tensor at full rank. model: finest level alone, with its samples
+    sorted by how much they explain of the pose. budgets: allowed errors of the finest level, m, by
+    name. judge: errors of truncations. exam: errors of a level under construction. finals: errors
+    of a finished level. lesson: data that a level's weights are fitted to.
     """
 
     full: Multilinear
@@ -55,13 +56,17 @@ class Workshop:
     lesson: Lesson
 
     def lowered(self, model: Model, joints: tuple[int, ...], times: float) -> Model:
-        """Model with one more level of the least work whose answers keep so many times the
-        budgets, or nearly; some joints move."""
+        """Return the model with one more level, the cheapest with errors below `times` the budgets.
+
+        joints: those that move. If no level stays within the budgets, the last one tried is used.
+        """
         allowed = {name: times * budget for name, budget in self.budgets.items()}
-        within, kept = model.decoder.rungs[-1].ranks, []
+        price = cost.operations(self.judge.own_tensor, len(self.model.bank.low))
+        front = ranks.front(self.full.core, price, model.decoder.rungs[-1].ranks)
+        kept = []
         for share in TRUNCATION:
             parts = {name: share * most for name, most in allowed.items()}
-            rung = Rung(self._ranks(within, parts), joints)
+            rung = Rung(self._ranks(front, parts), joints)
             lowered, keeps = self._thinned(model, rung, allowed)
             kept += [lowered] if keeps else []
         return self._with_own_error(
@@ -69,10 +74,11 @@ class Workshop:
         )
 
     def level(self, model: Model, level: int) -> Level:
-        """What a level of a model is."""
+        """Return the description of a level of a model."""
         rung, numbers = model.decoder.rungs[level], cost.read(model, level)
-        found = self.finals.errors(model, level, range(len(model.decoder.means)))
-        effector = self.finals.effector(model, level)
+        answers = self.finals.answers(model, level)
+        found = answers.errors(range(len(model.decoder.means)))
+        effector = answers.effector
         return Level(
             rung.ranks,
             model.bank.samples(level),
@@ -88,29 +94,28 @@ class Workshop:
         )
 
     def _with_own_error(self, model: Model) -> Model:
-        """Model whose last level counts in its sigma how far it lies from the whole model."""
+        """Return the model with the last level's error relative to the full model in its sigma."""
         bank, last = model.bank, len(model.bank.coarse)
-        error = self.exam.errors(model, last, range(len(model.decoder.means))).rms
+        error = self.exam.answers(model, last).errors(range(len(model.decoder.means))).rms
         rank = model.decoder.rungs[last].ranks[2]
         weights = self.lesson.weights(bank.columns(last), rank, error)
         return replace(model, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
 
-    def _ranks(self, within: Triple, allowed: dict[str, float]) -> Triple:
-        """Fewest multiply-adds within a finer level's ranks whose true errors are allowed."""
+    def _ranks(self, front: Front, allowed: dict[str, float]) -> Triple:
+        """Return the cheapest ranks of a front whose true errors are allowed."""
 
         def strain(triple: Triple) -> float:
-            found = self.judge.of(self.full.truncated(triple))
-            return max(getattr(found, name) / most for name, most in allowed.items())
+            return self.judge.strain(self.full.truncated(triple), allowed)
 
-        own_tensor = self.judge.own_tensor
-        price = cost.operations(own_tensor, len(self.model.bank.low))
-        places = own_tensor.weight * np.prod(self.judge.whole.shape[:2])
+        places = self.judge.own_tensor.weight * np.prod(self.judge.whole.shape[:2])
         aim = min(allowed.values()) ** 2 * float(places)
-        return ranks.cheapest(ranks.front(self.full.core, price, within), strain, aim)
+        return ranks.cheapest(front, strain, aim)
 
     def _thinned(self, model: Model, rung: Rung, allowed: dict[str, float]) -> tuple[Model, bool]:
-        """Model with one more level, of the fewest covariances whose answers are near enough, and
-        whether any are."""
+        """Return the model with one more level of the fewest covariances within the allowed errors.
+
+        The second value is False if no number of covariances suffices.
+        """
         bank, decoder = model.bank, model.decoder
         decoder = replace(decoder, coarse=(*decoder.coarse, rung))
         for columns in _columns(model):
@@ -123,9 +128,9 @@ class Workshop:
 
 
 def build(recipe: Recipe, trained: Trained) -> Laddered:
-    """Model with the levels that a recipe asks for below its own size.
+    """Return the model with the levels of a recipe.
 
-    Raises TrainingError for joints to keep still that there are not, and for the root.
+    Raises TrainingError for unknown joints to fix, and for the root.
     """
     shop = workshop(recipe, trained)
     model = shop.model
@@ -137,7 +142,7 @@ def build(recipe: Recipe, trained: Trained) -> Laddered:
 
 
 def workshop(recipe: Recipe, trained: Trained) -> Workshop:
-    """Workshop for the levels of a trained model."""
+    """Return the inputs of the construction of levels for a trained model."""
     bank = thin.ordered(trained.model.bank)
     return Workshop(
         trained.full,
@@ -155,7 +160,7 @@ def _short(length: float) -> float:
 
 
 def _joints(trained: Trained, finer: Rung, detail: Detail) -> tuple[int, ...]:
-    """Joints that a level moves: those of the finer one but what it drops and what hangs on it."""
+    """Return the joints that a level moves: the finer level's without dropped subtrees."""
     names, parents = trained.skeleton.names, trained.skeleton.parents
     unknown = sorted(set(detail.drop_joints) - set(names[1:]))
     if unknown:
@@ -169,8 +174,10 @@ def _joints(trained: Trained, finer: Rung, detail: Detail) -> tuple[int, ...]:
 
 
 def _columns(model: Model) -> list[int]:
-    """Numbers of covariances to try for a level below the last: some of the pose's, or all of one
-    field after the other."""
+    """Return the numbers of covariances to try for the next level.
+
+    They cover some samples of the pose's model, or whole models.
+    """
     bank, n = model.bank, len(model.bank.pose.samples)
     some = [*(m for m in SAMPLES if m < n), *(n * (f + 1) for f in range(len(bank.kriged)))]
     return [m for m in some if m <= bank.columns(len(bank.coarse))]

@@ -1,6 +1,6 @@
-"""Controls that are measured of the motion, so that nobody types them.
+"""Controls that are measured from the motion.
 
-Measured is the clip that training sees: cut, its heading and origin taken out, a cycle closed.
+They are measured on the clip that training uses: cut, heading and origin removed, cycles closed.
 """
 
 from collections.abc import Sequence
@@ -18,15 +18,15 @@ from service.motion.errors import TrainingError
 from service.motion.measure import At, Measure, Seen
 from service.motion.skeleton import Skeleton
 
-# Decimals of a measured value: what lies below a micrometre is rounding, and would make as many
-# lengths of one performer's leg as there are clips.
+# Decimals of a measured value. Differences below a micrometre are rounding errors, and would give
+# one performer's leg a different length in every clip.
 DECIMALS = 6
 
 
 def controls(recipe: Recipe, row: Row, clip: Clip, landmarks: Sequence[float]) -> Floats:
-    """All controls (d,) of a clip, in the recipe's order: those of its row and those measured.
+    """Return all controls (d,) of a clip, from its row or measured, in the recipe's order.
 
-    landmarks: shares of the clip. Raises TrainingError for a leg whose ends are on no chain.
+    landmarks: shares of the clip. Raises TrainingError for a leg whose ends are not on one chain.
     """
     if not recipe.measured:
         return row.controls
@@ -38,16 +38,16 @@ def controls(recipe: Recipe, row: Row, clip: Clip, landmarks: Sequence[float]) -
         at = _landmark(recipe, control, landmarks)
         place = replace(whole, landmark=(at or 0.0) * (len(clip) - 1))
         found = measure.value(of(recipe, control, clip.skeleton), place)
-        # Of minus zero, zero.
+        # Adding zero turns minus zero into zero.
         return round(found, DECIMALS) + 0.0
 
     return np.array([value(control) for control in recipe.controls])
 
 
 def of(recipe: Recipe, control: ControlMeasured, joints: Skeleton, share: float = 0.0) -> Measure:
-    """How a control is measured on a skeleton, which has the joints that are named.
+    """Return the measure of a control on a skeleton that has the named joints.
 
-    share: of canonical time, of its landmark, if that is its moment.
+    share: of canonical time, of the control's landmark, if it has one.
     """
     auto = control.auto
     if auto.quantity == "root_height":
@@ -62,9 +62,9 @@ def of(recipe: Recipe, control: ControlMeasured, joints: Skeleton, share: float 
 def on_the_card(
     recipe: Recipe, control: Control, joints: Skeleton, landmarks: Floats
 ) -> Measure | None:
-    """How a control is measured, as the card says it; None where it was typed.
+    """Return the measure of a control for the model card; None for a control of the table.
 
-    landmarks (N, m): of all clips, whose mean is where canonical time has them.
+    landmarks: (N, m), of all clips; canonical time has them at their mean.
     """
     if not isinstance(control, ControlMeasured):
         return None
@@ -73,31 +73,33 @@ def on_the_card(
 
 
 def travel(roots: Floats, path: Floats) -> Floats:
-    """How far a root (..., F, 4) on its path (..., F, 3) gets (..., 3): to the left and forward, m,
-    and the change of heading, rad."""
+    """Return the travel (..., 3) of a root (..., F, 4) along its path (..., F, 3).
+
+    Its components are left and forward, m, and the change of heading, rad.
+    """
     turned = quat.mul(roots[..., -1, :], quat.conj(roots[..., 0, :]))
     way = path[..., -1, :] - path[..., 0, :]
     return np.stack([way[..., 0], way[..., 2], quat.twist(turned, UP)], axis=-1)
 
 
 def bones(clip: Clip) -> Floats:
-    """Bone offsets (J, 3) of the performer, the root's zero, m."""
+    """Return the bone offsets (J, 3), m, of the performer, zero for the root."""
     offsets = clip.translations.mean(axis=0)
     offsets[0] = 0.0
     return offsets
 
 
 def seen(clip: Clip) -> Seen:
-    """A clip as it is measured."""
+    """Return the quantities of a clip that measures use."""
     offsets, parents = bones(clip), clip.skeleton.parents
     local = skeleton.translations(offsets, clip.root_path)
-    positions, _ = skeleton.forward(parents, clip.rotations, local)
+    positions = skeleton.positions(parents, clip.rotations, local)
     gone = travel(clip.rotations[:, 0], clip.root_path)
     return Seen(positions, clip.duration, gone, parents, offsets)
 
 
 def _landmark(recipe: Recipe, control: ControlMeasured, landmarks: Sequence[float]) -> float | None:
-    """Which of the landmarks is the control's moment; None where none is."""
+    """Return the time of the control's landmark; None if it uses none."""
     at = control.auto.at
     own = at is not None and at not in MOMENTS
     return landmarks[recipe.clips.landmarks.index(str(at))] if own else None
@@ -112,7 +114,7 @@ def _moment(auto: Auto, share: float) -> tuple[At | None, float | None]:
 
 
 def _chain(control: ControlMeasured, ends: Sequence[str], joints: Skeleton) -> tuple[int, ...]:
-    """Joints below the upper end down to the lower: their offsets are the bones between."""
+    """Return the joints below the upper end down to the lower; their offsets are the bones."""
     upper, lower = map(joints.names.index, ends)
     chain = [lower]
     while chain[-1] > upper and joints.parents[chain[-1]] != upper:

@@ -1,12 +1,12 @@
-"""The metric of pose space: how far joints move when a degree of freedom does.
+"""Metric of pose space: the distance that joints move for a change of each degree of freedom.
 
-A pose vector mixes metres and radians, and a hip turns more body than a wrist. The Gram matrix JᵀJ
-of the forward kinematics' Jacobian J, averaged over the family's own poses, is what makes distances
-between pose vectors distances between bodies, so that least squares means what the eye sees.
+A pose vector mixes metres and radians, and a hip moves more of the body than a wrist. The Gram
+matrix JᵀJ of the forward kinematics' Jacobian J, averaged over the family's poses, turns distances
+between pose vectors into distances between joint positions, so that least squares minimizes those.
 
-JᵀJ is the mass matrix of a body that carries a unit mass at every joint, so it is computed as one:
-by composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.2), with
-motions and forces as six numbers about the origin. No Jacobian is ever formed.
+JᵀJ is the mass matrix of a body with a unit mass at every joint, and is computed as such by
+composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.2), with
+motions and forces as six numbers about the origin. The Jacobian is never formed.
 """
 
 import numpy as np
@@ -14,12 +14,12 @@ import numpy as np
 from service.motion import quat, skeleton
 from service.motion.conventions import Floats
 
-# Every joint carries a sphere of skin of this radius, so that a turn about a bone counts too, m.
+# Radius of a sphere at every joint, m, so that rotations about a bone have a cost.
 SHELL = 0.03
 # Poses over which the metric is averaged: 40 times as many change the truncation error by less than
 # half a percent, on the procedural family and on real motion.
 POSES = 50
-# Directions that move almost nothing weigh no less than this share of the heaviest.
+# Least eigenvalue of the metric, as a share of the largest.
 FLOOR = 1e-6
 
 
@@ -30,10 +30,10 @@ def gram(
     translations: Floats,
     joint_weights: Floats,
 ) -> Floats:
-    """Mean over poses of JᵀJ (D, D), D = 3 + 3 J, m² for a unit of each degree of freedom.
+    """Return the mean over poses of JᵀJ (D, D), D = 3 + 3 J, in m² per squared unit.
 
-    rotations (P, J, 4) local, vectors (P, J, 3) the same as rotation vectors about the means,
-    translations (P, J, 3) local, m. joint_weights (J,): the mass of each joint.
+    rotations: local (P, J, 4). vectors: the same as rotation vectors about the means (P, J, 3).
+    translations: local (P, J, 3), m. joint_weights: mass (J,) of each joint.
     """
     positions, orientations = skeleton.forward(parents, rotations, translations)
     below = skeleton.descendants(parents)
@@ -41,20 +41,23 @@ def gram(
     forces = _forces(motions, positions, joint_weights, below)
     poses = len(positions)
     products = np.tensordot(motions, forces, axes=([0, 2], [0, 2])) / poses
-    # A force acts on the joint that it comes from and on those above it; the rest is symmetry.
+    # A force acts on its own joint and on ancestors; the other half follows by symmetry.
     acts = np.kron(np.pad(below, ((1, 0), (1, 0)), constant_values=1.0), np.ones((3, 3)))
     upper = products * np.triu(acts)
     return upper + np.triu(upper, k=1).T
 
 
 def _axes(orientations: Floats, vectors: Floats) -> Floats:
-    """World axis (P, J, 3 numbers, 3) about which each number of a rotation vector turns."""
+    """Return the world axis (P, J, 3 numbers, 3) of each number of a rotation vector."""
     turned = quat.to_matrix(orientations) @ quat.right_jacobian(vectors)
     return np.swapaxes(turned, -1, -2)
 
 
 def _motions(positions: Floats, axes: Floats) -> Floats:
-    """Angular velocity and velocity at the origin (P, 3 + 3 J, 6) of each degree of freedom."""
+    """Return the motion (P, 3 + 3 J, 6) of each degree of freedom.
+
+    It is the angular velocity and the velocity at the origin.
+    """
     poses, joints = positions.shape[:2]
     motions = np.zeros((poses, 3 + 3 * joints, 6))
     motions[:, :3, 3:] = np.eye(3)
@@ -64,9 +67,9 @@ def _motions(positions: Floats, axes: Floats) -> Floats:
 
 
 def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> Floats:
-    """Moment about the origin and force (P, 3 + 3 J, 6) that each motion needs.
+    """Return the moment about the origin and the force (P, 3 + 3 J, 6) that each motion needs.
 
-    What moves is all that hangs below the joint, as one rigid body.
+    The joint and its descendants move as one rigid body.
     """
     moments = mass[:, None] * positions
     second = moments[..., :, None] * positions[..., None, :]
@@ -83,7 +86,10 @@ def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> 
 
 
 def whitening(gram: Floats) -> tuple[Floats, Floats]:
-    """Square root (D, D) of a Gram matrix and its inverse, tiny directions held at the floor."""
+    """Return the square root (D, D) of a Gram matrix and its inverse.
+
+    Eigenvalues below FLOOR times the largest are raised to it.
+    """
     values, vectors = np.linalg.eigh(gram)
     roots = np.sqrt(np.maximum(values, FLOOR * values[-1]))
     return (vectors * roots) @ vectors.T, (vectors / roots) @ vectors.T

@@ -1,5 +1,6 @@
-"""The whole model in float64: what the graph must answer, stage by stage."""
+"""Complete model in float64, the reference for the graph."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +12,17 @@ from model_export.ladder import Ladder
 from model_export.net import Net, Shapes
 from model_export.timing import Timing
 from model_export.travel import Travel
-from service.motion import skeleton
+from service.motion import checksum, skeleton
 from service.motion.conventions import Floats
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """rotations (B, S, J, 4), root_position (B, S, 3), bone_offsets (B, J, 3), duration (B,),
-    sigma (B,), travel (B, S, 3)."""
+    """Outputs of a model.
+
+    rotations: (B, S, J, 4). root_position: (B, S, 3), m. bone_offsets: (B, J, 3), m. duration:
+    (B,), s. sigma: (B,), m. travel: (B, S, 3).
+    """
 
     rotations: Floats
     root_position: Floats
@@ -28,14 +32,14 @@ class Outputs:
     travel: Floats
 
     def positions(self, parents: tuple[int, ...]) -> Floats:
-        """Joint positions (B, S, J, 3), m."""
+        """Return joint positions (B, S, J, 3), m."""
         translations = skeleton.translations(self.bone_offsets, self.root_position)
-        return skeleton.forward(parents, self.rotations, translations)[0]
+        return skeleton.positions(parents, self.rotations, translations)
 
 
 @dataclass(frozen=True)
 class Model:
-    """The stages of a trained model; only that of a cycle travels apart from its poses."""
+    """Stages of a trained model. travel: None if it is not cyclic."""
 
     bank: FieldBank
     timing: Timing
@@ -46,20 +50,48 @@ class Model:
     def evaluate(
         self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
     ) -> Outputs:
-        """Answer to controls (B, d) in their own units and times (B, S), s, at a level of detail.
+        """Return outputs at controls (B, d) in their own units and times (B, S), s, of a level.
 
-        labels (B, p): who moves; nobody that was seen, if not said.
+        labels: performers (B, p), by default an unseen performer.
         """
         nobody = np.zeros((len(controls), len(self.bank.performers)))
-        points = self.bank.points(controls, nobody if labels is None else labels)
-        fields = self.bank.numpy(points, level)
+        fields = self.fields(controls, nobody if labels is None else labels, level)
+        return self.timed(fields, time, level)
+
+    def fields(self, controls: Floats, labels: Floats, level: int) -> dict[str, Floats]:
+        """Return the values (B, m) of all kriged quantities by name."""
+        return self.bank.numpy(self.bank.points(controls, labels), level)
+
+    def timed(self, fields: dict[str, Floats], time: Floats, level: int) -> Outputs:
+        """Return the outputs for `fields` at times (B, S), s."""
         _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
         return self._decoded(fields, place, level)
 
+    def durations(self, controls: Floats, labels: Floats) -> Floats:
+        """Return the durations (B,), s, at the finest level."""
+        logs = self.bank.others["duration"].predict(self.bank.points(controls, labels))
+        return np.exp(logs[:, 0])
+
     def posed(self, controls: Floats, place: Floats, labels: Floats, level: int) -> Outputs:
-        """The same at canonical frames (B, S)."""
-        fields = self.bank.numpy(self.bank.points(controls, labels), level)
-        return self._decoded(fields, place, level)
+        """Return outputs at canonical frames (B, S)."""
+        return self._decoded(self.fields(controls, labels, level), place, level)
+
+    def joint_at_frame(
+        self, fields: dict[str, Floats], chain: Sequence[int], frame: int, level: int
+    ) -> Floats:
+        """Return the positions (B, 3), m, of the last joint of a chain at one canonical frame.
+
+        chain: joints from the root on, each the parent of the next.
+        """
+        decoder = self.decoder.at(level).of_joints(chain)
+        rotations, root = (found[:, None] for found in decoder.at_frame(fields[POSE], frame))
+        if self.travel:
+            place = np.full((len(root), 1), float(frame))
+            rotations, root, _ = self.travel.numpy(rotations, root, fields["travel"], place)
+        offsets = self.proportions.numpy(fields["offsets"])[:, list(chain)]
+        translations = skeleton.translations(offsets, root)
+        parents = tuple(range(-1, len(chain) - 1))
+        return skeleton.positions(parents, rotations, translations)[:, 0, -1]
 
     def _decoded(self, fields: dict[str, Floats], place: Floats, level: int) -> Outputs:
         rotations, root = self.decoder.at(level).numpy(fields[POSE], place)
@@ -71,13 +103,13 @@ class Model:
         return Outputs(rotations, root, offsets, duration, sigma, gone)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
-        """The same as one graph, with metadata and what the file says of its producer."""
+        """Return the file of the model: one graph with metadata, producer fields and a checksum."""
         net = Net()
         ranks = [rung.ranks[2] for rung in self.decoder.rungs]
         ladder = Ladder({**field_graph.entries(self.bank, ranks), **self.decoder.entries()})
         ends = ladder.onnx(net)
         fields = field_graph.onnx(self.bank, net, "controls", ends)
-        # What exact controls start from: service/synthesis/exact.
+        # service/synthesis/exact reads the coefficients by this name.
         fields[POSE] = net.called("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         place = net.called("frame", place)
@@ -96,7 +128,7 @@ class Model:
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.performers:
-            # Its default is one row: a name for both would promise the runtime what is not so.
+            # Its default has one row, so its axis must not share the name "batch".
             inputs["performer"] = ["batch_or_one", len(self.bank.performers)]
         inputs["level"] = []
         outputs: Shapes = {
@@ -107,4 +139,4 @@ class Model:
             "sigma": ["batch"],
             "travel": ["batch", "steps", 3],
         }
-        return net.model(inputs, outputs, metadata, about)
+        return checksum.sealed(net.model(inputs, outputs, metadata, about))

@@ -1,8 +1,8 @@
 """Naive kriging, the paper's baseline: a variogram and a kriging system for every frame.
 
-This is what Mukai & Kuriyama (TOG 2005) do and what the multilinear model is measured against: a
-reference, of which nothing ships. The dissimilarity of two poses is the distance between their
-joints; pose vectors are interpolated as they are.
+This is the method of Mukai & Kuriyama (TOG 2005) and the "naive" row of table 1 of Mukai & Kuriyama
+2006. It serves as a reference only. The dissimilarity of two poses is the distance between their
+joints; pose vectors are interpolated directly.
 """
 
 from collections.abc import Callable
@@ -22,19 +22,24 @@ Fitter = Callable[[Experimental, str], Fit]
 
 @dataclass(frozen=True)
 class Naive:
-    """One isotropic field a frame over the same samples; values are pose vectors (N, T, D)."""
+    """One isotropic kriging model per frame over the same samples.
+
+    values: pose vectors (N, T, D).
+    """
 
     fields: tuple[Kriging, ...]
     values: Floats
 
     def numpy(self, points: Floats) -> Floats:
-        """Pose vectors (B, T, D) at points (B, d) in half-ranges, as weighted averages."""
+        """Return pose vectors (B, T, D) at points (B, d) in half-ranges, as weighted averages."""
         weights = np.stack([field.weights(points) for field in self.fields], axis=1)
         return np.einsum("btn,ntd->btd", weights, self.values, optimize=True)
 
     def onnx(self, net: Net, points: str) -> str:
-        """Pose vectors (T, D) at one point (1, d): weights from the inverse of each frame's system,
-        and the average of the full samples by them, as the paper describes it."""
+        """Build pose vectors (T, D) at one point (1, d) by weighted averages of the samples.
+
+        The weights come from the inverse of each frame's system, as in the paper.
+        """
         basis = self.basis(net, points)
         inverse = np.stack([field.weighing for field in self.fields])
         weights = net("MatMul", basis, net.weights("inverses", inverse))
@@ -42,7 +47,7 @@ class Naive:
         return net("Squeeze", net("MatMul", weights, samples), net.indices(1))
 
     def onnx_dual(self, net: Net, points: str) -> str:
-        """The same with weights and samples multiplied beforehand: half the numbers to read."""
+        """Build `onnx` with premultiplied weights and samples, which halves the numbers read."""
         duals = np.stack(
             [
                 field.weighing @ values
@@ -53,7 +58,7 @@ class Naive:
         return net("Squeeze", product, net.indices(1))
 
     def basis(self, net: Net, points: str) -> str:
-        """Covariances and drift (T, 1, n + k) of one point in every frame's own field."""
+        """Build covariances and drift (T, 1, n + k) of one point for every frame's model."""
         samples = self.fields[0].samples
         gaps = net("Sub", points, net.weights("naive_samples", samples))
         squared = net("ReduceSum", net("Mul", gaps, gaps), net.indices(1), keepdims=0)
@@ -70,9 +75,9 @@ class Naive:
 def fit(
     points: Floats, positions: Floats, values: Floats, covariance: str, fitter: Fitter
 ) -> Naive:
-    """Naive field of pose vectors (N, T, D) with joint positions (N, T, J, 3) at points (N, d).
+    """Fit naive kriging to pose vectors (N, T, D), joint positions (N, T, J, 3) at points (N, d).
 
-    fitter: how each frame's variogram is fitted.
+    fitter: fits a variogram model to each frame's experimental variogram.
     """
     fields = []
     for frame in range(values.shape[1]):
@@ -81,6 +86,6 @@ def fit(
         found = fitter(variogram.experimental(points, left), covariance)
         nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
         scales = np.full(points.shape[1], 1.0 / found.range)
-        hyper = Hyper(covariance, (1,), scales, float(nugget))
+        hyper = Hyper(covariance, (1,), scales, float(nugget), 0.0)
         fields.append(kriging.solve(hyper, points, values[:, frame]))
     return Naive(tuple(fields), values)

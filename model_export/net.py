@@ -1,4 +1,4 @@
-"""A thin builder over onnx.helper: operators as calls that return the name of their value."""
+"""Thin builder over onnx.helper: operators as calls that return the name of their value."""
 
 from typing import Any
 
@@ -7,14 +7,14 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-# The pair of onnx 1.13, which every onnxruntime from 1.14 on loads.
+# Versions of onnx 1.13, which every onnxruntime from 1.14 on loads.
 OPSET, IR_VERSION = 18, 8
 
 Shapes = dict[str, list[str | int]]
-"""Axes by the name of an input or output: a size, or a name for what the caller decides."""
+"""Axes by the name of an input or output: a fixed size, or the name of a free one."""
 
 REGISTER = 16
-"""Numbers that a processor works on at once, at most."""
+"""Largest number of float32 values in a vector register."""
 
 
 class Net:
@@ -25,28 +25,31 @@ class Net:
         self._constants: dict[str, onnx.TensorProto] = {}
 
     def __call__(self, operator: str, *inputs: str, **attributes: Any) -> str:
-        """Name of the first output of a new node."""
+        """Add a node and return the name of its first output."""
         return self.many(operator, 1, *inputs, **attributes)[0]
 
     def many(self, operator: str, outputs: int, *inputs: str, **attributes: Any) -> list[str]:
-        """Names of all outputs of a new node."""
+        """Add a node and return the names of all its outputs."""
         stem = f"{operator.lower()}_{len(self._nodes)}"
         names = [stem] if outputs == 1 else [f"{stem}_{i}" for i in range(outputs)]
         self._nodes.append(helper.make_node(operator, inputs, names, **attributes))
         return names
 
     def called(self, name: str, value: str) -> str:
-        """A value that nobody has used yet under a name of its own, by which it is found later."""
+        """Rename a value that no other node uses yet."""
         for node in self._nodes:
             node.output[:] = [name if own == value else own for own in node.output]
         return name
 
     def named(self, name: str, value: str) -> None:
-        """Give a value the name under which the graph puts it out."""
+        """Make a value an output of the graph under a name."""
         self._nodes.append(helper.make_node("Identity", [value], [name]))
 
     def weights(self, name: str, array: npt.NDArray[Any]) -> str:
-        """A named constant, float32 unless it holds integers; a name stands for one content."""
+        """Add a named constant, float32 unless it holds integers, and return its name.
+
+        Raises ValueError for a second constant of the same name with other content.
+        """
         kind = np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32
         tensor = numpy_helper.from_array(np.asarray(array, dtype=kind, order="C"), name)
         if self._constants.setdefault(name, tensor) != tensor:
@@ -54,34 +57,34 @@ class Net:
         return name
 
     def number(self, value: float) -> str:
-        """A scalar constant, stored once however often it is used."""
+        """Add a scalar constant, stored once, and return its name."""
         return self.weights(f"number_{value:.9g}", np.array(value))
 
     def indices(self, *values: int) -> str:
-        """A list of whole numbers: a shape, axes, starts or ends."""
+        """Add a list of integers, such as a shape, axes, starts or ends, and return its name."""
         return self.weights("indices_" + "_".join(map(str, values)), np.array(values))
 
     def row_sums(self, terms: str, pairs: str) -> str:
-        """Sums (..., 1) over the last axis of terms (..., n), the same for a row wherever it stands
-        among others; pairs (n, 2): ones.
+        """Sum terms (..., n) over the last axis to (..., 1), each row independent of its position.
 
-        ReduceSum adds from where memory is aligned, which differs from row to row, and a product
-        with one column takes rows by fours. A second column leaves each row to itself.
+        pairs: ones (n, 2). ReduceSum sums from aligned addresses, which differ between rows, and a
+        product with one column processes rows in groups of four, so equal rows could round
+        differently. With a second column each row is summed in the same order.
         """
         sums = self("MatMul", terms, pairs)
         return self("Slice", sums, self.indices(0), self.indices(1), self.indices(-1))
 
     def padded(self, values: str) -> str:
-        """All the numbers in a row, and some more.
+        """Flatten values and append padding.
 
-        The last numbers of a row, which fill no register, get their sine and cosine one by one and
-        rounded otherwise. Here those are nobody's.
+        The last numbers that do not fill a register are processed one by one and round differently
+        in sine and cosine. The padding takes their place.
         """
         row = self("Reshape", values, self.indices(-1))
         return self("Pad", row, self.indices(0, REGISTER - 1))
 
     def unpadded(self, row: str, shape: str) -> str:
-        """The numbers of a padded row without the rest, in the shape that they had."""
+        """Remove the padding of a row and restore its shape."""
         own = self("Slice", row, self.indices(0), self.indices(1 - REGISTER))
         return self("Reshape", own, shape)
 
@@ -96,9 +99,9 @@ class Net:
         metadata: dict[str, str],
         about: dict[str, str],
     ) -> bytes:
-        """The finished file; inputs and outputs map a name to its shape.
+        """Return the finished file; inputs and outputs map a name to its shape.
 
-        An input with the name of a constant is optional: the constant is its default, and its type.
+        An input with the name of a constant is optional: the constant gives its default and type.
         All others are float32.
         """
         graph = helper.make_graph(

@@ -1,7 +1,6 @@
-"""Files of new clips to examples of a model that is there: checked against its card.
+"""Examples from files of new clips, checked against the model card of a trained model.
 
-Controls that the card says how to measure are measured, of the clip that a model would be trained
-from; all others stand in a table.
+Controls with a measure on the card are measured from the clip; all others come from a table.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from model_export import data, ingest, measured, table
+from model_export import bvh, data, ingest, measured, table
 from model_export.ingest import Example
 from model_export.recipe import Source
 from model_export.reopen import Reopened
 from model_export.table import Row, Table
-from service.motion import bvh, measure
+from service.motion import measure
 from service.motion.card import Control
 from service.motion.clip import Clip
 from service.motion.conventions import Floats
@@ -26,7 +25,7 @@ from service.motion.skeleton import Skeleton
 def of_files(
     reopened: Reopened, paths: Sequence[Path], source: Source, performer: str
 ) -> tuple[list[Example], list[str]]:
-    """Examples of whole files, whose controls are all measured, and notes on what was assumed.
+    """Return examples of whole files, with all controls measured, and notes on assumptions.
 
     Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
     another skeleton; BvhError for a file that cannot be read.
@@ -47,10 +46,11 @@ def of_files(
 def of_table(
     reopened: Reopened, path: Path, source: Source, performer: str
 ) -> tuple[list[Example], list[str]]:
-    """Examples of a table's rows: `file` beside the table, `first_frame` and `last_frame` where
-    they are, landmarks, and controls by their names; those that can be measured may be missing.
+    """Return examples of a table's rows, and notes on assumptions.
 
-    Raises RecipeError naming line and column of what cannot be used, and as `of_files`.
+    Columns: `file`, relative to the table; optionally `first_frame` and `last_frame`; landmarks;
+    controls by name, optional for those that can be measured. Raises RecipeError, naming line and
+    column, for an invalid cell, and as `of_files`.
     """
     own = table.opened(path)
     landmarks, controls = reopened.making.landmarks, reopened.card.controls
@@ -94,7 +94,7 @@ def _row_of(
 def _examples(
     reopened: Reopened, rows: Sequence[Row], source: Source, given: Sequence[Mapping[str, float]]
 ) -> tuple[list[Example], list[str]]:
-    files = {str(row.place): bvh.read(row.place) for row in rows}
+    files = ingest.read(rows)
     examples, notes = [], []
     for row, values in zip(rows, given, strict=True):
         example, said = _example(reopened, row, source, files[str(row.place)])
@@ -119,9 +119,9 @@ def _example(
 
 
 def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str]]:
-    """Clip of the family's joints alone, and a note on those that it has besides.
+    """Return the clip of the family's joints alone, and a note on its other joints.
 
-    Raises RecipeError where joints are missing or hang on others.
+    Raises RecipeError if joints are missing or have other parents.
     """
     own = clip.skeleton
     missing = [name for name in family.names if name not in own.names]
@@ -145,8 +145,10 @@ def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str
 def measured_again(
     reopened: Reopened, before: Sequence[Example], after: Sequence[Example]
 ) -> list[Example]:
-    """Examples that begin elsewhere than before, with what was measured of them measured anew: of a
-    cycle on an arc, the way from one phase is not that from another."""
+    """Return shifted examples with their measured controls measured again.
+
+    The travel of a cycle on an arc depends on the phase at which it begins.
+    """
     found = []
     for old, new in zip(before, after, strict=True):
         said = zip(reopened.card.controls, old.controls, _controls(reopened, old, {}), strict=True)
@@ -156,7 +158,7 @@ def measured_again(
 
 
 def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) -> Floats:
-    """Controls (d,) of an example: those given, and the others measured or as they are."""
+    """Return the controls (d,) of an example: given, measured, or else unchanged."""
     seen = measured.seen(example.clip)
 
     def value(control: Control, own: float) -> float:
@@ -173,7 +175,7 @@ def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) 
 
 
 def _landmark(reopened: Reopened, control: Control, example: Example) -> float:
-    """Share of the clip at which a control is measured, where that is at a landmark."""
+    """Return the share of the clip at which a control is measured; 0 without landmark."""
     if control.measure is None or control.measure.share is None:
         return 0.0
     times = np.array(list(reopened.making.landmarks.values()))

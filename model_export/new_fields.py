@@ -1,7 +1,7 @@
-"""The fields of a model laid through new samples too, with the parameters that they have.
+"""Coefficient models of a trained model, solved again with new samples and unchanged parameters.
 
-Only where the samples lie in half-ranges may change: a sampled range that grows is a longer unit
-of its control, and the scales grow with it, so that all distances stay what they were.
+Only the half-ranges change: if a sampled range grows, the scales grow with it, so that all
+distances between points stay the same.
 """
 
 from collections.abc import Sequence
@@ -23,8 +23,11 @@ from service.motion.field import half_ranges
 
 @dataclass(frozen=True)
 class Laid:
-    """Old samples and new ones: the ends (d,) of what is sampled, performers in the order of their
-    labels, and by how much each range grew (d,)."""
+    """Samples of a model followed by new ones.
+
+    low, high: ends of the sampled ranges (d,). performers: names, in the order of their labels.
+    growth: ratio (d,) of new to old ranges.
+    """
 
     low: Floats
     high: Floats
@@ -33,13 +36,15 @@ class Laid:
     growth: Floats
 
     def hyper(self, old: Hyper) -> Hyper:
-        """The same field's parameters for ranges that grew."""
+        """Return parameters rescaled to the new ranges."""
         return replace(old, scales=old.scales * self.growth)
 
 
 def lay(bank: FieldBank, old_groups: Indices, examples: Sequence[Example], performer: str) -> Laid:
-    """Samples of a bank with their groups (n,), and those of a new performer's examples, which are
-    left out by their takes."""
+    """Return the samples of a bank, with groups (n,), followed by examples of a new performer.
+
+    New examples are grouped by take for leave-one-out.
+    """
     d = len(bank.low)
     old = (bank.pose.samples[:, :d] * (bank.high - bank.low) + bank.low + bank.high) / 2.0
     new = np.stack([example.controls for example in examples])
@@ -54,10 +59,10 @@ def lay(bank: FieldBank, old_groups: Indices, examples: Sequence[Example], perfo
 
 
 def solve(laid: Laid, bank: FieldBank, name: str, new: Floats) -> Field:
-    """One of a bank's other fields through its old values and new ones (k, m)."""
+    """Return one of a bank's other models solved with its old values and new ones (k, m)."""
     field, old = bank.others[name], bank.at_samples(name)
     if isinstance(field, Constant):
-        # What the controls do not explain of the others they do not explain of these.
+        # The controls did not explain the old values, so the model stays constant.
         n, k = len(old), len(new)
         return Constant((n * field.mean + new.sum(axis=0)) / (n + k))
     hyper = laid.hyper(field.hyper)
@@ -67,7 +72,7 @@ def solve(laid: Laid, bank: FieldBank, name: str, new: Floats) -> Field:
 def bones(
     laid: Laid, bank: FieldBank, proportions: Proportions, offsets: Floats
 ) -> tuple[Field, Proportions]:
-    """Field of bone offsets that has those of new clips (k, J, 3) too, m."""
+    """Return the model of bone offsets solved with new clips' (k, J, 3), m, and its directions."""
     known = bank.at_samples("offsets")
     old, new, longer = _spanned(proportions, known, offsets)
     both, field = np.vstack([old, new]), bank.others["offsets"]
@@ -80,7 +85,7 @@ def bones(
 
 
 def _by_performer(laid: Laid, bank: FieldBank) -> Hyper:
-    """Parameters of a field in which each performer has values of their own everywhere."""
+    """Return parameters of a model that is constant for each performer."""
     scales = SCALES[0] * laid.growth
     return Hyper(bank.pose.hyper.covariance, (0,), scales, NUGGETS[0], LABELS[1])
 
@@ -88,7 +93,7 @@ def _by_performer(laid: Laid, bank: FieldBank) -> Hyper:
 def _spanned(
     proportions: Proportions, known: Floats, offsets: Floats
 ) -> tuple[Floats, Floats, Proportions]:
-    """Coefficients of old (n, r) and new clips, of as many more directions as these need."""
+    """Return coefficients of old (n, r) and new clips, with directions extended for the new."""
     flat = proportions.directions.reshape(len(proportions.directions), -1)
     centred = (offsets - proportions.mean).reshape(len(offsets), -1)
     own = centred @ np.linalg.pinv(flat)
@@ -108,5 +113,5 @@ def _spanned(
 
 
 def _worst(left: Floats, values: Floats, right: Floats, rank: int) -> float:
-    """Largest number that the first parts of a decomposition leave out."""
+    """Return the largest absolute entry of the remainder of a truncated decomposition."""
     return float(np.abs((left[:, rank:] * values[rank:]) @ right[rank:]).max())

@@ -1,4 +1,7 @@
-"""How far each clip of a family lies from what the others predict, strangers having no say."""
+"""Outlier detection: distances of a family's clips from their leave-one-out predictions.
+
+Detected outliers are excluded from the predictions of the other clips.
+"""
 
 from dataclasses import dataclass
 
@@ -9,23 +12,23 @@ from model_export.kriging import Hyper
 from model_export.samples import Samples
 from service.motion.conventions import Floats, Indices
 
-# A clip is an outsider where it lies so many times as far away as is usual, measured in what
-# kriging expects of each, and so many robust standard deviations beyond that. On three real
-# families and the procedural one no clip is beyond 2.7 and 5.6.
+# A clip is an outlier if its distance, in kriging deviations, exceeds the median by the factor
+# TIMES and by DEVIATIONS robust standard deviations. On three real families and the procedural one
+# no clip exceeds 2.7 and 5.6.
 TIMES, DEVIATIONS = 3.0, 6.0
-# At most this share of a family can be strangers to the rest.
+# Largest share of a family that can be outliers.
 SHARE = 0.25
-# A robust standard deviation is so many times the median absolute deviation.
+# Ratio of a robust standard deviation to the median absolute deviation.
 ROBUST = 1.4826
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A family judged by those of it that belong.
+    """Leave-one-out distances of a family with its outliers excluded.
 
-    left_out (N, N): from values to what each clip differs by from what the others predict, without
-    the outsiders among them. distances (N,): the same of whole motions, m. times (N,): distances
-    as multiples of what is usual where each clip is. outside: clips, the farthest first.
+    left_out: maps values to leave-one-out residuals (N, N), without contributions of outliers.
+    distances: of whole motions (N,), m. times: distances (N,) relative to the median, both in units
+    of the kriging deviation. outside: outliers, the farthest first.
     """
 
     left_out: Floats
@@ -35,15 +38,15 @@ class Judged:
 
     @property
     def usual(self) -> float:
-        """Median distance of the clips that belong, m."""
+        """Return the median distance of the clips that are not outliers, m."""
         return float(np.median(np.delete(self.distances, self.outside)))
 
 
 def judge(hyper: Hyper, laid: Samples, motions: Floats) -> Judged:
-    """Judged family of motions (N, m), whose differences are distances, m, by their field.
+    """Return the outliers of motions (N, m), whose differences are distances, m.
 
-    The farthest is taken out before the next is sought: its neighbours, which it spoils the
-    prediction of, are no strangers.
+    The farthest outlier is excluded before the next is searched, because it spoils the predictions
+    of its neighbours.
     """
     outside: list[int] = []
     judged = _judged(hyper, laid, motions, outside)
@@ -59,10 +62,10 @@ def judge(hyper: Hyper, laid: Samples, motions: Floats) -> Judged:
 
 
 def deviations(values: Floats) -> Floats:
-    """Values (N,) as robust standard deviations from their median."""
+    """Return values (N,) as robust standard deviations from their median."""
     gaps = values - np.median(values)
     spread = ROBUST * float(np.median(np.abs(gaps)))
-    # Where most values are equal there is no scale: what differs at all is far beyond it.
+    # The spread is zero if most values are equal; any difference is then an outlier.
     return gaps / max(spread, 1e-12)
 
 

@@ -1,8 +1,8 @@
-"""Cycles cut at different moments, brought to begin at the same one.
+"""Alignment of cycles that were cut at different phases.
 
-A cycle has no first frame: where it was cut is a choice of whoever cut it. A warp keeps its ends,
-so it cannot move a cut, and bends hard beside one that is late. Every cycle is therefore first
-turned by the share of itself at which it agrees best with the family, and begins there.
+A cycle has no natural first frame. A warp keeps its ends, so it cannot move a cut, and is distorted
+near a late one. Every cycle is therefore first shifted by the share at which it agrees best with
+the family.
 """
 
 from collections.abc import Sequence
@@ -19,23 +19,22 @@ from service.motion.clip import Clip
 from service.motion.conventions import UP, Floats
 from service.motion.errors import RecipeError
 
-# Steps of a cycle at which it is compared; a cut is found between them.
+# Steps of a cycle at which it is compared; shifts are interpolated between them.
 STEPS = 96
-# A cycle that is nearly two equal halves fits almost as well from its other half: it begins there
-# only where that is this much nearer, in squared distance, than all within a quarter of the cycle.
+# A cycle of two nearly equal halves also fits shifted by half. A shift beyond NEAR of the cycle
+# must reduce the squared distance below FAR_WORTH times the best within NEAR.
 NEAR, FAR_WORTH = 0.25, 0.5
-# A shift beyond this share of a cycle is worth a note.
+# A shift beyond this share of a cycle is noted.
 LARGE = 0.08
 
 
 def in_phase(
     recipe: Recipe, examples: tuple[Example, ...], joint_weights: Floats
 ) -> tuple[Example, ...]:
-    """Examples that begin at the family's phase, where they are cycles and the recipe wants it.
+    """Shift examples to the family's phase, if they are cycles and the recipe requests it.
 
-    The medoid says the phase first, then the mean of the others. The circular mean of the shifts
-    is zero: on average the cycles begin where the data did. Raises RecipeError where a landmark
-    would pass from one end of a cycle to the other.
+    The first reference is the medoid, then the mean of the others. The circular mean of the shifts
+    is zero. Raises RecipeError if a landmark would pass from one end of a cycle to the other.
     """
     if not recipe.motion.cyclic or recipe.alignment.begin == "as_cut":
         return examples
@@ -51,8 +50,7 @@ def in_phase(
 
 
 def _measured(recipe: Recipe, begun: Example) -> Example:
-    """The example with what is measured of it from where it begins now: of a cycle on an arc, the
-    way from one phase is not that from another."""
+    """Measure the controls of a shifted example again; travel on an arc depends on the phase."""
     controls = measured.controls(recipe, begun.row, begun.clip, begun.landmarks)
     return replace(begun, controls=controls)
 
@@ -60,15 +58,17 @@ def _measured(recipe: Recipe, begun: Example) -> Example:
 def in_phase_with(
     examples: Sequence[Example], references: Floats, joint_weights: Floats, in_place: bool
 ) -> tuple[Example, ...]:
-    """Cyclic examples that begin at the phase of their references (N, F, features), traces of
-    closed cycles in even steps."""
+    """Shift cyclic examples to the phase of their references (N, F, features).
+
+    The references are traces of closed cycles at uniform steps.
+    """
     traces = np.stack([_even(align.trace(e.clip, np.sqrt(joint_weights))) for e in examples])
     found = _to(traces, np.stack([_even(reference) for reference in references]))
     return tuple(begin(e, share, in_place) for e, share in zip(examples, found, strict=True))
 
 
 def shifts(traces: Floats, rounds: int) -> Floats:
-    """Shares of their cycles (N,) at which traces (N, STEPS, features) are at one phase."""
+    """Return shares of a cycle (N,) at which traces (N, STEPS, features) have a common phase."""
     found = _gauge(_to(traces, traces[_medoid(traces)]))
     for _ in range(rounds):
         turned = _turned(traces, found)
@@ -78,7 +78,7 @@ def shifts(traces: Floats, rounds: int) -> Floats:
 
 
 def _even(trace: Floats) -> Floats:
-    """Rows (STEPS, features) of a closed trace (F, features), its end left to its beginning."""
+    """Resample a closed trace (F, features) to (STEPS, features), without its repeated end."""
     u = np.arange(STEPS) / STEPS
     return align.at(trace, u)
 
@@ -88,21 +88,23 @@ def _spectra(traces: Floats) -> npt.NDArray[np.complex128]:
 
 
 def _costs(traces: Floats, references: Floats) -> Floats:
-    """Squared distances (N, STEPS) of cycles (N, STEPS, features), begun at each of their steps,
-    from references (STEPS, features), or one each."""
+    """Return squared distances (N, STEPS) of cycles (N, STEPS, features), at every shift.
+
+    references: (STEPS, features), or one per cycle.
+    """
     cross = np.sum(_spectra(traces) * np.conj(_spectra(references)), axis=-1)
     own = np.sum(np.square(traces), axis=(-2, -1)) + np.sum(np.square(references), axis=(-2, -1))
     return np.maximum(own[..., None] - 2.0 * np.fft.irfft(cross, STEPS, axis=-1), 0.0)
 
 
 def _medoid(traces: Floats) -> int:
-    """The cycle nearest to all others, wherever they begin."""
+    """Return the cycle nearest to all others, each at its best shift."""
     totals = [np.sum(np.sqrt(_costs(traces, one).min(axis=1))) for one in traces]
     return int(np.argmin(np.round(totals, 9)))
 
 
 def _to(traces: Floats, references: Floats) -> Floats:
-    """Shares of a cycle (N,) in [-0.5, 0.5) at which traces begin where their references do."""
+    """Return shares of a cycle (N,) in [-0.5, 0.5) that bring traces to their references' phase."""
     costs = _costs(traces, references)
     shares = np.fft.fftfreq(STEPS)
     near = np.where(np.abs(shares) <= NEAR, costs, np.inf)
@@ -112,7 +114,7 @@ def _to(traces: Floats, references: Floats) -> Floats:
 
 
 def _beside(costs: Floats, best: Floats) -> Floats:
-    """Lowest points (N,) of parabolas through each best step and its neighbours, in steps."""
+    """Return offsets (N,), in steps, of the minima of parabolas through the best steps."""
     rows = np.arange(len(costs))
     before, at, after = (costs[rows, (best + side) % STEPS] for side in (-1, 0, 1))
     bend = before - 2.0 * at + after
@@ -120,21 +122,21 @@ def _beside(costs: Floats, best: Floats) -> Floats:
 
 
 def _turned(traces: Floats, shifts: Floats) -> Floats:
-    """Traces (N, STEPS, features) begun at shares (N,) of their cycles."""
+    """Shift traces (N, STEPS, features) by shares (N,) of their cycles."""
     turn = np.exp(2j * np.pi * np.arange(STEPS // 2 + 1) * shifts[:, None])
     return np.fft.irfft(_spectra(traces) * turn[:, :, None], STEPS, axis=1)
 
 
 def _gauge(shifts: Floats) -> Floats:
-    """The same shifts, in [-0.5, 0.5), their circular mean zero."""
+    """Return the shifts, in [-0.5, 0.5), minus their circular mean."""
     around = np.exp(2j * np.pi * shifts)
     return np.angle(around * np.conj(around.sum())) / (2 * np.pi)
 
 
 def begin(example: Example, share: float, in_place: bool = False) -> Example:
-    """A cyclic example begun a share of its cycle later, to the nearest frame.
+    """Shift a cyclic example to begin a share of its cycle later, to the nearest frame.
 
-    What is cut off at one end goes on at the other, carried and turned by the cycle's travel.
+    The frames cut off at the start are appended, moved and turned by the cycle's travel.
     """
     cycle = len(example.clip) - 1
     frames = round(share * cycle) % cycle
@@ -142,12 +144,12 @@ def begin(example: Example, share: float, in_place: bool = False) -> Example:
         return example
     own = frames / cycle
     clip = _rolled(example.clip, frames)
-    # The line through the cycle's heading sets out straight ahead and goes on: a line fitted anew
-    # would swing with the pelvis.
+    # The heading changes linearly over the cycle. A line fitted again to the shifted clip would
+    # vary with the swing of the pelvis.
     clip = ingest.place(clip, clip.root_path[0] * (1.0 - UP), _turned_by(example.clip) * own)
     return replace(
         example,
-        # Turned by the cycle's change of heading, what was in place is so no longer.
+        # The appended frames are turned by the change of heading, which moves the root again.
         clip=ingest.stay(clip) if in_place else clip,
         landmarks=tuple((mark - own) % 1.0 for mark in example.landmarks),
         shift=own - np.rint(own),
@@ -155,13 +157,13 @@ def begin(example: Example, share: float, in_place: bool = False) -> Example:
 
 
 def _turned_by(clip: Clip) -> Floats:
-    """By how much a closed cycle's heading changes, rad."""
+    """Return the change of heading over a closed cycle, rad."""
     first, last = clip.rotations[[0, -1], 0]
     return quat.twist(quat.mul(last, quat.conj(first)), UP)
 
 
 def _rolled(clip: Clip, frames: int) -> Clip:
-    """Closed cycle begun so many frames later."""
+    """Shift a closed cycle to begin some frames later."""
     turn = np.broadcast_to(quat.about(UP, _turned_by(clip)), (frames, 4))
     rotations, translations = clip.rotations[1 : frames + 1], clip.translations[1 : frames + 1]
     rotations, translations = rotations.copy(), translations.copy()
@@ -176,7 +178,7 @@ def _rolled(clip: Clip, frames: int) -> Clip:
 
 
 def notes(examples: Sequence[Example]) -> list[str]:
-    """One sentence for every clip that was cut at quite another phase."""
+    """Return one note per clip that was shifted by a large share of its cycle."""
     return [
         f"{example.row.named}: begun {abs(example.shift):.0%} of its cycle "
         f"{'later' if example.shift > 0 else 'earlier'} than it was cut"
@@ -186,7 +188,7 @@ def notes(examples: Sequence[Example]) -> list[str]:
 
 
 def _refuse_parted_landmarks(examples: Sequence[Example]) -> None:
-    """A landmark near the cut may come to lie at the other end of some cycles."""
+    """Raise RecipeError for landmarks that the shift moves across the end of some cycles."""
     marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
     usual = np.median(marks, axis=0)
     for example, own in zip(examples, marks, strict=True):

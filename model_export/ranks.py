@@ -1,4 +1,4 @@
-"""How much of the core tensor to keep."""
+"""Choice of the ranks of the core tensor."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ from service.motion.errors import TrainingError
 
 Triple = tuple[int, int, int]
 Strain = Callable[[Triple], float]
-"""Largest of the true errors at some ranks, each over its budget: at most one if all are kept."""
+"""Largest ratio of a true error to its budget at some ranks; at most one within all budgets."""
 
 
 @dataclass(frozen=True)
 class Front:
-    """Triples of ranks (F, 3) to which nothing cheaper is as good, the cheapest first.
+    """Pareto front of rank triples (F, 3) by cost and error, the cheapest first.
 
-    errors (F,): the squared error of each in the tensor's metric; it falls from one to the next.
+    errors: squared error (F,) of each in the tensor's metric, decreasing.
     """
 
     triples: npt.NDArray[np.int64]
@@ -34,19 +34,18 @@ class Front:
         return r1, r2, r3
 
     def near(self, error: float, low: int, high: int) -> int:
-        """Place strictly between two others of the first triple whose error is no larger."""
+        """Return the index of the first triple within an error, strictly between low and high."""
         place = int(np.searchsorted(-self.errors, -error))
         return min(max(place, low + 1), high - 1)
 
 
 def choose(size: Size, full: Multilinear, price: Price, judge: Judge) -> Triple:
-    """Ranks that a recipe gives, or the cheapest whose true errors keep its budgets."""
+    """Return the ranks of a recipe, or the cheapest whose true errors stay within its budgets."""
     if size.ranks is not None:
         return given(full.core, size.ranks)
 
     def strain(triple: Triple) -> float:
-        found = judge.of(full.truncated(triple))
-        return max(getattr(found, name) / budget for name, budget in size.budgets.items())
+        return judge.strain(full.truncated(triple), size.budgets)
 
     places = judge.own_tensor.weight * np.prod(judge.whole.shape[:2])
     aim = min(size.budgets.values()) ** 2 * float(places)
@@ -54,13 +53,13 @@ def choose(size: Size, full: Multilinear, price: Price, judge: Judge) -> Triple:
 
 
 def front(core: Floats, price: Price, within: Triple | None = None) -> Front:
-    """Front of all triples by cost and exact squared error; of those within a triple, if given.
+    """Return the Pareto front of rank triples by cost and exact squared error.
 
-    Every triple is scored, from one cumulative sum of the squared core (Mukai & Kuriyama 2006 left
-    the choice open).
+    within: largest ranks; None for all. All triples are evaluated from one cumulative sum of the
+    squared core; Mukai & Kuriyama 2006, section 4, leave the choice of size open.
     """
     errors = hosvd.squared_errors(core)[tuple(map(slice, within or core.shape))]
-    # A relative rounding error of the sum is no reason to keep another rank.
+    # Rounding errors of the sum must not add a rank.
     errors[errors <= 1e-12 * float(np.sum(np.square(core)))] = 0.0
     costs = price.of(*np.ix_(*(np.arange(1, size + 1) for size in errors.shape)))
     order = np.lexsort((errors.ravel(), costs.ravel()))
@@ -72,10 +71,10 @@ def front(core: Floats, price: Price, within: Triple | None = None) -> Front:
 
 
 def cheapest(front: Front, strain: Strain, aim: float) -> Triple:
-    """First triple of a front that keeps every budget, if true errors fall along it as its own do.
+    """Return the first triple of a front within every budget, if true errors decrease along it.
 
-    What is returned keeps them in any case. aim: squared error at which to look first. Halving
-    takes turns with where the last strain, which grows as the root of the error, says to look.
+    The triple returned is within the budgets in any case. aim: squared error of the first guess.
+    Bisection alternates with a guess from the last strain, which grows as the root of the error.
     """
     low, high, guess = -1, len(front.errors) - 1, True
     while high - low > 1:
@@ -87,7 +86,7 @@ def cheapest(front: Front, strain: Strain, aim: float) -> Triple:
 
 
 def given(core: Floats, ranks: list[int]) -> Triple:
-    """The recipe's own ranks; TrainingError where the tensor has not that many."""
+    """Return the recipe's own ranks; raise TrainingError if they exceed the tensor's size."""
     if any(rank > size for rank, size in zip(ranks, core.shape, strict=True)):
         raise TrainingError(
             f"size.ranks {ranks}, expected at most {list(core.shape)}: degrees of freedom, frames "

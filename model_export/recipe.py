@@ -1,8 +1,7 @@
-"""The recipe: what to train from, checked once when it is read.
+"""Recipe of a training: a validated TOML file.
 
-A TOML file says everything but the numbers of each clip, which stand in a CSV table. Whatever a
-wrong recipe could mean in silence is refused: unknown keys, missing units, names that are used
-twice.
+The recipe refers to a CSV table with the data of each clip. Ambiguous recipes are refused: unknown
+keys, missing units, duplicate names.
 """
 
 import json
@@ -14,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from model_export import data
 from model_export.controls import (
     COLUMN,
     MEASURED,
@@ -33,7 +33,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Source(Part):
-    """What the motion files leave unsaid; a BVH file knows neither its unit nor its up axis."""
+    """Unit and axes of the motion files; a BVH file states neither its unit nor its up axis."""
 
     metres_per_unit: Positive = Field(description="length of one unit of the files, m")
     up: Literal["y", "z"] = Field(description="the files' up axis; their frame is right-handed")
@@ -45,7 +45,7 @@ class Source(Part):
 
 
 class Condition(Part):
-    """Which rows of the table belong: by listed values, or by a range of a number."""
+    """Selection of rows of the table, by listed values or by a range of a number."""
 
     among: list[str] | None = Field(default=None, description="the cell is one of these")
     without: list[str] | None = Field(default=None, description="the cell is none of these")
@@ -54,7 +54,7 @@ class Condition(Part):
 
 
 class Clips(Part):
-    """Where the table is and which of its columns say what."""
+    """Location of the table and the meaning of its columns."""
 
     table: Text = Field(description="CSV file, relative to the data folder")
     file: Text = Field(description="column: motion file, relative to the table")
@@ -68,7 +68,7 @@ class Clips(Part):
 
 
 class Motion(Part):
-    """How clips become a tensor."""
+    """Conversion of clips to a tensor."""
 
     frames: Annotated[int, Field(ge=8, le=1000)] = Field(description="aligned frames T")
     cyclic: bool = Field(description="whether the last pose leads into the first")
@@ -106,12 +106,12 @@ class Alignment(Part):
     )
 
 
-# Degree one meets targets, degree zero keeps what clips have in common.
+# Degree one extrapolates to targets, degree zero keeps the common part of the clips.
 MIXED = (0, 1, 1)
 
 
 class Kriging(Part):
-    """The field of the control coefficients."""
+    """Kriging model of the control coefficients."""
 
     covariance: Literal[
         "matern52", "matern32", "gaussian", "exponential", "spherical", "chosen"
@@ -136,24 +136,24 @@ class Kriging(Part):
 
     @property
     def degree(self) -> int:
-        """The highest degree that is tried."""
+        """Return the highest degree of drift that is tried."""
         return max(map(max, self.drifts))
 
     @property
     def covariances(self) -> tuple[str, ...]:
-        """The covariances that are tried."""
+        """Return the covariances that are tried."""
         return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)
 
     @property
     def drifts(self) -> tuple[tuple[int, ...], ...]:
-        """What is tried of the degrees whose predictions are averaged."""
+        """Return the sets of drift degrees to try; predictions are averaged within a set."""
         if self.drift == "chosen":
             return (1,), MIXED
         return (MIXED,) if self.drift == "mixed" else ((self.drift,),)
 
 
 class Event(Part):
-    """What a motion is for: a joint that has to be in its place at one moment."""
+    """Event of a motion: a joint and the moment at which its position matters."""
 
     joint: Text = Field(description="the joint: a hand that reaches, a foot that lands")
     at: Text = Field(
@@ -162,7 +162,7 @@ class Event(Part):
 
 
 class Detail(Part):
-    """A level of detail below the model's own size."""
+    """Level of detail below the model's own size."""
 
     times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
         description="how many times the budgets, or the errors at the ranks given, it may cost"
@@ -174,14 +174,14 @@ class Detail(Part):
     )
 
 
-# In pictures 1080 pixels high and 60 degrees wide, one pixel at some 15 m a centimetre of error.
+# An image 1080 pixels high, with a horizontal field of view of 60 degrees, resolves 1 cm at 15 m.
 DETAILS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
 
 
 class Size(Part):
-    """How much of the tensor is kept: ranks, or the errors that leaving out may cost.
+    """Size of the truncated tensor: ranks, or error budgets.
 
-    Errors are true distances between joints, by forward kinematics; all budgets given are kept.
+    Errors are true distances between joints, by forward kinematics; all given budgets apply.
     """
 
     levels: list[Detail] | None = Field(
@@ -210,7 +210,7 @@ class Size(Part):
 
     @property
     def details(self) -> Sequence[Detail]:
-        """The coarser levels of detail."""
+        """Return the coarser levels of detail."""
         return DETAILS if self.levels is None else self.levels
 
     @field_validator("levels")
@@ -223,7 +223,7 @@ class Size(Part):
 
     @property
     def budgets(self) -> dict[str, float]:
-        """Budgets given, m, by what they are for: rms, p99, effector."""
+        """Return the given budgets, m, by name: rms, p99, effector."""
         given = {
             "rms": self.rms_budget_cm,
             "p99": self.p99_budget_cm,
@@ -242,12 +242,12 @@ class Size(Part):
         return self
 
 
-# What only a whole cycle has.
+# Quantities that only a whole cycle has.
 OF_CYCLES = (*measure.TRAVELLED, "step_length")
 
 
 class Recipe(Part):
-    """A whole recipe."""
+    """Complete recipe."""
 
     schema_version: Literal[1] = Field(alias="schema", description="version of this format")
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
@@ -272,16 +272,16 @@ class Recipe(Part):
 
     @property
     def typed(self) -> list[ControlColumn]:
-        """Controls whose values stand in the table."""
+        """Return the controls with values in the table."""
         return [control for control in self.controls if isinstance(control, ControlColumn)]
 
     @property
     def measured(self) -> list[ControlMeasured]:
-        """Controls whose values are measured of the clips."""
+        """Return the controls that are measured from the clips."""
         return [control for control in self.controls if isinstance(control, ControlMeasured)]
 
     def ends(self, auto: Auto) -> list[str]:
-        """Two feet of a step, or the upper and the lower end of a leg; empty for all else."""
+        """Return the two feet of a step, or the ends of a leg; empty for other quantities."""
         if auto.quantity == "step_length":
             return list(auto.joints or self.motion.feet)
         if auto.quantity == "leg_length":
@@ -313,7 +313,7 @@ class Recipe(Part):
         return self
 
     def _unmeasurable(self, auto: Auto) -> str | None:
-        """Why a quantity cannot be measured of these clips."""
+        """Return the reason for which a quantity cannot be measured; None if it can."""
         quantity, landmarks = auto.quantity, self.clips.landmarks
         if quantity in OF_CYCLES and not self.motion.cyclic:
             return (
@@ -359,19 +359,56 @@ class Recipe(Part):
         return self
 
 
+MOST_BYTES = 128_000
+"""Size of a recipe; those of the project take 3 kB."""
+
+MOST_DOTS = 1_000
+"""Dots in one key: far more than MOST_LEVELS, and few enough to parse quickly."""
+
+SHOWN = 200
+"""Characters of a value in a message."""
+
+MOST_LEVELS = 16
+"""Nesting depth of tables and arrays; a recipe needs five."""
+
+
 def read(path: Path) -> Recipe:
-    """Recipe of a TOML file; RecipeError says which key is wrong and what it should be."""
+    """Return the recipe of a TOML file; RecipeError names the invalid key."""
+    content = data.read(path, MOST_BYTES, "a recipe")
     try:
-        content = path.read_text(encoding="utf-8")
-        return Recipe.model_validate(tomllib.loads(content))
-    except OSError as fault:
-        raise RecipeError(path, f"cannot be read: {fault.strerror}") from fault
+        text = content.decode()
     except UnicodeDecodeError as fault:
         raise RecipeError(path, f"not UTF-8 text: {fault}") from fault
-    except tomllib.TOMLDecodeError as fault:
+    # tomllib takes quadratic time in the parts of a key: 40 s for a key of MOST_BYTES.
+    if any(line.partition("=")[0].count(".") > MOST_DOTS for line in text.splitlines()):
+        raise RecipeError(path, TOO_DEEP)
+    try:
+        found = tomllib.loads(text)
+    except RecursionError as fault:
+        raise RecipeError(path, TOO_DEEP) from fault
+    except ValueError as fault:
+        # ValueError covers TOMLDecodeError and int's error for a number of thousands of digits.
         raise RecipeError(path, f"not TOML: {fault}", _line_of(str(fault))) from fault
+    if _levels(found) > MOST_LEVELS:
+        raise RecipeError(path, TOO_DEEP)
+    try:
+        return Recipe.model_validate(found)
     except ValidationError as fault:
         raise RecipeError(path, _explain(fault)) from fault
+
+
+TOO_DEEP = f"tables or arrays nested deeper than {MOST_LEVELS} levels, expected at most that many"
+
+
+def _levels(found: dict[str, Any]) -> int:
+    """Return the nesting depth of tables and arrays, at most MOST_LEVELS + 1."""
+    inside: list[Any] = [found]
+    for level in range(MOST_LEVELS + 1):
+        if not inside:
+            return level
+        parts = (one.values() if isinstance(one, dict) else one for one in inside)
+        inside = [one for part in parts for one in part if isinstance(one, dict | list)]
+    return MOST_LEVELS + 1
 
 
 def _line_of(message: str) -> int | None:
@@ -381,18 +418,24 @@ def _line_of(message: str) -> int | None:
 
 def _explain(fault: ValidationError) -> str:
     lines = []
-    # A unit that was left out is not known where what is measured is not: that is said already.
+    # The default unit follows from the measured quantity; an error there is reported already.
     errors = fault.errors(include_url=False)
     for error in (one for one in errors if one["type"] != "default_factory_not_called"):
         parts = [str(part) for part in error["loc"] if part not in (COLUMN, MEASURED)]
         key = ".".join(parts) or "recipe"
-        found = "" if error["type"] in ("missing", "value_error") else f", found {error['input']!r}"
+        found = "" if error["type"] in ("missing", "value_error") else _found(error["input"])
         lines.append(f"{key}: {error['msg']}{found}")
     return "; ".join(lines)
 
 
+def _found(given: Any) -> str:
+    """Return the given value for a message, cut to SHOWN characters."""
+    shown = repr(given)
+    return f", found {shown if len(shown) <= SHOWN else f'{shown[:SHOWN]}...'}"
+
+
 def json_schema() -> str:
-    """JSON Schema of the recipe, as published beside the recipes for editors."""
+    """Return the JSON Schema of the recipe, which editors use."""
     schema: dict[str, Any] = Recipe.model_json_schema(by_alias=True)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, sort_keys=True) + "\n"

@@ -1,8 +1,8 @@
-"""A model file to the model in float64 that it was made of, without the data.
+"""Reconstruction of the float64 model from a model file, without the training data.
 
-The graph holds dual weights, not what the fields were laid through. These are had back from the
-dual weights and the system that made them, which hangs on controls, performers and the parameters
-of each field: the card has the pose's, the graph scales and labels of all, and `Making` the rest.
+The graph holds dual weights, not sample values. These are recovered from the dual weights and the
+kriging system, which depends on controls, performers and the parameters of each model. The card
+holds the pose's parameters, the graph the scales and labels of all, and `Making` the rest.
 """
 
 from collections.abc import Mapping
@@ -26,16 +26,16 @@ from service.motion import field
 from service.motion.card import Making, ModelCard
 from service.motion.conventions import Floats, Indices
 from service.motion.errors import ModelError
-from service.synthesis import freeze, session
+from service.synthesis import freeze, model_file
 from service.synthesis.exact import reduced, spread
 
-# Numbers of float32 are this near to those that they were, in half-ranges.
+# Largest rounding error of sample controls in float32, in half-ranges.
 SAME = 1e-5
 
 
 @dataclass(frozen=True)
 class Reopened:
-    """What a model file was made of. digest: SHA-256 of its content."""
+    """A reconstructed model. digest: SHA-256 of the file's content."""
 
     known: Known
     card: ModelCard
@@ -45,7 +45,7 @@ class Reopened:
 
 @dataclass(frozen=True)
 class _File:
-    """Numbers of a model file by name, with its card; `source` names it in errors."""
+    """Arrays of a model file by name, with its card. source: name of the file in errors."""
 
     numbers: Mapping[str, Floats]
     card: ModelCard
@@ -62,25 +62,19 @@ class _File:
 
 
 def load(path: Path) -> Reopened:
-    """The same of a file's content; ModelError where it cannot be read."""
-    return reopen(session.read(path), str(path))
+    """Return the model of a file; ModelError if it cannot be read."""
+    return reopen(model_file.read(path), str(path))
 
 
 def reopen(content: bytes, source: str) -> Reopened:
-    """Model of one level, and its card, from the bytes of a file; `source` names it in errors.
+    """Return the model of one level, and its card, from the bytes of a file.
 
-    Raises ModelError where the service could not open it, and for files older than what this takes.
+    source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
     """
-    own_card = session.open_bytes(content, source).card
-    if own_card.making is None or own_card.kriging is None:
-        raise ModelError(
-            source,
-            "was written before models could be adapted: its card does not say what its fields "
-            "were solved with; train it again",
-        )
+    own_card = model_file.checked(content, source)
     numbers = {name: _plain(array) for name, array in freeze.weights(content).items()}
     file = _File(numbers, own_card, own_card.making, source)
-    return Reopened(_known(file), own_card, own_card.making, session.sha256(content))
+    return Reopened(_known(file), own_card, own_card.making, model_file.sha256(content))
 
 
 def _plain(array: Any) -> Floats:
@@ -119,20 +113,19 @@ def _bones(file: _File) -> Proportions:
 
 
 def _bank(file: _File) -> FieldBank:
-    """Fields over the samples in the order of the card."""
+    """Return the coefficient models over the samples in the order of the card."""
     card = file.card
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
     points = field.half_ranges(np.array(card.examples), low, high)
     points = np.hstack([points, card.labels])
     order = _order(file, points)
     others = {name: _other(file, name, points, order) for name in _widths(file)}
-    assert card.kriging is not None
     pose = _solved(file, POSE, (card.kriging, points, order))
     return FieldBank(low, high, card.performers, pose, others, float(file["sill"]))
 
 
 def _order(file: _File, points: Floats) -> Indices:
-    """Place on the card (n,) of each sample of the graph."""
+    """Return the index (n,) on the card of each sample of the graph."""
     order, held = spread.order_of(file.card, file.numbers, points), file["samples"][0].T
     if np.abs(points[order, : len(file.card.controls)] - held).max() > SAME:
         raise ModelError(file.source, "its card lists other samples than its graph holds")
@@ -140,14 +133,14 @@ def _order(file: _File, points: Floats) -> Indices:
 
 
 def _widths(file: _File) -> dict[str, int]:
-    """How many values each field beside the pose has, in their order."""
+    """Return the number of values of each quantity besides the pose, in their order."""
     travel = {"travel": 3} if file.card.cyclic else {}
     bones, warp = len(file["offset_directions"]), len(file["warp_still"])
     return {**travel, "offsets": bones, "duration": 1, "warp": warp}
 
 
 def _columns(file: _File, name: str) -> slice:
-    """Where a field stands in the weights of one and the controls, after two of the variance."""
+    """Return the columns of a quantity in the drift weights; the variance takes the first two."""
     start = 2
     for other, width in _widths(file).items():
         if other == name:
@@ -172,7 +165,7 @@ def _other(file: _File, name: str, points: Floats, order: Indices) -> Field:
 
 
 def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Kriging:
-    """Field of one name through what its dual weights say that it was laid through."""
+    """Return one kriging model, solved for the sample values recovered from its dual weights."""
     hyper, points, order = laid
     near = np.empty_like(file[f"{name}_weights"])
     near[order] = file[f"{name}_weights"]
@@ -182,7 +175,7 @@ def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Krig
 
 
 def _decoder(file: _File, bank: FieldBank) -> Decoder:
-    """Decoder whose first mode's coordinates are those of the core."""
+    """Return a decoder with the core's coordinates for the first mode."""
     held = reduced.read(file.numbers, file.card.levels[0])
     core = held.core.transpose(1, 0, 2)
     bases = np.eye(len(core)), held.time, bank.pose.values

@@ -1,4 +1,4 @@
-"""Where samples lie: controls, and who moved."""
+"""Sample points: controls and performers of the examples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ EMPTY = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class Samples:
-    """Where a field's samples lie.
+    """Sample points of a kriging model.
 
-    points (n, d + p): controls in half-ranges, then the performers' labels. controls: d. groups
-    (n,): samples that are left out together.
+    points: (n, d + p), controls in half-ranges, then the performers' labels. controls: d. groups:
+    group (n,) of each sample; a group is left out together.
     """
 
     points: Floats
@@ -29,42 +29,43 @@ class Samples:
 
     @property
     def half_ranges(self) -> Floats:
-        """The controls (n, d) alone."""
+        """Return the controls (n, d) in half-ranges, without labels."""
         return self.points[:, : self.controls]
 
     @property
     def labelled(self) -> bool:
-        """Whether performers are told apart."""
+        """Return True if performers have labels."""
         return self.points.shape[1] > self.controls
 
     @property
     def moved_by(self) -> Indices:
-        """Place (n,) of each sample's performer among them; empty where they are not told apart."""
+        """Return the index (n,) of each sample's performer; empty without labels."""
         return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else EMPTY
 
     def from_mean(self, values: Floats) -> Floats:
-        """How far each of values (n, m) lies from the mean of all other groups."""
+        """Return the differences of values (n, m) from the mean of all other groups."""
         _, inverse, counts = np.unique(self.groups, return_inverse=True, return_counts=True)
         sums = np.zeros((len(counts), values.shape[1]))
-        np.add.at(sums, inverse, values)
+        for group, own in zip(inverse, values, strict=True):
+            sums[group] += own
         others = (values.sum(axis=0) - sums[inverse]) / (len(values) - counts[inverse])[:, None]
         return values - others
 
 
 def labels(names: Sequence[str], performers: Sequence[str]) -> Floats:
-    """Labels (N, p) of who moved: one for the performer's own, zeros where the name is unknown."""
+    """Return one-hot labels (N, p) of performers, zeros for an unknown name."""
     own = [[float(name == performer) for performer in performers] for name in names]
     return np.array(own).reshape(len(names), len(performers))
 
 
 def lay(recipe: Recipe, examples: Sequence[Example]) -> tuple[Samples, tuple[str, ...]]:
-    """Samples of a recipe's examples, and the performers that it tells apart, by name.
+    """Return the samples of a recipe's examples, and the labelled performers sorted by name.
 
-    Raises TrainingError where a drift hangs on a single example.
+    Raises TrainingError if a drift depends on a single example.
     """
     points = _points(examples)
     names = [example.row.performer for example in examples]
-    # One alone is told apart from nobody.
+    # A single performer needs no label.
     apart = recipe.kriging.label is not None and len(set(names)) > 1
     performers = tuple(sorted(set(names))) if apart else ()
     both = np.hstack([points, labels(names, performers)])
@@ -72,7 +73,7 @@ def lay(recipe: Recipe, examples: Sequence[Example]) -> tuple[Samples, tuple[str
 
 
 def notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
-    """What a recipe asks of its examples that they are too few for, in a sentence each."""
+    """Return one note per setting of the recipe that the examples are too few for."""
     said = []
     laid, performers = lay(recipe, examples)
     if recipe.kriging.label and not performers:
@@ -92,14 +93,14 @@ def _points(examples: Sequence[Example]) -> Floats:
 
 
 def takes(examples: Sequence[Example]) -> Indices:
-    """Number (N,) of the file that each example was cut from."""
+    """Return the number (N,) of the file that each example was cut from."""
     return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
 
 
 def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indices:
-    """Groups (N,) by file, or where no field is left without one of the files, of one each.
+    """Return groups (N,) by file, or singletons if the drift is undetermined without a file.
 
-    Raises TrainingError where there is none without a single example.
+    Raises TrainingError if the drift is undetermined without a single example.
     """
     degree = recipe.kriging.degree
     by_file, alone = takes(examples), np.arange(len(examples))
@@ -116,5 +117,5 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
 
 
 def _needed(groups: Indices, points: Floats, degree: int) -> int | None:
-    """First group without which points (N, d) do not determine a drift."""
+    """Return the first group without which points (N, d) do not determine the drift, or None."""
     return field.needed(groups, field.drift(points, points.shape[1], degree))

@@ -1,4 +1,4 @@
-"""How far each joint of a clip left out lies from what the others predict, beside all joints."""
+"""Leave-one-out error of each joint relative to that of all joints."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from model_export.hosvd import Multilinear
 from model_export.tune import Tuned
 from service.motion.conventions import Floats
 
-# Joints never err by less than this share: nothing is certain.
+# Least share of a joint, so that its sigma is never zero.
 LEAST = 0.01
 
 
 def of_joints(judge: Judge, full: Multilinear, pose: Tuned, travels: Floats | None) -> Floats:
-    """Root-mean-square distance (J,) of each joint, as a share of that of all joints.
+    """Return the root mean square error (J,) of each joint as a share of that of all joints.
 
-    pose: the field of the whole tensor's motions, whose variances say what is usual of each clip
-    left out; travels (N, 3): residuals of a cycle's travel. Distances are true ones, by forward
+    pose: kriging model of the full tensor's motions; its variances normalize the error of each
+    clip. travels: residuals (N, 3) of a cycle's travel. Distances are true ones, by forward
     kinematics.
     """
     own = judge.own_tensor

@@ -1,7 +1,6 @@
-"""Clips that do not seem to belong to their family, each with what speaks against it.
+"""Detection of clips that do not fit their family, with the evidence.
 
-Nothing is left out because of it: what is strange to the others may be the one clip that shows a
-part of the controls.
+The clips stay in the training data: an outlier can be the only clip in a part of the control space.
 """
 
 from collections.abc import Iterator
@@ -24,19 +23,18 @@ from service.motion.conventions import Floats
 if TYPE_CHECKING:
     from model_export.train import Trained
 
-# From so many times the usual distance on it is asked whether a clip is another in disguise.
+# Multiple of the median distance above which a clip is tested for mirroring, turns and swaps.
 SUSPECT = 1.5
-# A duration or a way is strange this many robust standard deviations beyond what is usual, and by
-# at least a factor, or m.
+# A duration or travel is an outlier beyond STRANGE robust standard deviations, and by at least the
+# factor FACTOR, or WAY, m.
 STRANGE, FACTOR, WAY = 8.0, 1.5, 0.3
 
 
 @dataclass(frozen=True)
 class Stranger:
-    """What speaks against one clip, as part of a sentence.
+    """Evidence against one clip, as part of a sentence.
 
-    kind: "far" from what the others predict, "disguise", "leap", "size", "bones", "duration" or
-    "travel".
+    kind: "far" from the prediction, "disguise", "leap", "size", "bones", "duration" or "travel".
     """
 
     clip: int
@@ -45,14 +43,14 @@ class Stranger:
 
 
 def find(recipe: Recipe, trained: "Trained") -> tuple[Stranger, ...]:
-    """Evidence against the clips of a trained family, clip by clip."""
+    """Return the evidence against the clips of a trained family, sorted by clip."""
     own = _Family(recipe, trained)
     parts = (own.sized(), own.far(), own.disguised(), own.leaping(), own.late(), own.astray())
     return tuple(sorted((one for part in parts for one in part), key=lambda one: one.clip))
 
 
 def notes(trained: "Trained") -> list[str]:
-    """One sentence for every clip that does not seem to belong."""
+    """Return one note per clip with evidence against it."""
     said: dict[int, list[str]] = {}
     for one in trained.strangers:
         said.setdefault(one.clip, []).append(one.said)
@@ -70,7 +68,7 @@ class _Family:
 
     @cached_property
     def motions(self) -> Floats:
-        """Motions (N, m) whose differences are root mean square distances of joints, m."""
+        """Return motions (N, m) whose differences are root mean square joint distances, m."""
         whole = self.trained.tensor
         return self.trained.values["pose"] / np.sqrt(whole.weight * whole.values.shape[1])
 
@@ -91,7 +89,7 @@ class _Family:
         return f"most like it is {named}, {_cm(apart[nearest])} away"
 
     def disguised(self) -> Iterator[Stranger]:
-        """Clips that would lie nearer mirrored, turned or with sides exchanged."""
+        """Yield clips that would fit better mirrored, turned or with sides exchanged."""
         suspects = np.flatnonzero(self.judged.times > SUSPECT)
         if not len(suspects):
             return
@@ -108,12 +106,14 @@ class _Family:
                 yield Stranger(int(clip), "disguise", _worn(worn))
 
     def _around(self, values: Floats, offsets: Floats) -> Floats:
-        """Joints (B, T, J, 3) around the root of slices (D', T, B) of the tensor, on bones (J, 3),
-        m."""
+        """Return joint positions (B, T, J, 3), m, relative to the root, of slices (D', T, B).
+
+        offsets: bone offsets (J, 3), m.
+        """
         whole = self.trained.tensor
         rotations, _ = whole.chart.poses(whole.numbers(values))
         translations = np.broadcast_to(offsets, (*rotations.shape[:-1], 3))
-        return skeleton.forward(self.trained.skeleton.parents, rotations, translations)[0]
+        return skeleton.positions(self.trained.skeleton.parents, rotations, translations)
 
     def leaping(self) -> Iterator[Stranger]:
         for clip, example in enumerate(self.trained.examples):
@@ -122,7 +122,7 @@ class _Family:
                 yield Stranger(clip, "leap", _leapt(leap, example))
 
     def sized(self) -> Iterator[Stranger]:
-        """Clips with bones of another size, or another performer's."""
+        """Yield clips with bones of another size, or another performer's."""
         offsets = np.stack([example.offsets for example in self.trained.examples])
         performers = tuple(example.row.performer for example in self.trained.examples)
         for clip, size in enumerate(bones.sizes(offsets)):
@@ -133,7 +133,7 @@ class _Family:
                 yield Stranger(clip, "bones", _boned(other, performers[clip]))
 
     def late(self) -> Iterator[Stranger]:
-        """Clips that last far longer or shorter than is expected."""
+        """Yield clips with a duration far from the prediction."""
         gaps = self.trained.residuals["duration"][:, 0]
         for clip in _strange(np.abs(gaps), np.log(FACTOR)):
             lasts = self.trained.aligned.durations[clip]
@@ -141,7 +141,7 @@ class _Family:
             yield Stranger(clip, "duration", said)
 
     def astray(self) -> Iterator[Stranger]:
-        """Cycles that get somewhere else than is expected."""
+        """Yield cycles with travel far from the prediction."""
         gaps = self.trained.residuals.get("travel", np.zeros((1, 2)))[:, :2]
         lost = np.linalg.norm(gaps, axis=1)
         for clip in _strange(lost, WAY):

@@ -1,10 +1,11 @@
-"""The table of clips: one row a clip, checked cell by cell."""
+"""Table of clips: one validated row per clip."""
 
 import csv
 import io
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,11 @@ from service.motion.errors import RecipeError
 
 @dataclass(frozen=True)
 class Row:
-    """One clip: where it is, which frames of it, and what it was an example of.
+    """One clip: its file, frames, and controls.
 
-    line: in the table, for messages; None where it stands in none. last_frame, counted in, and
-    first_frame index the file's frames from 0; None is the file's own end. controls: those that
-    are typed; landmarks: frames of the file.
+    line: in the table, for messages; None without table. first_frame, last_frame: indices in the
+    file from 0, last_frame inclusive; None is the end of the file. controls: those of the table.
+    landmarks: frames of the file.
     """
 
     place: Place
@@ -36,27 +37,27 @@ class Row:
 
     @property
     def named(self) -> str:
-        """How messages name it: its line and its file."""
+        """Return the name of the row in messages: its line and its file."""
         return self.place.name if self.line is None else f"line {self.line}, {self.place.name}"
 
     @property
     def source(self) -> str:
-        """File, and frames of it where it is a part."""
+        """Return the file's name, with frames if the clip is a part of it."""
         if self.first_frame == 0 and self.last_frame is None:
             return self.place.name
         last = "the end" if self.last_frame is None else self.last_frame
         return f"{self.place.name}, frames {self.first_frame} to {last}"
 
     def fault(self, message: str) -> RecipeError:
-        """Error that names this row."""
+        """Return an error that names this row."""
         return RecipeError(self.table, message, self.line)
 
 
 def read(recipe: Recipe, folder: Path) -> list[Row]:
-    """Rows of the recipe's table that meet its conditions.
+    """Return the rows of the recipe's table that meet its conditions.
 
-    Raises RecipeError naming the line and the column of the first cell that cannot be used, a
-    missing column, a table without a row that belongs, and two rows that are one clip.
+    Raises RecipeError, naming line and column, for the first invalid cell, and for a missing
+    column, no matching row, and two rows of the same frames.
     """
     place = data.find(folder, recipe.clips.table)
     cells = opened(place)
@@ -72,17 +73,25 @@ def read(recipe: Recipe, folder: Path) -> list[Row]:
     return rows
 
 
+MOST_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
+"""Limits of a table: a hundred times the size of the largest published families of motions."""
+
+
 def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
     try:
-        text = place.read_bytes().decode("utf-8-sig")
+        text = data.read(place, MOST_BYTES, "a table").decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
     reader = csv.DictReader(io.StringIO(text, newline=None), strict=True)
     try:
-        records = [(reader.line_num, record) for record in reader]
+        _refuse_columns(place, reader.fieldnames or [])
+        records = [(reader.line_num, record) for record in islice(reader, MOST_ROWS)]
+        further = next(reader, None)
     except csv.Error as fault:
         raise RecipeError(str(place), f"not CSV: {fault}", reader.line_num) from fault
-    _refuse_twin_columns(place, reader.fieldnames or [])
+    if further is not None:
+        message = f"found more than {MOST_ROWS} rows, expected at most {MOST_ROWS}"
+        raise RecipeError(str(place), message, reader.line_num)
     for line, record in records:
         if None in record or None in record.values():
             columns = len(reader.fieldnames or [])
@@ -90,36 +99,40 @@ def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
     return records
 
 
-def _refuse_twin_columns(place: Place, names: Sequence[str]) -> None:
+def _refuse_columns(place: Place, names: Sequence[str]) -> None:
+    """Raise RecipeError for too many columns, and for two of one name."""
+    if len(names) > MOST_COLUMNS:
+        message = f"found {len(names)} columns, expected at most {MOST_COLUMNS}"
+        raise RecipeError(str(place), message, 1)
     twins = sorted({name for name in names if names.count(name) > 1})
     if twins:
         raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
 
 
 def opened(place: Place) -> "Table":
-    """Table of a CSV file; RecipeError where it is none."""
-    try:
-        return Table(str(place), _records(place))
-    except OSError as fault:
-        raise RecipeError(str(place), f"cannot be read: {fault.strerror}") from fault
+    """Return the table of a CSV file; RecipeError if it is invalid."""
+    return Table(str(place), _records(place))
 
 
 @dataclass(frozen=True)
 class Table:
-    """Cells by line and column of a file of a name; every fault in them names both."""
+    """Cells of a file by line and column; errors name both."""
 
     name: str
     records: list[tuple[int, dict[str, str]]]
 
     def expect_only(self, columns: Collection[str]) -> None:
-        """Refuse columns besides those that mean something."""
+        """Raise RecipeError for unknown columns."""
         unknown = sorted(set(self.records[0][1]) - set(columns))
         if unknown:
             known = ", ".join(sorted(columns))
             raise RecipeError(self.name, f"columns {unknown}, expected some of {known}", 1)
 
     def require(self, columns: Mapping[str, str]) -> None:
-        """Refuse a table without rows, or without one of some columns; why says what each is."""
+        """Raise RecipeError for a table without rows, or without a required column.
+
+        columns: explanation of each, for the message.
+        """
         if not self.records:
             raise RecipeError(self.name, "no rows below the heading")
         there = self.records[0][1]
@@ -130,9 +143,9 @@ class Table:
                 )
 
     def number(self, line: int, record: dict[str, str], column: str) -> float:
-        """A cell's number."""
+        """Return the number in a cell."""
         try:
-            # Python reads 1_000 as a number; a table that holds it means something else.
+            # float() accepts 1_000, which is not a number in CSV.
             value = float(record[column].replace("_", "?"))
         except ValueError:
             value = math.nan
@@ -142,7 +155,7 @@ class Table:
         return value
 
     def frame(self, line: int, record: dict[str, str], column: str) -> int:
-        """A cell's frame of a file."""
+        """Return the frame index in a cell."""
         value = self.number(line, record, column)
         if value != int(value) or value < 0:
             raise RecipeError(
@@ -151,7 +164,7 @@ class Table:
         return int(value)
 
     def meets(self, line: int, record: dict[str, str], column: str, condition: Condition) -> bool:
-        """Whether a cell meets a condition."""
+        """Return True if a cell meets a condition."""
         cell = record[column]
         if condition.among is not None and cell not in condition.among:
             return False
@@ -209,7 +222,7 @@ def _motion_file(
 
 
 def refuse_repeats(rows: Sequence[Row]) -> None:
-    """Raise RecipeError for two rows that are one clip."""
+    """Raise RecipeError for two rows with the same frames of the same file."""
     seen: dict[tuple[str, int, int | None], Row] = {}
     for row in rows:
         key = (str(row.place), row.first_frame, row.last_frame)

@@ -1,4 +1,7 @@
-"""Aligned clips as a tensor of degrees of freedom × frames × samples, in the metric of bodies."""
+"""Motion tensor of degrees of freedom × frames × samples (Mukai & Kuriyama 2006, section 2).
+
+It is expressed in a metric of joint positions, see `metric`.
+"""
 
 from dataclasses import dataclass
 
@@ -10,17 +13,18 @@ from model_export.chart import Chart
 from model_export.flips import Finding
 from service.motion.conventions import Floats
 
-# A degree of freedom that stays within this all through the family is left out: metres or radians.
+# A degree of freedom with a smaller range over the family is left out, m or rad.
 CONSTANT = 1e-9
 
 
 @dataclass(frozen=True)
 class MotionTensor:
-    """values (D', T, N): centred pose vectors of the D' degrees of freedom that vary, whitened.
+    """Centred, whitened pose vectors of aligned clips.
 
-    A unit of squared distance between two entries is a square metre, summed over the joints by
-    their weights and over the frames. mean (D,): what it is centred on. whiten and unwhiten (D',
-    D) and (D, D') lead there and back. weight: sum of the joints' weights.
+    values: (D', T, N), of the D' degrees of freedom that vary. A unit of squared distance between
+    two entries is a square metre, summed over weighted joints and frames. mean: pose vector (D,) on
+    which it is centred. whiten, unwhiten: maps (D', D) and (D, D') to whitened values and back.
+    weight: sum of the joints' weights.
     """
 
     values: Floats
@@ -31,11 +35,11 @@ class MotionTensor:
     weight: float
 
     def numbers(self, values: Floats) -> Floats:
-        """Pose vectors (B, T, D) of slices (D', T, B) like those of the tensor."""
+        """Return pose vectors (B, T, D) of slices (D', T, B) of the tensor."""
         return self.mean + values.transpose(2, 1, 0) @ self.unwhiten.T
 
     def rms(self, squared: Floats) -> Floats:
-        """Root-mean-square joint distance, m, of squared distances summed over the tensor."""
+        """Return the RMS joint distance, m, of squared distances summed over the tensor."""
         _, frames, samples = self.values.shape
         return np.sqrt(squared / (self.weight * frames * samples))
 
@@ -43,9 +47,9 @@ class MotionTensor:
 def pose_vectors(
     aligned: Aligned, parents: tuple[int, ...], offsets: Floats
 ) -> tuple[Floats, Chart, list[Finding]]:
-    """Pose vectors (N, T, D) of aligned clips, their chart, and the flips and far joints met.
+    """Return pose vectors (N, T, D) of aligned clips, their chart, and flips and far joints.
 
-    offsets (N, J, 3): bone offsets of each clip's performer, m.
+    offsets: bone offsets (N, J, 3) of each clip's performer, m.
     """
     small = flips.small_joints(parents, offsets.mean(axis=0))
     rotations, flipped = flips.without_flips(aligned.rotations, small)
@@ -60,9 +64,9 @@ def build(
     offsets: Floats,
     joint_weights: Floats,
 ) -> MotionTensor:
-    """Tensor of pose vectors (N, T, D) in the metric of their own poses.
+    """Return the tensor of pose vectors (N, T, D) in the metric of their own poses.
 
-    offsets (N, J, 3): bone offsets of each clip's performer, m. joint_weights (J,).
+    offsets: bone offsets (N, J, 3) of each clip's performer, m. joint_weights: (J,).
     """
     mean = numbers.mean(axis=(0, 1))
     varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT
@@ -75,7 +79,7 @@ def build(
 
 
 def _whitened(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
-    """Tensor (D', T, N) of pose vectors (N, T, D), its long axes turned in small blocks."""
+    """Return the tensor (D', T, N) of pose vectors (N, T, D), transposed in small blocks."""
     samples, frames, _ = numbers.shape
     flat = whiten @ numbers.reshape(samples * frames, -1).T
     flat -= (whiten @ mean)[:, None]
@@ -89,7 +93,7 @@ def gram(
     offsets: Floats,
     joint_weights: Floats,
 ) -> Floats:
-    """Gram matrix (D, D) over poses spread evenly through pose vectors (N, T, D)."""
+    """Return the Gram matrix (D, D) over poses spaced evenly through pose vectors (N, T, D)."""
     samples, frames, _ = numbers.shape
     chosen = np.unique(np.linspace(0, samples * frames - 1, metric.POSES).astype(np.int64))
     some = numbers.reshape(samples * frames, -1)[chosen]

@@ -1,8 +1,8 @@
-"""Kriging thinned out for coarser levels of detail.
+"""Kriging with fewer samples for coarser levels of detail.
 
-What the finest level costs at every pose is mostly distances and covariances, which no truncation
-of the tensor saves. A coarser level asks fewer samples, those that say most, of the pose's field
-alone, and has all fields of them by the weights whose answers come nearest to what all fields say.
+At the finest level most of the cost of a pose is in distances and covariances, which truncation of
+the tensor does not reduce. A coarser level uses only the most informative samples and the pose's
+covariance, with weights for all quantities that fit the full models by least squares.
 """
 
 from dataclasses import dataclass, replace
@@ -15,27 +15,28 @@ from model_export.kriging import Kriging
 from service.motion.conventions import Floats, Indices
 
 QUESTIONS = 2_000
-# Weights are fitted somewhat beyond the samples, so that they are held there too.
+# Range of the fit in half-ranges: beyond the samples, so that the weights hold there too.
 BEYOND = 1.25
-# Directions of the basis below this share of the largest would need weights that float32 spoils.
+# Directions of the basis below this share of the largest are dropped: their large weights would
+# lose precision in float32.
 FAINTEST = 1e-5
 
 
 def ordered(bank: FieldBank) -> FieldBank:
-    """The same bank with its samples in the order in which they say most of the pose."""
+    """Return the bank with its samples sorted by how much they explain of the pose."""
     order = spread_order(bank.pose)
     others = {name: _reordered(field, order) for name, field in bank.others.items()}
     return replace(bank, pose=_permuted(bank.pose, order), others=others)
 
 
 def spread_order(pose: Kriging) -> Indices:
-    """Samples (n,) each of which the ones before it say least of (pivoted Cholesky)."""
+    """Return samples (n,), each the least determined by the previous ones (pivoted Cholesky)."""
     left = kriging.covariances(pose.hyper, pose.samples, pose.samples)
     taken: list[int] = []
     for _ in range(len(left)):
         unknown = np.diagonal(left).copy()
         unknown[taken] = -1.0
-        # Rounded, so that ties are not broken by an ulp.
+        # Rounded, so that rounding errors do not break ties.
         chosen = int(np.argmax(np.round(unknown, 9)))
         taken.append(chosen)
         if unknown[chosen] > FAINTEST:
@@ -59,8 +60,10 @@ def _permuted(field: Kriging, order: Indices) -> Kriging:
 
 
 def questions(bank: FieldBank, reach: float, count: int) -> Floats:
-    """Random points (Q, d + p) within so many half-ranges; nobody moves as often as each performer
-    does."""
+    """Return random points (Q, d + p) within `reach` half-ranges.
+
+    No performer is as likely as each of the performers.
+    """
     rng = np.random.Generator(np.random.PCG64(count))
     controls = rng.uniform(-reach, reach, (count, len(bank.low)))
     performers = len(bank.performers)
@@ -70,9 +73,9 @@ def questions(bank: FieldBank, reach: float, count: int) -> Floats:
 
 @dataclass(frozen=True)
 class Lesson:
-    """What a bank's fields say at points beyond its samples, for coarser levels to learn.
+    """Fit data of coarser levels: values of a bank's models at points beyond its samples.
 
-    basis (P, p + 1 + d + m): labels, one, controls and all covariances. said: values (P, m) by
+    basis: labels, one, controls and all covariances (P, p + 1 + d + m). said: values (P, m) by
     name.
     """
 
@@ -81,9 +84,9 @@ class Lesson:
     bank: FieldBank
 
     def weights(self, columns: int, rank: int, error: float) -> Floats:
-        """Weights (p + 1 + d + m, M) of the first m covariances for a pose of so many coefficients.
+        """Return weights (p + 1 + d + m, M) of the first m covariances.
 
-        error: of the level's own, m; its variance counts it in.
+        rank: number of pose coefficients. error: of the level, m, added to its variance.
         """
         own = np.log(self.said[VARIANCE] + error**2 / self.bank.sill)
         values = np.hstack(list({**self.said, VARIANCE: own}.values()))
@@ -94,6 +97,6 @@ class Lesson:
 
 
 def lesson(bank: FieldBank) -> Lesson:
-    """Lesson of a bank of one level."""
+    """Return the fit data of a bank of one level."""
     points = np.vstack([questions(bank, BEYOND, QUESTIONS), bank.pose.samples])
     return Lesson(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)

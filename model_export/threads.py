@@ -1,4 +1,4 @@
-"""Linear algebra on one thread, whatever runs beside it."""
+"""Linear algebra limited to one thread."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,11 +11,11 @@ _TURN = RLock()
 
 @contextmanager
 def one() -> Iterator[None]:
-    """Everything inside is computed on one thread, and by one at a time in this process.
+    """Run the block on one BLAS thread, in one Python thread of this process at a time.
 
-    Matrices as small as ours gain nothing from more threads, and a sum's order would hang on how
-    many the machine has: one thread makes the same bytes everywhere. The limit is the process's:
-    of two who came in together, the first to leave would lift it for the other.
+    Small matrices gain nothing from more threads, and the order of a sum would depend on their
+    number; one thread gives the same bytes on every machine. The limit applies to the whole
+    process, so the lock prevents one block from lifting it for another.
     """
     with _TURN, threadpool_limits(1):
         yield

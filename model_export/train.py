@@ -1,4 +1,7 @@
-"""Examples to a model: align, tensor, HOSVD, kriging."""
+"""Training of a model from examples: alignment, tensor, HOSVD, kriging.
+
+The steps follow Mukai & Kuriyama 2006, section 2.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -43,22 +46,22 @@ from service.motion.conventions import Floats
 from service.motion.skeleton import Skeleton
 
 Report = Callable[[str], None]
-"""Is told what is being done, in a few words."""
+"""Callback for progress messages."""
 
 
 @dataclass(frozen=True)
 class Trained:
-    """A model with what it was made from and what was seen on the way.
+    """A trained model with its training data and diagnostics.
 
-    examples: in an order of their own, so that the model does not depend on the table's. laid:
-    where they lie. pose: the tuned pose field. values: what each field is laid through (N, m), the
-    pose's whole motions in the coordinates of the sample mode. missed (N,): mean squared joint
-    distance, m², of each clip from what all others predict for it. explained: for each field the
-    share of the variation between clips that leave-one-out predicts from the controls; one that is
-    not surely above zero is answered with its mean. residuals: of each field but the pose, left
-    out (N, m). fidelity: what the truncation costs. joints (J,): how far each joint of a clip left
-    out lies from what all others predict, as a share of the root mean square of all. strangers:
-    what speaks against clips that do not seem to belong.
+    examples: sorted by their content, so that the model does not depend on the order of the table.
+    laid: sample points. pose: tuned kriging model of the pose. values: sample values (N, m) of each
+    quantity, the pose's full motions in the coordinates of the sample mode. missed: mean squared
+    joint distance (N,), m², of each clip from its leave-one-out prediction. explained: share of the
+    variation between clips that leave-one-out predicts from the controls, by quantity; without a
+    significant gain the quantity is constant. residuals: leave-one-out residuals (N, m) of each
+    quantity but the pose. fidelity: truncation errors. joints: leave-one-out error (J,) of each
+    joint as a share of the root mean square of all. strangers: evidence against clips that do not
+    fit.
     """
 
     model: Model
@@ -81,10 +84,10 @@ class Trained:
 
 @dataclass(frozen=True)
 class _Moved:
-    """Aligned clips as pose vectors (N, T, D), with their bone offsets (N, J, 3), m, and where they
-    lie among the controls and performers.
+    """Aligned clips as pose vectors.
 
-    travels (N, 3) are a cycle's, and empty else.
+    numbers: (N, T, D). offsets: bone offsets (N, J, 3), m. laid: their sample points. travels: (N,
+    3) of cycles, otherwise empty.
     """
 
     laid: Samples
@@ -98,9 +101,10 @@ class _Moved:
 
 
 def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Trained:
-    """Model of a recipe's examples.
+    """Return a model of a recipe's examples.
 
-    Raises TrainingError where the samples cannot carry a field.
+    report: called with a description of each step. Raises TrainingError if the samples do not
+    determine a kriging model.
     """
     with threads.one():
         return _train(recipe, examples, report)
@@ -125,7 +129,7 @@ def _train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Train
 
 
 def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
-    """By controls, and repeated trials by their duration and pace."""
+    """Sort examples by controls, and repeated trials by duration and travel."""
 
     def key(example: Example) -> tuple[float, ...]:
         return (*example.controls, example.clip.duration, *example.clip.root_path[-1])
@@ -134,7 +138,7 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
 
 
 def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
-    """Clips aligned and written as pose vectors."""
+    """Align clips and convert them to pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
     laid, performers = samples.lay(recipe, examples)
     predict = _predictor(recipe, laid)
@@ -151,7 +155,7 @@ def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Move
 
 
 def _predictor(recipe: Recipe, laid: Samples) -> align.Predict:
-    """What the other clips predict for each, by a field of its own parameters."""
+    """Return a function that predicts each clip from the others by a tuned kriging model."""
 
     def predict(values: Floats) -> Floats:
         covariance = recipe.kriging.covariances[0]
@@ -165,8 +169,10 @@ def _predictor(recipe: Recipe, laid: Samples) -> align.Predict:
 
 @dataclass(frozen=True)
 class _Fits:
-    """Every field at its own parameters: what it is laid through (N, m), and what it misses (N,) of
-    the poses, m²."""
+    """Tuned models of all quantities.
+
+    values: sample values (N, m) by name. missed: mean squared leave-one-out distance (N,), m².
+    """
 
     proportions: Proportions
     values: dict[str, Floats]
@@ -196,7 +202,7 @@ def _model(
     fits: _Fits,
     reduced: Multilinear,
 ) -> Model:
-    """The stages that the fields feed, of controls (N, d)."""
+    """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
     solved = kriging.solve(fits.pose.hyper, moved.laid.points, reduced.bases[2])
     others = {name: found.field for name, found in fits.beside.items()}
     ends = controls.min(axis=0), controls.max(axis=0)
@@ -217,7 +223,7 @@ def _fit(
     own_tensor: MotionTensor,
     full: Multilinear,
 ) -> Trained:
-    """Fields, the ranks that keep the budgets, and the model of both."""
+    """Fit the coefficient models, choose the ranks within the budgets, and assemble the model."""
     fits = _fits(recipe, moved, own_tensor, full)
     controls = np.stack([example.controls for example in examples])
     judge = fidelity.judge(recipe, examples, own_tensor)
@@ -245,7 +251,7 @@ def _fit(
 
 
 def _missed(own_tensor: MotionTensor, pose: Tuned, fitted: dict[str, Fitted]) -> Floats:
-    """Mean squared joint distance (N,), m², of each clip from what the others predict."""
+    """Return leave-one-out mean squared joint distances (N,), m², of all clips."""
     frames = own_tensor.values.shape[1]
     missed = np.sum(np.square(pose.residuals), axis=1) / (own_tensor.weight * frames)
     if "travel" in fitted:
@@ -254,7 +260,7 @@ def _missed(own_tensor: MotionTensor, pose: Tuned, fitted: dict[str, Fitted]) ->
 
 
 def _mean_skeleton(examples: Sequence[Example], offsets: Floats) -> Skeleton:
-    """The family's joints with mean bone offsets, the root at its mean height at rest."""
+    """Return the family's joints with mean bone offsets, the root at its mean height at rest."""
     first = examples[0].clip.skeleton
     rest = offsets.mean(axis=0)
     rest[0] = np.mean([example.clip.skeleton.offsets[0] for example in examples], axis=0)

@@ -1,8 +1,8 @@
-"""What a cycle does not come back to: where the root has got to, and where it heads.
+"""Travel of a cycle: displacement and change of heading from its first to its last frame.
 
-The last pose of a cycle leads into the first. Taken out of the root, evenly over the cycle, travel
-leaves a tensor whose last frame is its first, and so it is after any truncation: a synthesised
-cycle closes exactly. Travel is kriged beside it and put back at the end.
+The last pose of a cycle leads into the first. Travel is removed from the root evenly over the
+cycle, so the first and last frame of the tensor are equal, also after truncation, and a synthesized
+cycle closes exactly. Travel has its own kriging model and is added back at the end.
 """
 
 from dataclasses import dataclass, replace
@@ -22,14 +22,14 @@ END = 2**31 - 1
 
 
 def take_out(aligned: Aligned) -> tuple[Aligned, Floats]:
-    """Clips (N) that return to where they began, and how far each got (N, 3).
+    """Return clips (N) with their travel removed, and the travel (N, 3).
 
-    Travel is the way to the left, the way forward, m, and the change of heading, rad.
+    Its components are left and forward, m, and the change of heading, rad.
     """
     travel = measured.travel(aligned.rotations[:, :, 0], aligned.root_path)
     share = np.linspace(0.0, 1.0, aligned.rotations.shape[1])
     rotations, root_path = put_back(aligned.rotations, aligned.root_path, -travel, share)
-    # All else was closed before alignment: what is left is rounding.
+    # The cycles were closed before alignment; remove the rounding error.
     rotations[:, -1], root_path[:, -1] = rotations[:, 0], root_path[:, 0]
     return replace(aligned, rotations=rotations, root_path=root_path), travel
 
@@ -37,35 +37,34 @@ def take_out(aligned: Aligned) -> tuple[Aligned, Floats]:
 def put_back(
     rotations: Floats, root_path: Floats, travel: Floats, share: Floats
 ) -> tuple[Floats, Floats]:
-    """Rotations (B, S, J, 4) and root path (B, S, 3) that go their way (B, 3).
+    """Return rotations (B, S, J, 4) and root path (B, S, 3) with travel (B, 3) added.
 
-    share (..., S): how much of the way each frame has behind it.
+    share: (..., S), share of the travel completed at each frame.
     """
     return travelling.put_back(rotations, root_path, share[..., None] * travel[:, None])
 
 
 def spread(residuals: Floats) -> Floats:
-    """Mean squared distance (N,), m², that errors of travel (N, 3) put all joints at.
+    """Return the mean squared distance (N,), m², of all joints due to travel errors (N, 3).
 
-    An error grows evenly from nothing: its square is a third of its end's on average. That of the
-    heading turns the body about the root, which moves its joints by far less, and is left out.
+    The error grows linearly from zero, so its mean square is a third of the square at the end.
+    Errors of the heading move the joints by far less and are ignored.
     """
     return np.sum(np.square(residuals[:, :2]), axis=1) / 3.0
 
 
 @dataclass(frozen=True)
 class Travel:
-    """Travel of a cycle of so many canonical frames."""
+    """Travel of a cycle. frames: number of canonical frames."""
 
     frames: int
 
     def numpy(
         self, rotations: Floats, root: Floats, travel: Floats, place: Floats
     ) -> tuple[Floats, Floats, Floats]:
-        """Rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) put back, and how
-        much of it (B, S, 3) that is.
+        """Return rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) added.
 
-        place (B, S): canonical frames.
+        The third value is the travel completed (B, S, 3). place: canonical frames (B, S).
         """
         share = place / (self.frames - 1)
         return *put_back(rotations, root, travel, share), share[..., None] * travel[:, None]
@@ -73,7 +72,7 @@ class Travel:
     def onnx(
         self, net: Net, rotations: str, root: str, travel: str, place: str
     ) -> tuple[str, str, str]:
-        """The same in a graph; canonical frames are (B, S, 1) there."""
+        """Build `numpy` in a graph; canonical frames are (B, S, 1)."""
         share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
         gone = net("Mul", share, net("Unsqueeze", travel, net.indices(1)))
         axes = np.vstack([np.eye(3)[[0, 2]], np.zeros(3)])

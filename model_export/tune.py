@@ -1,4 +1,4 @@
-"""Scales and nugget of a field by leave-one-out, in closed form."""
+"""Tuning of scales and nugget of a kriging model by closed-form leave-one-out."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -7,30 +7,31 @@ import numpy as np
 from scipy.optimize import minimize
 
 from model_export import kriging, variogram
-from model_export.kriging import Hyper
+from model_export.kriging import Hyper, LeaveOneOut
 from model_export.samples import Samples
+from model_export.variogram import Experimental
 from service.motion.conventions import Floats
 
-# In half-ranges of a control. A scale at the lower bound means "linear in this control"; beyond
-# the bounds float32 would no longer tell the samples apart.
+# Bounds of scales, per half-range of a control. The lower bound means "linear in this control"; in
+# float32 samples would coincide beyond the bounds.
 SCALES = (0.15, 3.0)
-# As a share of the sill. Real trials differ so much that a nugget of several sills can be right.
+# Bounds of the nugget, as a share of the sill. Repeated trials can differ by several sills.
 NUGGETS = (1e-4, 10.0)
-# From performers who move alike to performers who say nothing of each other.
+# Bounds of label distances: from similar performers to independent ones.
 LABELS = (0.05, 4.0)
 DESCENTS = 2
 STEP = 0.7
-# A simplex this small in the logarithms, of losses this alike, is at its end.
+# Stopping criteria: size of the simplex in logarithms, relative difference of losses, evaluations.
 CLOSE, EVEN, MOST = 1e-2, 1e-5, 400
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """A chosen field: residuals (n, m) of its leave-one-out, their share of the mean's, its sill.
+    """A tuned kriging model.
 
-    unexplained: squared residuals over those of leaving the controls out and taking the mean of
-    the others; at one or above the controls explain nothing. variances (n,): of the residuals, as
-    shares of the sill. sill: of the sum over values.
+    residuals: leave-one-out residuals (n, m). unexplained: their squared sum relative to that of
+    the mean of the other samples; at one or above the controls explain nothing. variances: of the
+    residuals (n,), as shares of the sill. sill: of the sum over values.
     """
 
     hyper: Hyper
@@ -40,20 +41,22 @@ class Tuned:
     sill: float
 
 
-def first_guess(samples: Floats, values: Floats, covariance: str, drifts: tuple[int, ...]) -> Hyper:
-    """Isotropic field from the fit of the experimental variogram, within the bounds.
+def first_guess(
+    experimental: Experimental, controls: int, covariance: str, drifts: tuple[int, ...]
+) -> Hyper:
+    """Return parameters of the isotropic variogram fit, within the bounds.
 
-    samples (n, d): the controls alone.
+    experimental: variogram of the residuals from the highest degree in `drifts`. controls:
+    their number.
     """
-    left = variogram.residuals(samples, values, max(drifts))
-    fit = variogram.fit(variogram.experimental(samples, left), covariance)
+    fit = variogram.fit(experimental, covariance)
     share = fit.nugget / fit.sill if fit.sill > 0 else NUGGETS[1]
-    scales = np.full(samples.shape[1], np.clip(1.0 / fit.range, *SCALES))
-    return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGETS)))
+    scales = np.full(controls, np.clip(1.0 / fit.range, *SCALES))
+    return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGETS)), 0.0)
 
 
 def fixed(hyper: Hyper, samples: Samples, values: Floats) -> Tuned:
-    """Field of given parameters with its leave-one-out residuals."""
+    """Return the model of given parameters with its leave-one-out residuals."""
     left_out = kriging.leave_out(hyper, samples.points, samples.groups)
     variances = kriging.left_out_variances(hyper, samples.points, left_out)
     residuals, from_mean = left_out @ values, samples.from_mean(values)
@@ -68,12 +71,11 @@ def fixed(hyper: Hyper, samples: Samples, values: Floats) -> Tuned:
 
 
 def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -> Tuned:
-    """Field with the scales, the label's distance where there is one, and the nugget where none
-    is given, of least squared residuals.
+    """Return the model with scales, label distance and nugget that minimize the squared residuals.
 
-    values (n, m) in a metric of their own. Nelder and Mead's simplex descends from the best of the
-    guess and a coarse grid: there are ridges between a smooth field and one in which every sample
-    stands alone.
+    values: (n, m), in a Euclidean metric. nugget: fixed value; None to tune it. Nelder and Mead's
+    simplex starts from the best points of the guess and a coarse grid, because the loss has several
+    minima, between a smooth model and one of independent samples.
     """
     d, labelled = samples.controls, samples.labelled
     bounds = [SCALES] * d + [LABELS] * labelled + [NUGGETS]
@@ -90,9 +92,10 @@ def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -
 
     # The residuals depend on the values only through their inner products.
     products = values @ values.T
+    leave_one_out = LeaveOneOut(samples.points, samples.controls, samples.groups)
 
     def loss(x: Floats) -> float:
-        left_out = kriging.leave_out(read(x), samples.points, samples.groups)
+        left_out = leave_one_out.matrix(read(x))
         return float(np.sum((left_out @ products) * left_out))
 
     starts = [np.clip(x, low, high) for x in _starts(guess, labelled)]
@@ -101,7 +104,7 @@ def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -
 
 
 def _starts(guess: Hyper, labelled: bool) -> list[Floats]:
-    """Logarithms of scales, label and nugget: the variogram's guess and an isotropic grid."""
+    """Return logarithms of scales, label and nugget: the guess and an isotropic grid."""
     even = np.ones_like(guess.scales)
     pairs = [(guess.scales, guess.nugget)]
     pairs += [(s * even, n) for s in (0.2, 0.5, 1.2) for n in (0.02, 0.3, 2.0)]
@@ -112,8 +115,8 @@ def _starts(guess: Hyper, labelled: bool) -> list[Floats]:
 def _descend(
     loss: Callable[[Floats], float], start: Floats, low: Floats, high: Floats
 ) -> tuple[float, list[float]]:
-    """Least loss found from a start within bounds, and where."""
-    # Steps of a factor of about two: SciPy's own simplex would be a point where a logarithm is 0.
+    """Return the least loss found from a start within bounds, and its location."""
+    # Steps of a factor of two: SciPy's default simplex is degenerate if a logarithm is near zero.
     inward = np.where(start + STEP > high, -STEP, STEP)
     simplex = np.vstack([start, start + np.diag(inward)])
     found = minimize(

@@ -1,8 +1,9 @@
-"""The experimental variogram of reduced motions and its fit: diagnostic and first guess.
+"""Experimental variogram of reduced motions and its fit, for diagnosis and as a first guess.
 
-The dissimilarity of two motions is the distance between their slices of the core tensor, which
-equals that of their rows z of the sample basis scaled by the singular values. With a drift it is
-taken on what least squares leaves over: a trend in the data would otherwise pass for range.
+The dissimilarity of two motions is the distance between their slices of the core tensor (Mukai &
+Kuriyama 2006, section 2), which equals that of their rows of the sample basis scaled by the
+singular values. With a drift it is computed on least-squares residuals, because a trend in the data
+would be mistaken for a long range.
 """
 
 from dataclasses import dataclass
@@ -12,13 +13,15 @@ from scipy.optimize import least_squares
 
 from model_export import kriging
 from model_export.covariance import COVARIANCES
-from service.motion.conventions import Floats
+from service.motion.conventions import Floats, Indices
 
 LAGS = 15
-# Lags go up to this share of the largest distance, where pairs are still many.
+# Largest lag as a share of the largest distance; farther pairs are few.
 FAR = 0.7
 FEWEST_PAIRS = 3
 RANGES = np.geomspace(0.2, 8.0, 40)
+# Numbers per batch of pairs: half a megabyte.
+CACHED = 65_536
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Experimental:
 
 @dataclass(frozen=True)
 class Fit:
-    """nugget, sill (of what rises above the nugget) and practical range of an isotropic model."""
+    """Isotropic variogram model: nugget, partial sill above the nugget, and practical range."""
 
     nugget: float
     sill: float
@@ -40,14 +43,19 @@ class Fit:
 
 
 def residuals(samples: Floats, values: Floats, drift: int) -> Floats:
-    """What the drift leaves of values (n, m) at samples (n, d) by ordinary least squares."""
+    """Return the residuals of values (n, m) at samples (n, d) after least squares on the drift."""
     functions = kriging.drift(samples, samples.shape[1], drift)
     coefficients, *_ = np.linalg.lstsq(functions, values, rcond=None)
     return values - functions @ coefficients
 
 
-def lags(samples: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Pairs of samples (n, d) by lag: indices of both, their distances, and their lag."""
+def of_residuals(samples: Floats, values: Floats, drift: int) -> Experimental:
+    """Return the experimental variogram of the residuals of values (n, m) from a drift."""
+    return experimental(samples, residuals(samples, values, drift))
+
+
+def lags(samples: Floats) -> tuple[Indices, Indices, Floats, Indices]:
+    """Return pairs of samples (n, d) by lag: indices of both, their distances, and their lag."""
     first, second = np.triu_indices(len(samples), k=1)
     distances = np.linalg.norm(samples[first] - samples[second], axis=1)
     edges = np.linspace(0.0, FAR * distances.max(), LAGS + 1)
@@ -57,9 +65,9 @@ def lags(samples: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def experimental(samples: Floats, values: Floats) -> Experimental:
-    """Matheron's estimator over lags with enough pairs."""
+    """Return Matheron's estimate over lags with enough pairs."""
     first, second, distances, lag = lags(samples)
-    halves = 0.5 * np.sum(np.square(values[first] - values[second]), axis=1)
+    halves = 0.5 * _squared_distances(values, first, second)
     pairs = np.bincount(lag, minlength=LAGS)
     enough = pairs >= FEWEST_PAIRS
     return Experimental(
@@ -69,11 +77,26 @@ def experimental(samples: Floats, values: Floats) -> Experimental:
     )
 
 
-def fit(experimental: Experimental, covariance: str) -> Fit:
-    """Weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
+def _squared_distances(values: Floats, first: Indices, second: Indices) -> Floats:
+    """Return the squared distances (P,) of pairs of rows of values (n, m).
 
-    Nugget and sill enter linearly, so that for each range they are solved for and not searched.
-    Where no lag has pairs enough, as with a control of two values, nothing is known: no sill.
+    Pairs are taken in batches that stay in the processor's cache: the differences of all pairs
+    would take as much memory as n / 2 copies of the values.
+    """
+    squared = np.empty(len(first))
+    step = max(1, CACHED // values.shape[1])
+    for start in range(0, len(first), step):
+        batch = slice(start, start + step)
+        gaps = values[first[batch]] - values[second[batch]]
+        np.sum(np.square(gaps, out=gaps), axis=1, out=squared[batch])
+    return squared
+
+
+def fit(experimental: Experimental, covariance: str) -> Fit:
+    """Fit by weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
+
+    Nugget and sill enter linearly and are solved for at each range. If no lag has enough pairs, as
+    for a control of two values, the sill is zero.
     """
     if not len(experimental.pairs):
         return Fit(0.0, 0.0, float(RANGES[-1]))
@@ -87,7 +110,7 @@ def fit(experimental: Experimental, covariance: str) -> Fit:
 
 
 def _lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Intercepts and slopes (R,), none below zero, of values (L,) over rising (R, L)."""
+    """Return intercepts and slopes (R,), not negative, of values (L,) over rising (R, L)."""
     mean_x, mean_y = rising @ weights / weights.sum(), values @ weights / weights.sum()
     spread = (rising - mean_x[:, None]) ** 2 @ weights
     slopes = ((rising - mean_x[:, None]) * (values - mean_y)) @ weights / np.maximum(spread, 1e-30)
@@ -99,9 +122,9 @@ def _lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Flo
 
 
 def fit_by_search(experimental: Experimental, covariance: str) -> Fit:
-    """The same least squares by a general solver over nugget, sill and range at once.
+    """Fit nugget, sill and range together by a general least-squares solver.
 
-    It is how such fits are commonly made, and what the naive method is timed with.
+    This is the common method; the naive baseline is timed with it.
     """
     top, far = float(experimental.values.max()), float(experimental.distances.max())
     roots = np.sqrt(experimental.pairs) / np.maximum(experimental.values, 1e-30)

@@ -1,4 +1,4 @@
-"""The training job's commands: `sample`, `train`, `adapt` and `evaluate`."""
+"""Training commands: `sample`, `train`, `adapt` and `evaluate`."""
 
 import typer
 
@@ -6,7 +6,7 @@ from model_export.cli import adapting, evaluating, sampling, training
 
 
 def commands(app: typer.Typer) -> None:
-    """Add the training job's commands to the one command line."""
+    """Add the training commands to an application."""
     app.command("sample")(sampling.sample)
     app.command("train")(training.train_command)
     app.command("adapt")(adapting.adapt)

@@ -1,4 +1,4 @@
-"""`posefield adapt`: a new performer for a model that is there."""
+"""Command `posefield adapt`: a new performer for an existing model."""
 
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,4 +1,4 @@
-"""`posefield evaluate`: how far a recipe's models lie from motions that they have not seen."""
+"""Command `posefield evaluate`: errors of a recipe's models on held-out motions."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,7 +9,6 @@ import typer
 
 from model_export.cli import outputs, places
 from model_export.cli.places import Scheduler
-from model_export.cli.progress import bar
 from service.cli.answers import as_json
 from service.motion import files
 from service.motion.errors import InvalidField
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Protocol(StrEnum):
-    """Ways to ask how good a model is."""
+    """Evaluation protocols."""
 
     CLIP = "clip"
     PERFORMER = "performer"
@@ -31,15 +30,13 @@ class Protocol(StrEnum):
 
 
 def evaluate(
-    recipe_file: Annotated[
-        Path | None, typer.Argument(help="a TOML file", metavar="RECIPE", show_default=False)
-    ] = None,
+    recipe_file: Annotated[Path, typer.Argument(help="a TOML file", metavar="RECIPE")],
     data: Annotated[
-        Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
+        Path | None, typer.Option(help="folder of the motion data; default: the recipe's")
     ] = None,
     protocol: Annotated[
         list[Protocol] | None,
-        typer.Option(help="hold out clips, or performers, or compare with the truth; all that can"),
+        typer.Option(help="hold out clips or performers, or compare with the truth; default: all"),
     ] = None,
     report: Annotated[Path | None, typer.Option(help="the .html file to write")] = None,
     json_file: Annotated[
@@ -47,44 +44,28 @@ def evaluate(
     ] = None,
     joined: Annotated[
         Path | None,
-        typer.Option(help="another recipe: is the gap between both flagged?", metavar="RECIPE"),
+        typer.Option(
+            help="another recipe: share of the gap between both that is flagged", metavar="RECIPE"
+        ),
     ] = None,
     learning: Annotated[
-        bool, typer.Option(help="what suggested clips are worth, on the procedural family")
+        bool, typer.Option(help="compare suggested with random captures, on the procedural family")
     ] = False,
-    table1: Annotated[bool, typer.Option(help="Table 1 of the paper, measured again")] = False,
     scheduler: Scheduler = None,
 ) -> None:
-    """Measure how far a recipe's models lie from motions they have not seen, beside other methods.
+    """Measure the error of a recipe's models on unseen motions, beside other methods.
 
-    Everything is fitted anew without what is held out.
+    Everything is fitted again without the clips that are held out.
     """
     outputs.expect_html(report)
-    if table1 and scheduler:
-        raise InvalidField("scheduler", "Table 1 is timed on one machine, expected none")
-    if table1:
-        _table1(json_file)
-    elif recipe_file is None:
-        raise InvalidField("RECIPE", "missing: expected a recipe, or --table1")
-    else:
-        asked = [one.value for one in protocol or []]
-        wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
-        _evaluate(recipe_file, data or recipe_file.parent, wanted)
-
-
-def _table1(json_file: Path | None) -> None:
-    from model_export.evaluate import table1
-
-    found = table1.measure()
-    if json_file:
-        files.write(as_json(table1.facts(found)).encode(), json_file)
-    typer.echo(table1.text(found))
+    asked = [one.value for one in protocol or []]
+    wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
+    _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Protocols, all that can for none, what to write, where to work, the recipe of a family that
-    is joined to this one, and whether suggested clips are tried out."""
+    """Options of the command. protocols: empty for all that the recipe allows."""
 
     protocols: list[str]
     report: Path | None
@@ -96,7 +77,7 @@ class _Wanted:
 
 @dataclass(frozen=True)
 class _Family:
-    """A recipe and what it was read to."""
+    """A recipe and its examples."""
 
     recipe: "Recipe"
     examples: "list[Example]"
@@ -105,24 +86,24 @@ class _Family:
 def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     from model_export.evaluate import summary
 
-    # What cannot be done is refused before minutes of work.
+    # Errors in the arguments are reported before minutes of work.
     own = _family(recipe_file, data, wanted)
     other = _joined(own, data, wanted)
     results = _protocols(own, wanted)
-    typer.echo(f"{summary.LEGEND}\n{summary.definitions(results)}")
+    typer.echo(summary.legend(results))
     curve = _learning(wanted)
     more = _beside(own, other, results, curve)
     first, *others = map(summary.facts, results)
     if wanted.json_file:
         files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
     if wanted.report:
-        from model_export.evaluate import render
+        from model_export.evaluate import evaluation_page
 
-        files.write(render.html(own.recipe.description, results, curve), wanted.report)
+        files.write(evaluation_page.html(own.recipe.description, results, curve), wanted.report)
 
 
 def _family(recipe_file: Path, data: Path, wanted: _Wanted) -> _Family:
-    """A recipe's family; InvalidField for what it cannot be asked."""
+    """Read a recipe's family. Raises InvalidField for options that it does not allow."""
     from model_export import ingest, recipe
     from model_export.evaluate import protocol
 
@@ -139,14 +120,14 @@ def _family(recipe_file: Path, data: Path, wanted: _Wanted) -> _Family:
 
 @dataclass(frozen=True)
 class _Joined:
-    """Name of a family joined to the evaluated one, and what is flagged between both."""
+    """Name of a joined family, and the support flags of both families together."""
 
     name: str
     flags: "Flags"
 
 
 def _joined(own: _Family, data: Path, wanted: _Wanted) -> _Joined | None:
-    """None where no other family is named."""
+    """Return None if no other family is named."""
     from model_export import ingest, recipe
     from model_export.evaluate import flags
 
@@ -158,36 +139,36 @@ def _joined(own: _Family, data: Path, wanted: _Wanted) -> _Joined | None:
 
 
 def _protocols(own: _Family, wanted: _Wanted) -> "list[Result]":
-    """What the protocols found, each told as soon as it is done."""
-    from model_export.evaluate import protocol, reach, summary, worth
+    """Run the protocols and print each result when it is complete."""
+    from model_export.evaluate import corrections, protocol, summary
+    from service.cli.progress import Bar
 
     can = protocol.protocols(own.recipe, own.examples)
     results = []
-    with places.jobs(wanted.scheduler, [own.examples]):
+    with places.jobs(wanted.scheduler) as jobs:
         for name in wanted.protocols or can:
-            with bar(name) as progress:
-                results.append(protocol.run(own.recipe, own.examples, name, progress))
-            trust = "\n".join(summary.trust_said(results[-1]))
+            with Bar(name) as bar:
+                results.append(protocol.run(own.recipe, own.examples, name, jobs, bar.update))
+            trust = "\n".join(summary.trust_text(results[-1]))
             typer.echo(f"{summary.table(results[-1])}\n\n{trust}\n")
             if results[-1].corrections:
-                typer.echo(f"{reach.table(results[-1])}\n")
-    for said in worth.said(results):
-        typer.echo(said)
+                typer.echo(f"{corrections.table(results[-1])}\n")
+    for text in summary.performer_text(results):
+        typer.echo(text)
     return results
 
 
 def _beside(
     own: _Family, other: _Joined | None, results: "list[Result]", curve: "Learning | None"
 ) -> dict[str, Any]:
-    """What else was measured: of a joined family, of performers, and of suggested clips."""
-    from model_export.evaluate import learning, summary, worth
+    """Print and return the results for a joined family, for performers and for suggested clips."""
+    from model_export.evaluate import learning, summary
 
     more: dict[str, Any] = {}
     if other:
-        said = summary.flags_said(other.flags)
-        typer.echo(f"\n{own.recipe.name} and {other.name} joined, {said}")
-        more["joined"] = {"family": other.name, "support": summary.flags_facts(other.flags)}
-    if named := worth.facts(results):
+        typer.echo(f"\n{own.recipe.name} and {other.name} joined, {other.flags.text()}")
+        more["joined"] = {"family": other.name, "support": other.flags.facts()}
+    if named := summary.performer_facts(results):
         more["performers"] = named
     if curve:
         more["learning"] = learning.facts(curve)
@@ -196,10 +177,11 @@ def _beside(
 
 
 def _learning(wanted: _Wanted) -> "Learning | None":
-    """What suggested clips are worth; none where nobody asks."""
+    """Measure the learning curves; None if they are not wanted."""
     from model_export.evaluate import learning
+    from service.cli.progress import Bar
 
     if not wanted.learning:
         return None
-    with places.jobs(wanted.scheduler), bar("learning") as progress:
-        return learning.measure(progress)
+    with places.jobs(wanted.scheduler) as jobs, Bar("learning") as bar:
+        return learning.measure(jobs, bar.update)

@@ -1,4 +1,4 @@
-"""The model files and reports that commands write: how they are named, and what is told of them."""
+"""Output files of commands: their names, and the summary that is printed."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,24 +11,24 @@ if TYPE_CHECKING:
 
 
 def expect_onnx(output: Path) -> None:
-    """InvalidField for a model file of another ending."""
+    """Raise InvalidField for a model file without the suffix .onnx."""
     if output.suffix != ".onnx":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .onnx")
 
 
 def expect_html(report: Path | None) -> None:
-    """InvalidField for a report of another ending."""
+    """Raise InvalidField for a report without the suffix .html."""
     if report and report.suffix != ".html":
         raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
 
 
 def wrote(exported: "Exported", output: Path, json: bool) -> str:
-    """What to tell of a model that was written."""
+    """Return the output of a command that wrote a model, as JSON or text."""
     return as_json(facts(exported, output)) if json else summary(exported, output)
 
 
 def facts(exported: "Exported", output: Path) -> dict[str, Any]:
-    """What a model that was written is, as plain values."""
+    """Return the summary of a written model as JSON values."""
     card = exported.card
     return {
         "file": str(output),
@@ -40,7 +40,7 @@ def facts(exported: "Exported", output: Path) -> dict[str, Any]:
 
 
 def summary(exported: "Exported", output: Path) -> str:
-    """A model that was written in words."""
+    """Return the summary of a written model as text."""
     found = facts(exported, output)
     notes = [f"note: {note}" for note in found["notes"]]
     return "\n".join(

@@ -1,13 +1,15 @@
-"""Where the work of a command is done: in processes here, or on a cluster."""
+"""Executors of a command's jobs: processes of this machine, or a cluster."""
 
-from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.motion.errors import InvalidField
+
+if TYPE_CHECKING:
+    from model_export.jobs import Jobs
 
 Scheduler = Annotated[
     str | None,
@@ -20,7 +22,11 @@ Scheduler = Annotated[
 
 @dataclass(frozen=True)
 class Place:
-    """Where several are trained: in so many processes here, or on a cluster."""
+    """Executor of the training of several models.
+
+    jobs: number of processes; None for one per core. scheduler: address of a cluster's scheduler;
+    None for this machine.
+    """
 
     jobs: int | None
     scheduler: str | None
@@ -30,10 +36,15 @@ class Place:
             raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
 
 
-def jobs(scheduler: str | None, shared: Sequence[Any] = ()) -> AbstractContextManager[None]:
-    """Inside, jobs run on a cluster, or here where none is named."""
+def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextManager[Jobs]":
+    """Open an executor of jobs: a cluster, or processes of this machine if scheduler is None.
+
+    count: number of processes; None for one per core.
+    """
     if scheduler is None:
-        return nullcontext()
+        from model_export.jobs import Processes
+
+        return nullcontext(Processes(count))
     from model_export import cluster
 
-    return cluster.jobs(scheduler, shared)
+    return cluster.connect(scheduler)

@@ -1,4 +1,4 @@
-"""`posefield sample`: motions that a formula makes."""
+"""Command `posefield sample`: procedural motions."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from service.cli.answers import as_json, wrote
-from service.cli.arguments import Controls, Json, encoder, numbers
+from service.cli.arguments import Json, encoder
+from service.cli.options import Controls, numbers
 from service.motion import files
 from service.motion.answer import ClipAnswer, Trust
 from service.motion.errors import InvalidField

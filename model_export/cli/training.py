@@ -1,4 +1,4 @@
-"""`posefield train`: a recipe to a model, or several."""
+"""Command `posefield train`: one or several recipes to models."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -49,7 +49,7 @@ def train_command(
 def _train(
     recipe_file: Path, data: Path | None, output: Path, report: Path | None, json: bool
 ) -> None:
-    # SciPy and onnx take a second to import, which every other command would wait for.
+    # SciPy and onnx take a second to import, and other commands do not need them.
     from model_export import export, ingest, recipe, train
 
     outputs.expect_onnx(output)
@@ -70,15 +70,16 @@ def _train(
 def _write_report(
     recipe: "Recipe", trained: "Trained", exported: "Exported", progress: Progress, path: Path
 ) -> None:
-    # Nobody who wants no pictures waits for matplotlib, or needs it.
-    from model_export.report import detail, render
-    from model_export.report.about import Step
+    # matplotlib takes a second to import, and only the report needs it.
+    from model_export.report import levels_of_detail, training_report
+    from model_export.report.provenance import Step
 
     progress("measuring levels of detail")
-    ladder = detail.of(recipe, trained, exported)
+    others = levels_of_detail.alternatives(recipe, trained, exported.card)
+    levels = levels_of_detail.of(exported, others)
     progress("drawing the report")
     steps = [Step(name, seconds) for name, seconds in progress.finished]
-    rendered = render.render(trained, exported, ladder, steps)
+    rendered = training_report.render(trained, exported, levels, steps)
     files.write(rendered.html, path)
     files.write(rendered.json, path.with_suffix(".json"))
 
@@ -91,8 +92,8 @@ def _sweep(
     if folder.suffix == ".onnx":
         raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
     found, failed = [], []
-    with places.jobs(place.scheduler):
-        for made in sweep.models(recipe_files, data, place.jobs):
+    with places.jobs(place.scheduler, place.jobs) as jobs:
+        for made in sweep.models(recipe_files, data, jobs):
             if isinstance(made.found, TrainingError):
                 failed.append(made.name)
                 typer.echo(f"{made.name}: {made.found}", err=True)

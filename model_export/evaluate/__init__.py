@@ -1,1 +1,1 @@
-"""How far a model's motions lie from captured ones that it has not seen, beside its peers'."""
+"""Evaluation of models on motions that they have not seen, beside other methods."""

@@ -1,4 +1,4 @@
-"""How far one motion lies from another: numbers of one clip, in metres, and their means."""
+"""Errors of a synthesised motion against a captured one, and their means over clips."""
 
 import math
 from collections.abc import Sequence
@@ -14,8 +14,10 @@ from service.motion.conventions import Floats
 
 @dataclass(frozen=True)
 class Distances:
-    """Distances over joints and frames, m: mean, root mean square, 95th and 99th percentile,
-    largest."""
+    """Statistics of distances over joints and frames, m.
+
+    mean, rms: root mean square, p95, p99: percentiles, largest.
+    """
 
     mean: float
     rms: float
@@ -26,15 +28,14 @@ class Distances:
 
 @dataclass(frozen=True)
 class Errors:
-    """One synthesised motion against the captured one.
+    """Errors of one synthesized motion relative to the captured one.
 
-    relative and absolute: warp-invariant, with the root's position taken out and with it left in;
-    plain_…: at equal shares of the duration. shell: the farthest of three points around each
-    joint, root-relative and warp-invariant. effector, m: at the event, not a number where
-    there is none. acceleration: mean size of
-    the synthesised motion's over the captured one's, at equal durations. skate and skate_captured:
-    mean speed, m/s, of feet on the ground. duration: logarithm of synthesised over captured.
-    squared: mean squared absolute distance, m². joints (J,): of each joint, m².
+    relative, absolute: after time warping, without and with the root's position; plain_…: at equal
+    shares of the duration. shell: largest of three points around each joint, after time warping,
+    without the root's position. effector: distance at the event, m; NaN without an event.
+    acceleration: mean magnitude, synthesized over captured, at equal durations. skate,
+    skate_captured: mean speed of feet on the ground, m/s. duration: logarithm of synthesized over
+    captured. joints: mean squared absolute distance (J,) of each joint, m².
     """
 
     relative: Distances
@@ -51,12 +52,12 @@ class Errors:
 
     @property
     def squared(self) -> float:
-        """Mean squared distance, m², that sigma speaks of."""
+        """Return the mean squared absolute distance, m², which sigma predicts."""
         return self.absolute.rms**2
 
 
 def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
-    """Errors of a synthesised motion."""
+    """Return the errors of a synthesized motion. feet: joint indices."""
     own, true = made.points, captured.points
     phase = dtw.warp(_around(true)[None], _around(own))[0]
     warped = _at(own, phase)
@@ -86,7 +87,7 @@ def _rooted(points: Floats) -> Floats:
 
 
 def _around(points: Floats) -> Floats:
-    """What time warping looks at (FRAMES, J * 3): joints around the root."""
+    """Return joint positions (FRAMES, J * 3) relative to the root, for time warping."""
     return _rooted(points)[:, :, 0].reshape(FRAMES, -1)
 
 
@@ -105,19 +106,21 @@ def _distances(apart: Floats) -> Distances:
 
 
 def acceleration(points: Floats) -> float:
-    """Mean size of a motion's second differences (FRAMES, J, 4, 3), its root taken out, m."""
+    """Return the mean size of second differences of points (FRAMES, J, 4, 3), root-relative, m."""
     joints = _rooted(points)[:, 1:, 0]
     return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
 
 
 def skate(motion: Motion, feet: tuple[int, ...]) -> float:
-    """Mean horizontal speed, m/s, of feet while they are on the ground; 0 without feet."""
+    """Return the mean horizontal speed of feet on the ground, m/s; 0 without feet."""
     return float(ground.skate(motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration))
 
 
 def mean(errors: Sequence[Errors]) -> Errors:
-    """Means over clips; root mean squares are pooled, the largest is the largest of all, and the
-    duration's error is a root mean square."""
+    """Return the means over clips.
+
+    RMS distances are pooled, the largest is the largest of all, and the duration's error is an RMS.
+    """
 
     def pooled(name: str) -> Distances:
         return _pool([getattr(error, name) for error in errors])

@@ -1,6 +1,6 @@
-"""The model's answer held to the captured place of the event's joint, by what the service runs.
+"""Answers corrected to the captured position of the event's joint by the service's solver.
 
-Beside the motions: how the correction fared, and what becomes of places that are out of reach.
+Each correction is measured, also for targets that are farther away than the captured position.
 """
 
 import time
@@ -25,36 +25,33 @@ from service.synthesis.exact.holding import Bench, Held
 from service.synthesis.ports import OUTPUTS
 from service.synthesis.session import Session, State
 
-# How much farther from the root than the captured place, m: what should be told to be too far, and
-# what certainly is.
+# Distances beyond the captured position, away from the root, m: possibly and certainly unreachable.
 BEYOND, FAR = (0.1, 0.2, 0.3), 1.0
 
 
 @dataclass(frozen=True)
 class Goal:
-    """Where a captured clip has the event's joint (3,) and the root (3,) at the event, m."""
+    """Captured positions at the event. joint: of the event's joint (3,), m. root: (3,), m."""
 
     joint: Floats
     root: Floats
 
     def farther(self, metres: float) -> Floats:
-        """A place so much farther from the root (3,)."""
+        """Return the joint's position moved away from the root (3,), m."""
         away = self.joint - self.root
         return np.asarray(self.joint + metres * away / np.linalg.norm(away), np.float64)
 
 
 @dataclass(frozen=True)
 class Correction:
-    """How one clip was corrected.
+    """Correction of one clip.
 
-    miss, m, that is left. steps. distance: of the captured place from the predicted one, in
-    standard deviations. reached: whether that counts as within reach. beyond: whether the same is
-    said of places BEYOND it, none where the event is the root's. acceleration: after over before.
-    seconds: that one thread worked, the prediction counted in; plain_seconds: for the same clip
-    uncorrected. far: likewise none where the event is the root's.
+    steps: of the solver. distance: from prediction to target, in standard deviations. reached: True
+    if the target counts as reachable. beyond: the same for targets BEYOND it; empty if the event's
+    joint is the root. acceleration: after over before. seconds: thread time with the prediction.
+    plain_seconds: of the prediction alone. far: None if the event's joint is the root.
     """
 
-    miss: float
     steps: int
     distance: float
     reached: bool
@@ -67,8 +64,11 @@ class Correction:
 
 @dataclass(frozen=True)
 class Far:
-    """The same for a place FAR beyond: whether it counts as reached, acceleration after over
-    before, how far the root was moved, m, and steps."""
+    """Correction to a target FAR beyond the captured position.
+
+    reached: True if the target counts as reachable. acceleration: after over before. root: movement
+    of the root, m. steps: of the solver.
+    """
 
     reached: bool
     acceleration: float
@@ -78,7 +78,7 @@ class Far:
 
 @dataclass(frozen=True)
 class Exact:
-    """Corrected motions, and how each was corrected."""
+    """Corrected motions and their corrections."""
 
     motions: list[Motion]
     corrections: list[Correction]
@@ -86,24 +86,24 @@ class Exact:
 
 @dataclass(frozen=True)
 class _Desk:
-    """An opened model, its bench, and the event with the canonical frame at which it is."""
+    """An opened model, its constraint solver, and the event."""
 
     opened: Session
     bench: Bench
     event: fidelity.Moment
 
     def state(self, controls: Floats, labels: Floats) -> State:
-        """State at even shares of the duration."""
+        """Return the state at even shares of the duration."""
         durations = self.opened.durations(controls, labels)
         return self.opened.state(controls, EVEN * durations, labels)
 
     def held(self, begun: Held, place: Floats) -> Held:
-        """The motion whose event's joint is at a place (3,) at the event."""
+        """Return the motion with the event's joint at a position (3,) at the event."""
         own = Measure("height", (self.event.joint,), "landmark")
         return self.bench.held(begun, [Place(("event",), own, (0, 1, 2), place, self.event.frame)])
 
     def motion(self, held: Held) -> Motion:
-        """What is compared of a held motion."""
+        """Return a corrected motion as it is compared."""
         state, parents = held.state, self.opened.card.skeleton.parents
         rotations, path = held.poses(state.frames)
         translations = skeleton.translations(state.bones, path)
@@ -113,14 +113,14 @@ class _Desk:
 
 
 def goal(captured: Motion, event: Event) -> Goal:
-    """Goal that a captured motion gives."""
+    """Return the target that a captured motion gives."""
     return Goal(event.of(captured.joints), Event(0, event.share).of(captured.joints))
 
 
 def answers(
     recipe: Recipe, trained: Trained, file: bytes, asked: Asked, wanted: Sequence[Goal]
 ) -> Exact:
-    """Answers of a model file, each held to its goal."""
+    """Return the answers of a model file, each corrected to its target."""
     event = fidelity.moment(recipe, trained.examples)
     assert event is not None
     opened = session.open_bytes(file, recipe.name)
@@ -137,11 +137,10 @@ def _corrected(
     begun = desk.bench.begun(desk.state(controls, labels))
     held = desk.held(begun, wanted.joint)
     before, after = desk.motion(begun), desk.motion(held)
-    # Nothing is farther from the root than the root is.
+    # The root cannot be moved away from itself.
     outward = desk.event.joint != 0
     beyond = [desk.held(begun, wanted.farther(metres)) for metres in BEYOND if outward]
     correction = Correction(
-        held.met[0].miss,
         held.steps,
         held.distance,
         _reached(held),
@@ -165,7 +164,7 @@ def _plain(desk: _Desk, controls: Floats, labels: Floats) -> None:
 
 
 def _seconds(run: Callable[[], None]) -> float:
-    # What is opened when it is first asked is open by then; what else the machine does is no part.
+    # The first call includes one-time work; thread time excludes other work of the machine.
     run()
     start = time.thread_time()
     run()

@@ -1,11 +1,12 @@
-"""Whether the support flag does what it promises, on clips that it has not seen.
+"""Accuracy of the support flag on clips that it has not seen.
 
-It is made of what is left where a clip is held out, limits and all, and asked of the held-out clips
-as they are and moved beyond the range of each control in turn.
+The flag, with its limits, is built from the clips that are not held out. It is evaluated at the
+controls of the held-out clips, and at the same controls moved beyond the range of each control.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from model_export.evaluate import folds
 from model_export.evaluate.folds import Fold
 from model_export.ingest import Example
 from model_export.recipe import Recipe
+from model_export.report import rounding
 from service.motion import support
 from service.motion.conventions import Floats
 from service.motion.errors import InvalidField
@@ -20,25 +22,48 @@ from service.motion.errors import InvalidField
 BEYOND = 0.25
 """Share of a control's range by which clips are moved beyond it."""
 ACROSS = (0.25, 0.5, 0.75)
-"""Where in a gap clips are moved to, as shares of it."""
+"""Positions in a gap to which clips are moved, as shares of it."""
 
 
 @dataclass(frozen=True)
 class Flags:
-    """What was flagged, as shares.
+    """Shares of clips that were flagged as unsupported.
 
-    alarms: of the held-out clips as they are. beyond: by control, of those moved beyond its range.
-    gap: the control in which two families lie apart, and of clips moved into that gap; none for one
-    family.
+    alarms: of held-out clips. beyond: of clips moved beyond the range of a control, by control.
+    gap: control that separates two families, and share of clips moved into the gap between them;
+    None for one family.
     """
 
     alarms: float
     beyond: dict[str, float]
     gap: tuple[str, float] | None = None
 
+    def facts(self) -> dict[str, Any]:
+        """Return the shares as JSON values."""
+        facts: dict[str, Any] = {
+            "false_alarms": rounding.number(self.alarms),
+            "beyond": {name: rounding.number(share) for name, share in self.beyond.items()},
+        }
+        if self.gap:
+            control, share = self.gap
+            facts["gap"] = {"control": control, "flagged": rounding.number(share)}
+        return facts
+
+    def text(self) -> str:
+        """Return the shares in a sentence."""
+        beyond = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.beyond.items())
+        text = (
+            f"support: {100 * self.alarms:.1f} % of held-out clips are flagged; of clips moved "
+            f"{100 * BEYOND:.0f} % of the range beyond a control: {beyond}"
+        )
+        if self.gap is None:
+            return text
+        control, share = self.gap
+        return f"{text}; of clips moved into the gap of {control}: {100 * share:.0f} %"
+
 
 def measure(controls: Floats, names: Sequence[str], parts: Sequence[Fold]) -> Flags:
-    """Flags over clips' controls (N, d), held out by folds."""
+    """Return the flags over controls (N, d) of clips held out by folds."""
     alarms, beyond = [], []
     for held, own in _held(controls, parts):
         alarms.append(~own.holds(held))
@@ -48,9 +73,9 @@ def measure(controls: Floats, names: Sequence[str], parts: Sequence[Fold]) -> Fl
 
 
 def joined(recipe: Recipe, one: list[Example], other_recipe: Recipe, other: list[Example]) -> Flags:
-    """Flags over two families as one, of the controls that both have.
+    """Return the flags over two families joined, by the controls that both have.
 
-    InvalidField where they have none, or overlap in all of them.
+    Raises InvalidField if they have none in common, or overlap in all of them.
     """
     known = [[control.name for control in each.controls] for each in (recipe, other_recipe)]
     names = _shared(*known)
@@ -60,8 +85,10 @@ def joined(recipe: Recipe, one: list[Example], other_recipe: Recipe, other: list
 
 
 def _flagged_between(names: Sequence[str], one: Floats, other: Floats) -> tuple[str, float]:
-    """The control in which controls (N, d) and (M, d) lie farthest apart, and the share of them
-    that is flagged in the gap."""
+    """Return the control with the widest gap between two families, and the share flagged in it.
+
+    one, other: controls (N, d) and (M, d). The share is of all clips, moved into the gap.
+    """
     both = np.vstack([one, other])
     control, low, high = _gap(names, one, other, np.ptp(both, axis=0))
     own = support.of(both)
@@ -74,8 +101,10 @@ def _flagged_between(names: Sequence[str], one: Floats, other: Floats) -> tuple[
 
 
 def _shared(one: Sequence[str], other: Sequence[str]) -> list[str]:
-    """Names of controls that two families have in common, in the order of the first; InvalidField
-    for none."""
+    """Return the controls that two families have in common, in the order of the first.
+
+    Raises InvalidField if there are none.
+    """
     both = [name for name in one if name in other]
     if not both:
         expected = f"expected one of {', '.join(one)}"
@@ -84,19 +113,19 @@ def _shared(one: Sequence[str], other: Sequence[str]) -> list[str]:
 
 
 def _columns(examples: Sequence[Example], names: Sequence[str], wanted: Sequence[str]) -> Floats:
-    """Controls (N, d) of examples, those that are wanted."""
+    """Return the wanted controls (N, d) of examples."""
     return np.stack([example.controls for example in examples])[:, [names.index(n) for n in wanted]]
 
 
 def _held(controls: Floats, parts: Sequence[Fold]) -> Iterator[tuple[Floats, support.Support]]:
-    """Controls that a fold holds out, and the support of all others."""
+    """Yield the controls that a fold holds out, and the support of all others."""
     for fold in parts:
         held = np.isin(np.arange(len(controls)), fold.held)
         yield controls[held], support.of(controls[~held])
 
 
 def _beyond(own: support.Support, held: Floats, control: int) -> Floats:
-    """Share (H,) of the ends of a control beyond which each held clip is flagged."""
+    """Return the share (H,) of both ends of a control beyond which each held clip is flagged."""
     room = BEYOND * (own.high - own.low)[control]
     flagged = []
     for end in (own.low[control] - room, own.high[control] + room):
@@ -109,7 +138,7 @@ def _beyond(own: support.Support, held: Floats, control: int) -> Floats:
 def _gap(
     names: Sequence[str], one: Floats, other: Floats, widths: Floats
 ) -> tuple[int, float, float]:
-    """Control, end of the lower family and beginning of the higher, of the widest gap."""
+    """Return the control with the widest gap, and the ends of the gap."""
     up, down = other.min(axis=0) - one.max(axis=0), one.min(axis=0) - other.max(axis=0)
     control = int(np.argmax(np.maximum(up, down) / widths))
     if max(up[control], down[control]) <= 0.0:

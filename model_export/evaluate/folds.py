@@ -1,4 +1,4 @@
-"""Which examples are held out together."""
+"""Folds: examples that are held out together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,27 +7,27 @@ import numpy as np
 
 from model_export.ingest import Example
 
-# Families of more takes than this are held out in as many parts, each of whole takes.
+# Families of more than MANY takes are held out in PARTS parts of whole takes.
 MANY, PARTS = 40, 12
 
 
 @dataclass(frozen=True)
 class Fold:
-    """Indices of the examples that are held out; all others are trained from."""
+    """Examples that are held out together. held: their indices."""
 
     held: tuple[int, ...]
 
     def split(self, examples: Sequence[Example]) -> tuple[list[Example], list[Example]]:
-        """Examples to train from, and those held out."""
+        """Return the examples to train from, and those held out."""
         held = set(self.held)
         rest = [example for i, example in enumerate(examples) if i not in held]
         return rest, [examples[i] for i in self.held]
 
 
 def clips(examples: Sequence[Example]) -> list[Fold]:
-    """Every take held out once, with all clips that were cut from it.
+    """Return folds that hold out every take once, with all clips cut from it.
 
-    Strides of one take are nearly equal: held out one by one they would give each other away.
+    Strides of one take are nearly equal; held out one by one, they would predict each other.
     """
     takes = _groups([str(example.row.place) for example in examples])
     if len(takes) > MANY:
@@ -36,7 +36,7 @@ def clips(examples: Sequence[Example]) -> list[Fold]:
 
 
 def performers(examples: Sequence[Example]) -> list[Fold]:
-    """Every performer held out once, with everything that they did."""
+    """Return folds that hold out every performer once, with all of their clips."""
     return [Fold(own) for own in _groups([example.row.performer for example in examples])]
 
 

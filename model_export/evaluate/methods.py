@@ -1,4 +1,4 @@
-"""Every method's answers to the same queries, from the same training."""
+"""Predictions of every method for the same queries, from the same training."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,29 +17,29 @@ from service.motion import skeleton
 from service.motion.conventions import Floats
 
 OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
-# What would only repeat another row where performers are not told apart.
+# Methods that repeat another row where the model does not distinguish performers.
 LABELLED = ("gp_controls", "nearest_same_performer")
 DEFINITIONS = {
-    OURS: "the model as it is exported: truncated, with its own bones and timing",
-    EXACT: "the same, corrected by what the service runs until the event's joint is at its event "
-    "where the captured clip has it",
-    "posefield_no_performer": "the same model, asked for nobody in particular",
+    OURS: "the model as exported: truncated, with its own bone lengths and timing",
+    EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
+    "captured position at the event",
+    "posefield_no_performer": "the same model without a performer",
     **{
-        f"posefield_adapt_{count}": f"the same model adapted to the performer by {shown}, each of "
-        "a take of its own and none of the asked clip's take, as far apart in the controls as "
-        "they come; only clips that at least three other takes of their performer stand beside"
-        for count, shown in ((1, "one clip"), (3, "three clips"), (5, "at most five clips"))
+        f"posefield_adapt_{count}": f"the same model adapted to the performer with {shown} from "
+        "different takes, far apart in the controls and not from the take of the predicted clip; "
+        "only for clips whose performer has at least three other takes"
+        for count, shown in ((1, "one clip"), (3, "three clips"), (5, "up to five clips"))
     },
-    NAIVE: "kriging of every frame by itself, isotropic, variogram fitted by weighted least "
-    "squares (Mukai & Kuriyama 2005); our code, checked against GSTools",
+    NAIVE: "kriging of each frame on its own, isotropic, variogram fitted by weighted least "
+    "squares (Mukai & Kuriyama 2005); posefield's own code, checked against GSTools",
     **{name: words for name, (_, words) in PEERS.items()},
 }
-"""What exactly each method is."""
+"""Definition of each method."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """Controls (Q, d) and performers' names of queries."""
+    """Queries. controls: (Q, d). performers: Q names; an empty name for no performer."""
 
     controls: Floats
     performers: Sequence[str]
@@ -47,8 +47,11 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answers:
-    """Motions of each method, none where it was not asked, and our own standard deviation of each
-    query (Q,), and of each joint of it (Q, J), m."""
+    """Predictions of all methods.
+
+    motions: by method; None for queries that a method does not predict. sigma: standard deviation
+    (Q,) that posefield predicts, m. joint_sigma: of each joint (Q, J), m.
+    """
 
     motions: Mapping[str, Sequence[Motion | None]]
     sigma: Floats
@@ -57,14 +60,17 @@ class Answers:
 
 @dataclass(frozen=True)
 class _Values:
-    """What is predicted for Q queries: pose vectors (Q, T, D) in canonical time, and the rest."""
+    """Predicted values.
+
+    numbers: pose vectors (Q, T, D) on canonical time. beside: the other quantities by name.
+    """
 
     numbers: Floats
     beside: dict[str, Floats]
 
 
 def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
-    """Answers of every method, ours first."""
+    """Return the answers of every method, posefield's first."""
     event = fidelity.moment(recipe, trained.examples)
     bank = trained.model.bank
     points = bank.points(asked.controls, _labels(trained, asked))
@@ -76,7 +82,7 @@ def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
 
 
 def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:
-    """The event of a captured clip, by its own landmarks."""
+    """Return the event of a captured clip from its landmarks; None if the recipe names none."""
     found = fidelity.moment(recipe, trained.examples)
     if found is None or recipe.event is None:
         return None
@@ -90,7 +96,7 @@ def _labels(trained: Trained, asked: Asked) -> Floats:
 
 
 def ours(recipe: Recipe, trained: Trained, asked: Asked) -> list[Motion]:
-    """Answers of the model as it is exported."""
+    """Return the answers of the exported model."""
     event = fidelity.moment(recipe, trained.examples)
     labels, model = _labels(trained, asked), trained.model
     fields = model.bank.numpy(model.bank.points(asked.controls, labels))
@@ -109,7 +115,7 @@ def _motions(
     logs: Floats,
     event: fidelity.Moment | None,
 ) -> list[Motion]:
-    """Motions of rotations (Q, S, J, 4), root paths (Q, S, 3) and bone offsets (Q, J, 3)."""
+    """Return motions of rotations (Q, S, J, 4), root paths (Q, S, 3), bone offsets (Q, J, 3)."""
     translations = skeleton.translations(offsets, path)
     events = [_synthesised_event(trained, log, event) for log in logs]
     parts = zip(rotations, translations, map(float, durations), events, strict=True)
@@ -119,7 +125,7 @@ def _motions(
 def _synthesised_event(
     trained: Trained, logs: Floats, event: fidelity.Moment | None
 ) -> Event | None:
-    """When a motion in its own predicted timing is at the canonical frame of the event."""
+    """Return the event at the share of the duration that the predicted timing gives it."""
     if event is None:
         return None
     timing = trained.model.timing
@@ -128,7 +134,7 @@ def _synthesised_event(
 
 
 def _methods(trained: Trained) -> dict[str, Callable[[Floats], _Values]]:
-    """Points (Q, d + p) to predicted values, by name."""
+    """Return functions from points (Q, d + p) to predicted values, by method."""
     laid = trained.laid
 
     def of_peer(peer: Peer) -> Callable[[Floats], _Values]:
@@ -144,12 +150,12 @@ def _methods(trained: Trained) -> dict[str, Callable[[Floats], _Values]]:
 
 
 def _numbers(trained: Trained, coefficients: Floats) -> Floats:
-    """Pose vectors (Q, T, D) of motions (Q, N) in the coordinates of the sample mode."""
+    """Return pose vectors (Q, T, D) of motions (Q, N) in coordinates of the sample mode."""
     return trained.tensor.numbers(trained.full.slices(coefficients))
 
 
 def _naive(trained: Trained, laid: Samples, points: Floats) -> _Values:
-    """Kriging of every frame by itself; all else the same way, as one frame."""
+    """Krige each frame on its own, and the other quantities in the same way as one frame."""
     whole, parents = trained.tensor, trained.skeleton.parents
     offsets = np.stack([example.offsets for example in trained.examples])
     positions = fidelity.positions(whole, whole.values, parents, offsets)
@@ -164,7 +170,7 @@ def _naive(trained: Trained, laid: Samples, points: Floats) -> _Values:
 
 
 def _restore(trained: Trained, values: _Values, event: fidelity.Moment | None) -> list[Motion]:
-    """Motions of predicted values, by the model's own timing, travel, chart and bones."""
+    """Return motions of predicted values, with the model's timing, travel, chart and bones."""
     timing, beside = trained.model.timing, values.beside
     steps = np.tile(EVEN, (len(values.numbers), 1))
     _, place = timing.numpy(np.zeros((len(steps), 1)), beside["warp"], steps)

@@ -1,4 +1,4 @@
-"""Motions as what is compared: joints and the skin around them, in even steps of their own time."""
+"""Motions in the form that is compared: joints and points around them at uniform time steps."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,17 @@ from service.motion.conventions import Floats
 
 FRAMES = 60
 EVEN = np.linspace(0.0, 1.0, FRAMES)
-# Three points at right angles this far from a joint, m, as the Animation Compression Library has.
+# Distance of three points at right angles from a joint, m, as in the Animation Compression Library.
 SHELL = 0.03
 
 
 @dataclass(frozen=True)
 class Motion:
-    """points (FRAMES, J, 4, 3): each joint, then three points of the shell around it, m. duration,
-    s. event: position (3,) of the event's joint at its event, m; None where there is no event."""
+    """A motion of J joints.
+
+    points: each joint and three points around it (FRAMES, J, 4, 3), m. duration: s. event: position
+    (3,) of the event's joint at its event, m; None without an event.
+    """
 
     points: Floats
     duration: float
@@ -26,24 +29,24 @@ class Motion:
 
     @property
     def joints(self) -> Floats:
-        """Joint positions (FRAMES, J, 3), m."""
+        """Return the joint positions (FRAMES, J, 3), m."""
         return self.points[:, :, 0]
 
 
 @dataclass(frozen=True)
 class Event:
-    """Which joint is looked at, and at which share of a motion's duration."""
+    """Event of a motion. joint: its index. share: its time as a share of the duration."""
 
     joint: int
     share: float
 
     def of(self, joints: Floats) -> Floats:
-        """Where the joint is then (3,), m."""
+        """Return the joint's position (3,) at that time, m. joints: (FRAMES, J, 3)."""
         return align.at(joints[:, self.joint], np.array([self.share]))[0]
 
 
 def of_clip(clip: Clip, event: Event | None) -> Motion:
-    """Motion of a captured clip on its own skeleton."""
+    """Return the motion of a captured clip on its own skeleton."""
     rotations, path = align.resample(clip, EVEN)
     translations = skeleton.translations(clip.translations.mean(axis=0), path)
     return posed(clip.skeleton.parents, rotations, translations, clip.duration, event)
@@ -56,7 +59,7 @@ def posed(
     duration: float,
     event: Event | None,
 ) -> Motion:
-    """Motion of local rotations (FRAMES, J, 4) and translations (FRAMES, J, 3), m."""
+    """Return the motion of local rotations (FRAMES, J, 4) and translations (FRAMES, J, 3), m."""
     positions, orientations = skeleton.forward(parents, rotations, translations)
     axes = quat.rotate(orientations[:, :, None], SHELL * np.eye(3))
     shell = positions[:, :, None] + axes

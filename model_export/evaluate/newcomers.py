@@ -1,4 +1,4 @@
-"""What a performer's name is worth: nobody named, and a performer of whom a few clips are shown."""
+"""Predictions without a performer, and of a model adapted to a new performer with a few clips."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,13 +17,13 @@ from service.motion.field import half_ranges
 
 NOBODY = "posefield_no_performer"
 SHOWN = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
-"""How many clips of a new performer each method is shown."""
+"""Number of clips that each method adapts with."""
 FEWEST = 3
-"""A clip is asked for where so many other takes of its performer are there to be shown."""
+"""Fewest other takes of the performer for which a clip is predicted."""
 
 
 def unnamed(recipe: Recipe, trained: Trained, asked: Asked) -> dict[str, list[Motion]]:
-    """The same questions about nobody in particular, where the model tells performers apart."""
+    """Return the answers without performers; empty if the model does not distinguish them."""
     if not trained.model.bank.performers:
         return {}
     nobody = [""] * len(asked.performers)
@@ -33,9 +33,9 @@ def unnamed(recipe: Recipe, trained: Trained, asked: Asked) -> dict[str, list[Mo
 def adapted(
     recipe: Recipe, trained: Trained, held: Sequence[Example]
 ) -> dict[str, list[Motion | None]]:
-    """Motions of a performer's clips, held out, from a model that was shown some of the others.
+    """Return the motions of held-out clips by models adapted with some of the others.
 
-    None where there are too few others. Nothing where the model tells no performers apart.
+    None if there are too few others. Empty if the model does not distinguish performers.
     """
     if not trained.model.bank.performers:
         return {}
@@ -65,10 +65,10 @@ def _motions(
 
 
 def choose(held: Sequence[Example], asked: int, count: int) -> tuple[int, ...]:
-    """Places of as many clips to be shown, each of a take of its own and none of the asked one's.
+    """Return the indices of `count` clips to adapt with, from different takes than the asked one.
 
-    The first is the nearest to the middle of their controls, each further one the farthest from
-    those before it. Fewer where there are not as many takes.
+    The first is the nearest to the mean of the controls; each further one is the farthest from
+    those before it. Fewer if there are fewer takes.
     """
     takes, points = samples.takes(held), _points(held)
     chosen: list[int] = []
@@ -80,7 +80,7 @@ def choose(held: Sequence[Example], asked: int, count: int) -> tuple[int, ...]:
             apart = np.linalg.norm(points[left, None] - points[chosen], axis=-1).min(axis=1)
         else:
             apart = -np.linalg.norm(points[left] - points[left].mean(axis=0), axis=-1)
-        # Rounded, so that ties are not broken by an ulp.
+        # Rounded, so that rounding errors do not decide ties.
         chosen.append(int(left[np.argmax(np.round(apart, 9))]))
     return tuple(sorted(chosen))
 
@@ -90,7 +90,7 @@ def _others(takes: Indices, taken: list[int]) -> Indices:
 
 
 def _points(held: Sequence[Example]) -> Floats:
-    """Controls (k, d) in half-ranges of their own."""
+    """Return the controls (k, d) in half-ranges of these clips."""
     controls = np.stack([example.controls for example in held])
     low, high = controls.min(axis=0), controls.max(axis=0)
     return half_ranges(controls, low, np.where(high > low, high, low + 1.0))

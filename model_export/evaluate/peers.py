@@ -1,7 +1,7 @@
-"""What one could use instead: each predicts values at queries from values at samples.
+"""Other interpolation methods, which predict values at queries from values at samples.
 
-A peer is a library's own method, not our copy of it. It sees the controls in half-ranges, and is
-given everything that is kriged: reduced motions, bone offsets, duration, warp and travel.
+A peer is a method of a library, not a copy of it. Its inputs are the controls in half-ranges and
+the quantities that posefield kriges: reduced motions, bone offsets, duration, warp and travel.
 """
 
 import warnings
@@ -23,7 +23,7 @@ from model_export.samples import Samples
 from service.motion.conventions import Floats
 
 Peer = Callable[[Samples, Floats, Floats], Floats]
-"""Samples, their values (n, m) and queries (q, d + p) to values (q, m)."""
+"""Function of samples, their values (n, m) and queries (q, d + p) that returns values (q, m)."""
 
 SMOOTHINGS = (0.0, *np.geomspace(1e-3, 1e2, 11))
 
@@ -48,7 +48,7 @@ def _through(known: Floats, values: Floats, kernel: Kernel, smoothing: float) ->
 
 
 def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Distinct points and the mean of the values at each: an interpolator can meet only one."""
+    """Return distinct points and the mean value at each: an interpolator needs distinct points."""
     points, place, counts = np.unique(known, axis=0, return_inverse=True, return_counts=True)
     sums = np.zeros((len(points), values.shape[1]))
     np.add.at(sums, np.ravel(place), values)
@@ -56,7 +56,7 @@ def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """Thin plates with the smoothing, one of a grid, that leave-one-out finds best."""
+    """Return thin-plate predictions with the smoothing of the least leave-one-out error."""
     known, asked = _controls(samples, queries)
     losses = [_left_out(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
     best = SMOOTHINGS[int(np.argmin(losses))]
@@ -73,21 +73,23 @@ def _left_out(samples: Samples, known: Floats, values: Floats, smoothing: float)
 
 
 def gp(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """Gaussian process with a length for every control and, where performers are told apart, for
-    every performer's label; lengths, amplitude and noise of greatest marginal likelihood."""
+    """Return predictions of a Gaussian process with a length scale for each control and performer.
+
+    Length scales, amplitude and noise maximise the marginal likelihood.
+    """
     centre, size = values.mean(axis=0), max(float(values.std()), 1e-12)
     lengths = np.ones(samples.points.shape[1])
     kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(lengths, (0.1, 100.0))
     model = GaussianProcessRegressor(kernel + WhiteKernel(0.1, (1e-5, 10.0)), random_state=0)
     with warnings.catch_warnings():
-        # A length at its bound is an answer: the control says nothing, or everything.
+        # A length scale at its bound is a valid result: the control has no influence, or all.
         warnings.simplefilter("ignore", ConvergenceWarning)
         found = model.fit(samples.points, (values - centre) / size).predict(queries)
     return centre + size * found.reshape(len(queries), -1)
 
 
 def gp_controls(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """The same of the controls alone."""
+    """Return the predictions of `gp` from the controls alone."""
     known, asked = _controls(samples, queries)
     return gp(Samples(known, samples.controls, samples.groups), values, asked)
 
@@ -111,12 +113,12 @@ def _neighbours(count: int | None, weights: str | Callable[[Floats], Floats]) ->
 
 
 def _inverse_square(distances: Floats) -> Floats:
-    # A query at a sample is that sample's.
+    # At a sample the prediction is that of the sample.
     return 1.0 / np.maximum(np.square(distances), 1e-12)
 
 
 def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """The nearest example of the same performer, or of any where the performer has none."""
+    """Return the nearest example of the same performer, or of any if that performer has none."""
     found = np.empty((len(queries), values.shape[1]))
     for row, query in enumerate(queries):
         same = samples.points[:, samples.controls :] @ query[samples.controls :] > 0.5
@@ -128,7 +130,7 @@ def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
 
 
 def linear_coefficients(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """Linear interpolation over the simplices of the samples, the nearest outside their hull."""
+    """Interpolate linearly over simplices of the samples; outside their hull, take the nearest."""
     known, asked = _controls(samples, queries)
     if samples.controls == 1:
         order = np.argsort(known[:, 0])
@@ -140,7 +142,7 @@ def linear_coefficients(samples: Samples, values: Floats, queries: Floats) -> Fl
 
 
 def mean(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """The mean of all samples, whatever is asked."""
+    """Return the mean of all samples for each query."""
     return DummyRegressor().fit(samples.points, values).predict(queries).reshape(len(queries), -1)
 
 
@@ -167,4 +169,4 @@ PEERS: dict[str, tuple[Peer, str]] = {
     ),
     "mean": (mean, "the mean motion"),
 }
-"""Peers by name, with what exactly they are."""
+"""Peers by name, each with its definition."""

@@ -1,11 +1,10 @@
-"""The three ways to ask how good a model is, and what came out."""
+"""Evaluation protocols: clips held out, performers held out, and the noise-free truth."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from joblib import Parallel, cpu_count, delayed, parallel_config
 
 from model_export import export, fidelity, threads
 from model_export.evaluate import (
@@ -13,11 +12,11 @@ from model_export.evaluate import (
     exact,
     flags,
     folds,
+    ground_truth,
     methods,
     motion,
     newcomers,
     stills,
-    truth,
 )
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.exact import Correction
@@ -27,34 +26,31 @@ from model_export.evaluate.methods import EXACT, OURS, Asked
 from model_export.evaluate.motion import Event, Motion
 from model_export.evaluate.stills import CAPTURED, Stills
 from model_export.ingest import Example
+from model_export.jobs import Jobs
 from model_export.recipe import Recipe
-from model_export.sample import truth as truths
 from model_export.train import Trained, train
 from service.motion.conventions import Floats
 from service.motion.errors import TrainingError
 
-# Frames a second at which the procedural truth is played.
-RATE = 120.0
-# Truths asked at a time, so that progress is seen and memory bounded.
+# Noise-free motions evaluated together: progress is shown, and memory is bounded.
 BATCH = 50
-
-# Methods whose answers are kept to be looked at.
+# Methods whose bodies are kept for the charts.
 OWN = (OURS, EXACT, *newcomers.SHOWN)
 
 Report = Callable[[int, int], None]
-"""Is told how many parts are done, and of how many."""
+"""Callback with the number of parts that are done, and of all parts."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What one protocol found.
+    """Result of one protocol over C clips.
 
-    clips: what was asked for, by name. errors: of each method, clip by clip; None where a method
-    was not asked. sigma (C,): predicted standard deviation of ours, m; joint_sigma (C, J): of each
-    joint, by name in `joints`. corrections (C,): what it took to hold ours to the captured event;
-    none where the recipe names no event. flags: how the support flag does on the same clips; none
-    against the truth, which is everywhere. stills: of the captured clips and of our own answers,
-    with the joints' parents.
+    clips: names. errors: of each method by clip; None for clips that a method did not predict.
+    sigma: standard deviation (C,) that posefield predicts, m. joint_sigma: of each joint (C, J), m.
+    joints: their names. corrections: of the predictions to the captured event (C,); empty without
+    an event. flags: accuracy of the support flag; None against the truth, which has no held-out
+    clips. stills: bodies at the event, of captured clips and of posefield's predictions. parents:
+    of the joints.
     """
 
     family: str
@@ -70,17 +66,17 @@ class Result:
     parents: tuple[int, ...] = ()
 
     def asked(self, name: str) -> list[int]:
-        """Places of the clips that a method was asked for."""
+        """Return the indices of the clips that a method predicted."""
         return [place for place, error in enumerate(self.errors[name]) if error is not None]
 
     def of(self, name: str, places: Sequence[int]) -> list[Errors]:
-        """Errors of a method at some of the places that it was asked for."""
+        """Return the errors of a method at some of the clips that it predicted."""
         return [error for place in places if (error := self.errors[name][place]) is not None]
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Answers to some of the clips: their places in the whole, their errors, sigma, corrections."""
+    """Result for some of the clips. places: their indices."""
 
     places: tuple[int, ...]
     errors: dict[str, list[Errors | None]]
@@ -91,13 +87,13 @@ class _Part:
     parents: tuple[int, ...]
 
     def of(self, name: str) -> Sequence[Errors | None]:
-        """Errors of a method, none of one that was not asked."""
+        """Return the errors of a method, None for each clip if it predicted none."""
         return self.errors.get(name, [None] * len(self.places))
 
 
 @dataclass(frozen=True)
 class _Made:
-    """What was trained of a recipe, and the file of it."""
+    """A recipe, its trained model, and the model file."""
 
     recipe: Recipe
     trained: Trained
@@ -105,61 +101,57 @@ class _Made:
 
 
 def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
-    """What can be asked of a recipe, the one that counts most first."""
+    """Return the protocols that a recipe allows, the most important first."""
     several = len({example.row.performer for example in examples}) > 1
     known = ["truth"] if recipe.truth else []
     return known + ["clip"] + (["performer"] if several else [])
 
 
-def run(recipe: Recipe, examples: Sequence[Example], protocol: str, report: Report) -> Result:
-    """Result of a protocol: "clip" or "performer", held out one by one, or "truth".
+def run(
+    recipe: Recipe, examples: Sequence[Example], protocol: str, jobs: Jobs, report: Report
+) -> Result:
+    """Run a protocol: "clip" or "performer", held out one by one, or "truth".
 
-    Raises TrainingError where what is left of the examples cannot carry a field.
+    Raises TrainingError if the examples that remain are too few to train from.
     """
     if protocol == "truth":
-        return against_truth(recipe, examples, truth.points(), report)
+        return against_truth(recipe, examples, ground_truth.points(), jobs, report)
     own = folds.clips(examples) if protocol == "clip" else folds.performers(examples)
-    jobs = [delayed(_held_out)(recipe, examples, fold, protocol) for fold in own]
+    each = [(fold, protocol) for fold in own]
     names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
     controls = np.stack([example.controls for example in examples])
     found = flags.measure(controls, [control.name for control in recipe.controls], own)
     asked = _Asked(f"leave_one_{protocol}_out", names, examples[0].clip.skeleton.names)
-    return replace(_result(recipe, asked, _done(jobs, report)), flags=found)
+    parts = completed(jobs.run(_held_out, each, (recipe, examples)), len(each), report)
+    return replace(_result(recipe, asked, parts), flags=found)
 
 
 def against_truth(
-    recipe: Recipe, examples: Sequence[Example], points: Floats, report: Report
+    recipe: Recipe, examples: Sequence[Example], points: Floats, jobs: Jobs, report: Report
 ) -> Result:
-    """Result at control points (C, d) whose noise-free motion is known."""
+    """Return the result at control points (C, d) of the procedural family."""
     made = _made(recipe, examples)
-    starts = range(0, len(points), BATCH)
-    jobs = [delayed(_true)(made, points[at : at + BATCH], at) for at in starts]
+    each = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
-    return _result(recipe, _Asked("truth", names, made.trained.skeleton.names), _done(jobs, report))
+    asked = _Asked("truth", names, made.trained.skeleton.names)
+    return _result(recipe, asked, completed(jobs.run(_true, each, (made,)), len(each), report))
 
 
-def _done(jobs: Sequence[object], report: Report) -> Iterator[_Part]:
-    parallel = Parallel(n_jobs=min(cpu_count(), len(jobs)), return_as="generator_unordered")
-    for count, part in enumerate(parallel(jobs), start=1):
-        report(count, len(jobs))
-        yield part
+def completed(results: Iterator[Any], count: int, report: Report) -> Iterator[Any]:
+    """Yield the results of jobs and report each. count: number of the jobs."""
+    for done, result in enumerate(results, start=1):
+        report(done, count)
+        yield result
 
 
-@contextmanager
-def _alone() -> Iterator[None]:
-    """A job asks for no others: on a cluster scikit-learn's own would leave its place there."""
-    with parallel_config(backend="sequential"), threads.one():
-        yield
-
-
-@_alone()
+@threads.one()
 def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str) -> _Part:
     rest, held = fold.split(examples)
     try:
         made = _made(recipe, rest)
-    except TrainingError as fault:
+    except TrainingError as error:
         named = ", ".join(sorted({example.row.place.name for example in held}))
-        raise TrainingError(f"with {named} held out: {fault}") from fault
+        raise TrainingError(f"with {named} held out: {error}") from error
     asked = Asked(np.stack([e.controls for e in held]), [e.row.performer for e in held])
     events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
     pairs = zip(held, events, strict=True)
@@ -172,22 +164,22 @@ def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol:
 
 
 More = Mapping[str, Sequence[Motion | None]]
-"""Answers of methods that only one protocol asks, None where they were not asked."""
+"""Answers of methods that only one protocol has; None for clips that they did not predict."""
 
 
 @dataclass(frozen=True)
 class _Truth:
-    """Captured motions, their events, and answers to them that are at hand already."""
+    """Captured motions, their events, and predictions of additional methods."""
 
     captured: Sequence[Motion]
     events: Sequence[Event | None]
     more: More
 
 
-@_alone()
+@threads.one()
 def _true(made: _Made, points: Floats, start: int) -> _Part:
     event = methods.captured_event(made.recipe, made.trained, ())
-    captured = [motion.of_clip(truths.clip(list(p), RATE), event) for p in points]
+    captured = ground_truth.motions(points, event)
     places = tuple(range(start, start + len(points)))
     asked = Asked(points, [""] * len(points))
     return _compared(made, places, asked, _Truth(captured, [event] * len(points), {}))
@@ -235,7 +227,7 @@ def _compared(
 
 @dataclass(frozen=True)
 class _Asked:
-    """Which protocol, of which clips, and the names of the joints."""
+    """Names of the protocol, of the clips and of the joints."""
 
     protocol: str
     clips: Sequence[str]
@@ -243,11 +235,11 @@ class _Asked:
 
 
 def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
-    """Parts in the order of the clips, whichever came first."""
-    listed = list(parts)
+    """Merge parts into one result, in the order of the clips."""
+    listed = sorted(parts, key=lambda part: part.places)
     order = np.argsort([place for part in listed for place in part.places])
     corrections = [correction for part in listed for correction in part.corrections]
-    # Where a fold holds the last but one performer out, nobody is told apart in it.
+    # A fold that leaves one performer lacks the methods that distinguish performers.
     methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
     gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
     looks = {

@@ -1,4 +1,4 @@
-"""Clips at their events, as they were captured and as several methods have them."""
+"""Bodies at the event of a clip, as captured and as predicted."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,8 +13,10 @@ CAPTURED = "captured"
 
 @dataclass(frozen=True)
 class Still:
-    """joints (J, 3), m, when an effector is nearest to where its event is, its path (F, 3) and
-    that place (3,)."""
+    """Body at the frame where the event's joint is nearest to its position at the event, m.
+
+    joints: (J, 3). path: of the event's joint (F, 3). event: its position at the event (3,).
+    """
 
     joints: Floats
     path: Floats
@@ -22,11 +24,11 @@ class Still:
 
 
 Stills = Mapping[str, Sequence[Still | None]]
-"""Of each method, clip by clip; None where it was not asked."""
+"""Bodies of each method, clip by clip; None for clips that it did not predict."""
 
 
 def still(motion: Motion | None, joint: int) -> Still | None:
-    """A motion at its event; None of one that has none."""
+    """Return a motion's body at its event; None without motion or event."""
     if motion is None or motion.event is None:
         return None
     path = motion.joints[:, joint]
@@ -35,8 +37,10 @@ def still(motion: Motion | None, joint: int) -> Still | None:
 
 
 def chosen(stills: Stills, methods: Sequence[str]) -> int | None:
-    """The clip in the middle of how far the first method is off at the event, of those that all
-    were asked for."""
+    """Return the index of the clip of median effector error of the first method, or None.
+
+    Only clips that all methods predicted count.
+    """
     there = [
         place
         for place, truth in enumerate(stills.get(CAPTURED, ()))

@@ -1,4 +1,4 @@
-"""A protocol's result as means over clips, as JSON and as a table."""
+"""Results of a protocol as means over clips: as JSON, as a table and in sentences."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -6,38 +6,50 @@ from typing import Any
 
 import numpy as np
 
-from model_export.evaluate import columns, errors, flags, reach
+from model_export.evaluate import corrections, errors, markdown
 from model_export.evaluate.errors import Errors
-from model_export.evaluate.flags import Flags
 from model_export.evaluate.methods import DEFINITIONS, EXACT, OURS
+from model_export.evaluate.newcomers import NOBODY, SHOWN
 from model_export.evaluate.protocol import Result
-from model_export.report import plain
+from model_export.report import rounding
 from service.motion.conventions import Floats
 
-DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
-HEAD = (
-    "method",
-    "relative",
-    "±",
-    "less ours",
-    "±",
-    "global",
-    "effector",
-    "plain rel.",
-    "plain glob.",
-    "duration",
-    "accel.",
-    "skate",
+DISTANCES = {
+    "relative": "relative",
+    "absolute": "global",
+    "plain_relative": "relative, unwarped",
+    "plain_absolute": "global, unwarped",
+    "shell": "shell",
+}
+"""Distances of `Errors`, and their titles."""
+COLUMNS = (
+    ("method", "defined below"),
+    ("relative", "distance without the root's position, after time warping"),
+    ("±", "standard error of the column before, over clips"),
+    ("difference", "relative distance less that of posefield, clip by clip"),
+    ("±", "standard error of the column before, over clips"),
+    ("global", "distance with the root's position, after time warping"),
+    ("effector", "distance of the event's joint at its event"),
+    ("rel. unwarped", "relative distance at equal shares of the duration, without time warping"),
+    ("glob. unwarped", "global distance at equal shares of the duration, without time warping"),
+    ("duration", "RMS of the logarithm of synthesised over captured duration"),
+    ("accel.", "mean acceleration, synthesised over captured"),
+    ("skate", "speed of feet on the ground, synthesised over captured"),
+)
+"""Titles of the table's columns, and their meanings."""
+UNITS = (
+    "Distances are in centimetres, mean over joints, frames and clips. Sigma ratio: mean squared "
+    "error over the squared error that the model predicts; 1 is ideal."
 )
 
 
 @dataclass(frozen=True)
 class Summary:
-    """One method over all clips that it was asked for.
+    """Errors of one method over all clips that it predicted.
 
-    clips, left_out: how many those are, and how many others there are. mean: its errors.
-    standard_error, m: of the mean relative distance. worse, worse_error, m: by how much its
-    relative distance exceeds ours on the same clip, and the standard error of that.
+    clips: number of those. left_out: number of all others. mean: its errors. standard_error: of the
+    mean relative distance, m. worse: mean difference of its relative distance from posefield's on
+    the same clips, m. worse_error: standard error of that difference, m.
     """
 
     name: str
@@ -50,12 +62,12 @@ class Summary:
 
     @property
     def skate(self) -> float:
-        """Speed of its feet on the ground over that of the captured ones; 0 without feet."""
+        """Return the ratio of foot speed on the ground to that of captured feet; 0 without feet."""
         captured = self.mean.skate_captured
         return self.mean.skate / captured if captured else 0.0
 
     def facts(self) -> dict[str, Any]:
-        """Figures by name, distances in centimetres."""
+        """Return the figures by name, distances in centimetres."""
         mean = self.mean
         return {
             "clips": self.clips,
@@ -68,9 +80,9 @@ class Summary:
             "standard_error_cm": centimetres(self.standard_error),
             "difference_cm": centimetres(self.worse),
             "difference_standard_error_cm": centimetres(self.worse_error),
-            "duration_error": plain.number(mean.duration),
-            "acceleration_ratio": plain.number(mean.acceleration),
-            "skate_ratio": plain.number(self.skate) if mean.skate_captured else None,
+            "duration_error": rounding.number(mean.duration),
+            "acceleration_ratio": rounding.number(mean.acceleration),
+            "skate_ratio": rounding.number(self.skate) if mean.skate_captured else None,
             "skate_cm_per_s": centimetres(mean.skate),
             "distances_cm": {
                 name: {
@@ -82,7 +94,7 @@ class Summary:
         }
 
     def cells(self) -> tuple[str, ...]:
-        """Its row of the table, in centimetres and shares."""
+        """Return the row of the table under COLUMNS."""
         mean = self.mean
         ours = self.name == OURS
         return (
@@ -106,16 +118,17 @@ def _two(metres: float) -> str:
 
 
 def centimetres(metres: float) -> float | None:
-    return None if np.isnan(metres) else plain.number(100.0 * metres)
+    """Return a rounded length in centimetres; None for NaN."""
+    return None if np.isnan(metres) else rounding.number(100.0 * metres)
 
 
 def relative(found: Sequence[Errors]) -> Floats:
-    """Mean relative distance (C,) of each clip, m."""
+    """Return the mean relative distance (C,) of each clip, m."""
     return np.array([error.relative.mean for error in found])
 
 
 def of(result: Result) -> list[Summary]:
-    """Every method of a result, ours first."""
+    """Return the summary of each method, posefield's first."""
     return [_summary(result, name) for name in result.errors if result.asked(name)]
 
 
@@ -139,97 +152,110 @@ def _standard_error(values: Floats) -> float:
 
 
 def sigma_ratio(result: Result) -> float:
-    """Mean of squared distance over squared prediction: one where sigma is right."""
+    """Return the mean of squared error over squared sigma."""
     squared = np.array([error.squared for error in result.of(OURS, result.asked(OURS))])
     return float(np.mean(squared / np.square(result.sigma)))
 
 
 def joint_sigma_ratios(result: Result) -> dict[str, float]:
-    """The same for each joint alone, by name."""
+    """Return the mean of squared error over squared sigma of each joint."""
     squared = np.stack([error.joints for error in result.of(OURS, result.asked(OURS))])
     ratios = np.mean(squared / np.square(result.joint_sigma), axis=0)
     return dict(zip(result.joints, ratios.tolist(), strict=True))
 
 
-def flags_facts(found: Flags) -> dict[str, Any]:
-    """How the support flag does, as JSON holds it."""
-    facts = {
-        "false_alarms": plain.number(found.alarms),
-        "beyond": {name: plain.number(share) for name, share in found.beyond.items()},
-    }
-    if found.gap is None:
-        return facts
-    control, share = found.gap
-    return {**facts, "gap": {"control": control, "flagged": plain.number(share)}}
-
-
-def flags_said(found: Flags) -> str:
-    """The same in a sentence."""
-    beyond = ", ".join(f"{name} {100 * share:.0f}" for name, share in found.beyond.items())
-    said = (
-        f"support: {100 * found.alarms:.1f} % of held-out clips flagged; of those moved "
-        f"{100 * flags.BEYOND:.0f} % of its range beyond a control, %: {beyond}"
-    )
-    if found.gap is None:
-        return said
-    control, share = found.gap
-    return f"{said}; in the gap of {control}, %: {100 * share:.0f}"
-
-
-def _joints_said(result: Result) -> str:
-    """Sigma by joint in a sentence."""
-    ratios = joint_sigma_ratios(result)
-    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
-    return (
-        f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
-        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
-    )
-
-
 def facts(result: Result) -> dict[str, Any]:
-    """Figures of a result as JSON holds them."""
-    held = {} if result.flags is None else {"support": flags_facts(result.flags)}
+    """Return the figures of a result as JSON values."""
+    held = {} if result.flags is None else {"support": result.flags.facts()}
     by_joint = joint_sigma_ratios(result)
     methods = {summary.name: summary.facts() for summary in of(result)}
     if EXACT in methods:
-        methods[EXACT]["exact"] = reach.facts(result)
+        methods[EXACT]["exact"] = corrections.facts(result)
     return {
         "family": result.family,
         "protocol": result.protocol,
         "clips": len(result.clips),
-        "sigma_ratio": plain.number(sigma_ratio(result)),
-        "joint_sigma_ratio": {name: plain.number(ratio) for name, ratio in by_joint.items()},
+        "sigma_ratio": rounding.number(sigma_ratio(result)),
+        "joint_sigma_ratio": {name: rounding.number(ratio) for name, ratio in by_joint.items()},
         **held,
         "methods": methods,
     }
 
 
 def table(result: Result) -> str:
-    """A result in Markdown, the columns even for who reads it as it is."""
+    """Return a result as a table in Markdown under a title."""
     title = (
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
-    rows = columns.even(HEAD, [summary.cells() for summary in of(result)])
-    return f"{title}\n\n{rows}"
+    head = [title for title, _ in COLUMNS]
+    return f"{title}\n\n{markdown.table(head, [summary.cells() for summary in of(result)])}"
 
 
-def trust_said(result: Result) -> list[str]:
-    """How sigma by joint and the support flag do, a sentence each."""
-    return [_joints_said(result)] + ([flags_said(result.flags)] if result.flags else [])
+def trust_text(result: Result) -> list[str]:
+    """Return a sentence on sigma by joint, and one on the support flag."""
+    ratios = joint_sigma_ratios(result)
+    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    joints = (
+        f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
+        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
+    )
+    return [joints] + ([result.flags.text()] if result.flags else [])
 
 
-LEGEND = (
-    "Centimetres, mean over joints, frames and clips. relative: root position taken out; global: "
-    "left in; both after slope-limited time warping; plain: at equal shares of the duration. "
-    "less ours: the method's relative error less ours, clip by clip. effector: the event's joint "
-    "at its event. duration: root mean square of the logarithm. accel., skate: synthesised over "
-    "captured. sigma ratio: squared error over the squared error predicted. posefield_exact is "
-    "told where the captured clip has the event's joint; beyond: places farther from the root."
-)
-
-
-def definitions(results: Sequence[Result]) -> str:
-    """What each method of some results is, a line each."""
+def legend(results: Sequence[Result]) -> str:
+    """Return units, columns and methods of the tables of some results, one per line."""
+    meanings = [f"  {title}: {meaning}" for title, meaning in COLUMNS if title != "±"]
     names = dict.fromkeys(name for result in results for name in result.errors)
-    return "\n".join(f"  {name}: {DEFINITIONS[name]}" for name in names)
+    definitions = [f"  {name}: {DEFINITIONS[name]}" for name in names]
+    return "\n".join([UNITS, *meanings, "  ±: standard error over clips", "Methods:", *definitions])
+
+
+def performer_facts(results: Sequence[Result]) -> dict[str, Any]:
+    """Return the error reduction by performer names and by clips of new performers.
+
+    Empty unless both protocols were run on a model that distinguishes performers.
+    """
+    by_name = {result.protocol: result for result in results}
+    clips, others = (by_name.get(f"leave_one_{held}_out") for held in ("clip", "performer"))
+    if not clips or not others or NOBODY not in clips.errors:
+        return {}
+    everyone = clips.asked(NOBODY)
+    named, unnamed = (_mean_relative(clips, name, everyone) for name in (OURS, NOBODY))
+    adapted = {name: _adapted(clips, others, name) for name in SHOWN if others.asked(name)}
+    return {"named_nearer": rounding.number(1.0 - named / unnamed), **adapted}
+
+
+def _adapted(clips: Result, others: Result, name: str) -> dict[str, Any]:
+    """Compare an adapted model with models of none, and of the other clips of the performer."""
+    places = others.asked(name)
+    own, none = (_mean_relative(others, one, places) for one in (name, OURS))
+    whole = _mean_relative(clips, OURS, places)
+    return {
+        "clips": len(places),
+        "relative_cm": centimetres(own),
+        "shown_none_cm": centimetres(none),
+        "shown_all_cm": centimetres(whole),
+        "farther_than_all": rounding.number(own / whole - 1.0),
+    }
+
+
+def _mean_relative(result: Result, name: str, places: Sequence[int]) -> float:
+    return float(relative(result.of(name, places)).mean())
+
+
+def performer_text(results: Sequence[Result]) -> list[str]:
+    """Return the performer facts, a sentence each."""
+    found = performer_facts(results)
+    if not found:
+        return []
+    return [
+        f"with the performer's name the error is {100 * found['named_nearer']:.1f} % smaller",
+        *(
+            f"{name}: {one['relative_cm']:.2f} cm on {one['clips']} clips; without clips of the "
+            f"performer {one['shown_none_cm']:.2f} cm; trained with all other clips "
+            f"{one['shown_all_cm']:.2f} cm ({100 * one['farther_than_all']:+.1f} %)"
+            for name in SHOWN
+            if (one := found.get(name))
+        ),
+    ]

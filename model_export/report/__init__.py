@@ -1,1 +1,1 @@
-"""The training report: one page with pictures, and its numbers as JSON."""
+"""Training report: an HTML page with charts, and its figures as JSON."""

@@ -1,4 +1,4 @@
-"""Where in the control space there are samples."""
+"""Coverage of the control space by the captured clips."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from model_export.report import picture, plain
-from model_export.report.page import Section, Table
+from model_export.report import chart, rounding
+from model_export.report.html_page import Section, Table
 from model_export.train import Trained
 from service.motion.card import Control
 from service.motion.conventions import Floats
@@ -17,9 +17,10 @@ BINS = 16
 
 @dataclass(frozen=True)
 class Coverage:
-    """values (N, d): controls of the clips. missed (N,): how well the others predict each, m.
+    """Controls of the clips and their errors.
 
-    performers (N,): empty names where the recipe does not say who moved.
+    values: (N, d). missed: leave-one-out error (N,) of each clip, m. performers: names (N,), empty
+    if the recipe has none.
     """
 
     controls: tuple[Control, ...]
@@ -28,7 +29,7 @@ class Coverage:
     performers: tuple[str, ...]
 
     def labels(self) -> tuple[str, ...]:
-        """Controls with one value for each of several performers: they say who moved."""
+        """Return the controls that have one value for each performer, and so identify them."""
         whose = np.unique(self.performers, return_inverse=True)[1]
         several = 1 < len(set(self.performers)) < len(self.performers)
         return tuple(
@@ -38,63 +39,61 @@ class Coverage:
         )
 
     def facts(self) -> dict[str, Any]:
-        """Of each control what was sampled, and the widest range in which nothing was."""
+        """Return range, values and widest gap of each control, and their correlation."""
         return {
             "controls": [
                 {
                     "name": control.name,
                     "unit": control.unit,
-                    "minimum": plain.number(control.minimum),
-                    "maximum": plain.number(control.maximum),
+                    "minimum": rounding.number(control.minimum),
+                    "maximum": rounding.number(control.maximum),
                     "distinct": len(np.unique(own)),
-                    "values": plain.numbers(control.values),
-                    "widest_gap": plain.numbers(_gap(own)),
+                    "values": rounding.numbers(control.values),
+                    "widest_gap": rounding.numbers(_gap(own)),
                 }
                 for control, own in zip(self.controls, self.values.T, strict=True)
             ],
             "one_value_a_performer": list(self.labels()),
-            "correlation": plain.numbers(self._correlation()),
+            "correlation": rounding.numbers(self._correlation()),
         }
 
     def _correlation(self) -> Floats:
         return np.atleast_2d(np.corrcoef(self.values.T))
 
     def section(self) -> Section:
-        """Every pair of controls, and a word on those that only have a few values."""
-        words = (
-            "A field knows nothing where it has no samples: corners that are empty here are "
-            "extrapolated to, whatever the ranges of the single controls say.",
+        """Return a table of the controls, warnings, and a scatter plot of each pair."""
+        paragraphs = (
+            "Where no clip was captured the model extrapolates. The charts show such regions; they "
+            "may lie within the range of every single control.",
             *self._warnings(),
         )
         rows = tuple(
             self._row(control, own)
             for control, own in zip(self.controls, self.values.T, strict=True)
         )
-        heading = ("control", "unit", "from", "to", "distinct values", "widest gap")
+        titles = ("minimum", "maximum", "distinct values", "widest gap", "description")
+        table = Table("Captured range of each control", ("control", "unit", *titles), rows)
         names = ", ".join(control.name for control in self.controls)
-        drawn = picture.draw(
-            "coverage",
+        drawn = chart.draw(
             max(3.0, min(9.0, 2.1 * len(self.controls))),
             self._paint,
-            f"Pair plot of {names} over {len(self.values)} clips.",
-            "Below the diagonal the clips, darker where the others predict them worse; on it how "
-            "often each value was sampled; above it the correlation.",
+            f"Scatter plots of each pair of the controls {names}, over {len(self.values)} clips.",
+            "Below the diagonal: the clips, coloured by their leave-one-out error. On the "
+            "diagonal: number of clips by value. Above the diagonal: correlation.",
         )
-        return Section(
-            "coverage", "Coverage of the controls", words, (Table(heading, rows),), (drawn,)
-        )
+        return Section("coverage", "Coverage of the controls", paragraphs, (table,), (drawn,))
 
     def _warnings(self) -> list[str]:
         few = [
             f"{control.name} has only {len(control.values)} distinct values "
-            f"({', '.join(f'{value:g}' for value in control.values)}): nothing was seen between "
-            "them."
+            f"({', '.join(f'{value:g}' for value in control.values)}): nothing was captured "
+            "between them."
             for control in self.controls
             if control.values
         ]
         return few + [
-            f"{name} has one value for each performer, and so tells who moved: leaving one clip "
-            "out is too kind to such a model, and a new performer is predicted less well."
+            f"{name} has one value for each performer and so identifies the performer. The "
+            "leave-one-out error is then too small for new performers."
             for name in self.labels()
         ]
 
@@ -103,7 +102,8 @@ class Coverage:
         low, high = _gap(own)
         ends = f"{control.minimum:.4g}", f"{control.maximum:.4g}"
         gap = f"{low:.4g} to {high:.4g}"
-        return (control.name, control.unit, *ends, str(len(np.unique(own))), gap)
+        distinct = str(len(np.unique(own)))
+        return (control.name, control.unit, *ends, distinct, gap, control.description)
 
     def _paint(self, figure: Figure) -> None:
         count = len(self.controls)
@@ -111,33 +111,33 @@ class Coverage:
         strength = self._correlation()
         for (row, column), ax in np.ndenumerate(axes):
             if row < column:
-                said = f"correlation\n{strength[row, column]:+.2f}"
-                ax.text(0.5, 0.5, said, ha="center", va="center", color=picture.GREY)
+                text = f"correlation\n{strength[row, column]:+.2f}"
+                ax.text(0.5, 0.5, text, ha="center", va="center", color=chart.GREY)
                 ax.set_axis_off()
             elif row > column:
                 x, y = self.values[:, [column, row]].T
                 seen = ax.scatter(x, y, c=100 * self.missed, s=16, cmap="viridis_r")
             else:
-                ax.hist(self.values[:, row], bins=BINS, color=picture.BLUE)
+                ax.hist(self.values[:, row], bins=BINS, color=chart.BLUE)
                 ax.grid(visible=False, axis="x")
                 ax.yaxis.get_major_locator().set_params(integer=True)
-        titles = [f"{control.name} ({control.unit})" for control in self.controls]
+        titles = [f"{chart.label(c.name)} ({chart.label(c.unit)})" for c in self.controls]
         for at, title in enumerate(titles):
             axes[-1, at].set_xlabel(title)
             axes[at, 0].set_ylabel(title if at else "clips")
         if count > 1:
-            figure.colorbar(seen, ax=axes, label="missed by (cm)", shrink=0.6, aspect=30)
+            figure.colorbar(seen, ax=axes, label="leave-one-out error (cm)", shrink=0.6, aspect=30)
 
 
 def _gap(values: Floats) -> tuple[float, float]:
-    """Ends of the widest range in which no value lies."""
+    """Return the ends of the widest range without a value."""
     distinct = np.unique(values)
     at = int(np.argmax(np.diff(distinct)))
     return float(distinct[at]), float(distinct[at + 1])
 
 
 def of(trained: Trained, controls: tuple[Control, ...]) -> Coverage:
-    """Coverage of a trained model's controls."""
+    """Return the coverage of a trained model's controls."""
     values = np.stack([example.controls for example in trained.examples])
     performers = tuple(example.row.performer for example in trained.examples)
     return Coverage(controls, values, np.sqrt(trained.missed), performers)

@@ -1,4 +1,4 @@
-"""What each direction of the three modes carries, and how many are kept."""
+"""Singular values of the three modes of the motion tensor (Mukai & Kuriyama 2006, section 2)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,51 +7,52 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from model_export import hosvd
-from model_export.report import picture, plain
-from model_export.report.page import Section
+from model_export.report import chart, rounding
+from model_export.report.html_page import Section
 from model_export.train import Trained
 from service.motion.conventions import Floats
 
 MODES = ("degrees of freedom", "frames", "samples")
-# A micrometre is nothing that anyone sees, and a logarithmic axis should end somewhere, m.
+# Lower end of the logarithmic axis, m: invisible in an animation.
 SMALLEST = 1e-6
 
 
 @dataclass(frozen=True)
 class Spectra:
-    """carried: of each mode, the root mean square joint distance of each direction, m."""
+    """Spectra of the modes.
+
+    carried: RMS joint distance, m, of each direction, by mode. ranks: kept of each mode.
+    """
 
     carried: tuple[Floats, ...]
     ranks: tuple[int, ...]
 
     def facts(self) -> dict[str, Any]:
-        """By mode: what each direction carries, m, and how many are kept."""
+        """Return the distance of each direction, m, and the rank, by mode."""
         return {
-            mode: {"kept": rank, "carried_m": plain.numbers(carried)}
+            mode: {"kept": rank, "carried_m": rounding.numbers(carried)}
             for mode, rank, carried in zip(MODES, self.ranks, self.carried, strict=True)
         }
 
     def section(self) -> Section:
-        """The three spectra side by side."""
+        """Return a chart of the three spectra."""
         sizes = ", ".join(
             f"{rank} of {len(carried)} {mode}"
             for mode, rank, carried in zip(MODES, self.ranks, self.carried, strict=True)
         )
-        return Section(
-            "spectra",
-            "Spectra of the motion tensor",
-            (f"The model keeps {sizes}. A spectrum that falls steeply compresses well.",),
-            pictures=(
-                picture.draw(
-                    "spectra",
-                    3.2,
-                    self._paint,
-                    f"Singular values of the three modes on a logarithmic scale; kept: {sizes}.",
-                    "What each direction of a mode carries, as root mean square joint distance. "
-                    "Blue directions are kept, grey ones are cut off.",
-                ),
-            ),
+        paragraphs = (
+            "The motion tensor holds all clips as one array of degrees of freedom × frames × "
+            f"samples. The model keeps {sizes}, as basis directions. The steeper a curve falls, "
+            "the better the motions compress.",
         )
+        drawn = chart.draw(
+            3.2,
+            self._paint,
+            f"Singular values of the three modes on a logarithmic scale; kept: {sizes}.",
+            "Contribution of each basis direction to the motions, as RMS joint distance. Blue "
+            "directions are kept, grey ones are dropped.",
+        )
+        return Section("spectra", "Spectra of the motion tensor", paragraphs, charts=(drawn,))
 
     def _paint(self, figure: Figure) -> None:
         axes = figure.subplots(1, 3, sharey=True)
@@ -59,15 +60,16 @@ class Spectra:
             at = np.arange(1, len(carried) + 1)
             seen = carried > SMALLEST
             kept = seen & (at <= rank)
-            ax.semilogy(at[seen & ~kept], 100 * carried[seen & ~kept], ".", color=picture.FAINT)
-            ax.semilogy(at[kept], 100 * carried[kept], ".", color=picture.BLUE)
-            ax.axvline(rank + 0.5, color=picture.ORANGE, linewidth=1.0)
+            ax.semilogy(at[seen & ~kept], 100 * carried[seen & ~kept], ".", color=chart.FAINT)
+            ax.semilogy(at[kept], 100 * carried[kept], ".", color=chart.BLUE)
+            ax.axvline(rank + 0.5, color=chart.ORANGE, linewidth=1.0)
             ax.set(title=f"{mode}: {rank} of {len(carried)}", xlabel="direction")
-        axes[0].set_ylabel("carried (cm)")
+        axes[0].set_ylabel("RMS joint distance (cm)")
+        chart.plain_logarithm(axes[0].yaxis)
 
 
 def of(trained: Trained) -> Spectra:
-    """Spectra of a trained model's tensor."""
+    """Return the spectra of a trained model's tensor."""
     core = trained.full.core
     energies = [np.sum(np.square(hosvd.unfold(core, mode)), axis=1) for mode in range(3)]
     return Spectra(

@@ -1,4 +1,4 @@
-"""How motions part with their controls: pairs, their means by distance, and the fields' curves."""
+"""Variograms of the poses: differences between clips over distances between their controls."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,25 +9,25 @@ from matplotlib.figure import Figure
 
 from model_export import variogram
 from model_export.covariance import COVARIANCES
-from model_export.report import left_out, picture, plain
-from model_export.report.page import Section
+from model_export.report import chart, rounding
+from model_export.report.html_page import Section
 from model_export.train import Trained
 from model_export.variogram import Experimental, Fit
 from service.motion.card import Control
 from service.motion.conventions import Floats
 
-# A pair goes along a control that has at least this share of its way: within 45 degrees.
+# A pair counts for a control that contributes this share of its distance: within 45 degrees.
 ALONG = np.sqrt(0.5)
-# A curve through fewer lags than this would be drawn at will.
+# Fewer lags do not determine a curve.
 FEWEST_LAGS = 3
 
 
 @dataclass(frozen=True)
 class Direction:
-    """Pairs (P,) of clips along one control, or in the field's own distance.
+    """Pairs (P,) of clips along one control, or by the scaled distance of all controls.
 
-    distances in unit, semivariances in m². mean: by lag. fit: to the mean, where there are lags
-    enough. scale: what a unit is worth to the field as distance.
+    distances: in `unit`. semivariances: m². mean: by lag. fit: None with fewer than FEWEST_LAGS
+    lags. scale: factor from the unit to the scaled distance.
     """
 
     name: str
@@ -39,22 +39,25 @@ class Direction:
     scale: float
 
     def facts(self) -> dict[str, Any]:
-        """Means by lag and the fit; the pairs themselves are only drawn."""
+        """Return the means by lag and the fit, without the pairs."""
         return {
             "name": self.name,
             "distance_unit": self.unit,
             "pairs": len(self.distances),
-            "lag_distances": plain.numbers(self.mean.distances),
-            "lag_semivariances_m2": plain.numbers(self.mean.values),
+            "lag_distances": rounding.numbers(self.mean.distances),
+            "lag_semivariances_m2": rounding.numbers(self.mean.values),
             "lag_pairs": [int(count) for count in self.mean.pairs],
-            "fit": self.fit and {name: plain.number(x) for name, x in vars(self.fit).items()},
-            "field_scale": plain.number(self.scale),
+            "fit": self.fit and {name: rounding.number(x) for name, x in vars(self.fit).items()},
+            "field_scale": rounding.number(self.scale),
         }
 
 
 @dataclass(frozen=True)
 class Variograms:
-    """Directions, the field's own distance last; covariance, nugget (of the sill) and sill, m²."""
+    """Directions, the scaled distance last, and the kriging model of the poses.
+
+    nugget: share of the sill. sill: m².
+    """
 
     directions: tuple[Direction, ...]
     covariance: str
@@ -63,40 +66,40 @@ class Variograms:
 
     @property
     def _grid(self) -> tuple[int, int]:
-        """Rows and columns of panels."""
+        """Return the rows and columns of panels."""
         columns = 2 if len(self.directions) in (2, 4) else 3
         return -(-len(self.directions) // columns), columns
 
     def facts(self) -> dict[str, Any]:
-        """The pose field's parameters and every direction."""
+        """Return the parameters of the kriging model, and every direction."""
         return {
             "covariance": self.covariance,
-            "nugget": plain.number(self.nugget),
-            "sill_m2": plain.number(self.sill),
+            "nugget": rounding.number(self.nugget),
+            "sill_m2": rounding.number(self.sill),
             "directions": [direction.facts() for direction in self.directions],
         }
 
     def section(self) -> Section:
-        """One panel a control and one for all."""
+        """Return a chart with a panel for each control and one for all controls."""
         rows, _ = self._grid
         names = ", ".join(direction.name for direction in self.directions[:-1])
-        words = (
-            "Half the mean squared distance between two motions, after the drift is taken off, "
-            "against how far apart their controls lie. A cloud that does not rise says that a "
-            "control does not explain the motions; one that starts high, that equal controls are "
-            "met by unequal motions.",
-            f"The field in use was tuned by leave-one-out: {self.covariance}, nugget "
-            f"{self.nugget:.3g} of the sill. Its curve has the height that leave-one-out found, "
-            "which counts in how far prediction has to reach.",
+        paragraphs = (
+            "A variogram shows how much two clips differ (half the mean squared distance between "
+            "their motions, without the trend) against the distance between their controls. If "
+            "the dots do not rise, the control does not explain the motions. If they start high, "
+            "clips with equal controls differ.",
+            f"The kriging model in use was tuned by leave-one-out: covariance {self.covariance}, "
+            f"nugget {self.nugget:.3g} of the sill. The height of its curve is fitted to the "
+            "leave-one-out errors and so may differ from the dots.",
         )
         caption = (
-            "Pairs of clips (grey), their means by distance (blue, larger for more pairs) with a "
-            "fit (line), and the curve of the field in use (orange). Along a control count pairs "
-            "whose way is mostly along it."
+            "Pairs of clips (grey), their means by distance (blue dots, larger for more pairs) "
+            "with a fitted curve (blue), and the kriging model in use (orange). The panel of a "
+            "control shows the pairs that differ mostly in that control."
         )
-        alt = f"Variogram clouds along {names}, and in the pose field's own scaled distance."
-        drawn = picture.draw("variograms", 2.9 * rows, self._paint, alt, caption)
-        return Section("variograms", "Variograms", words, pictures=(drawn,))
+        alt = f"Variograms along {names}, and over the scaled distance of all controls."
+        drawn = chart.draw(2.9 * rows, self._paint, alt, caption)
+        return Section("variograms", "Variograms", paragraphs, charts=(drawn,))
 
     def _paint(self, figure: Figure) -> None:
         axes = figure.subplots(*self._grid, sharey=True, squeeze=False)
@@ -110,21 +113,21 @@ class Variograms:
         axes[0, 0].set_ylim(0.0, 1.15e4 * max(tops))
 
     def _panel(self, ax: Axes, direction: Direction) -> None:
-        # Thousands of points are one picture within the picture.
+        # Thousands of points take less space as a bitmap.
         (cloud,) = ax.plot(direction.distances, 1e4 * direction.semivariances, ".", markersize=4)
-        cloud.set(color=picture.GREY, alpha=0.45, rasterized=True, markeredgewidth=0)
+        cloud.set(color=chart.GREY, alpha=0.45, rasterized=True, markeredgewidth=0)
         mean, far = direction.mean, direction.distances.max(initial=0.1)
         at = np.linspace(0.0, far, 100)
         field = self.sill * (self.nugget + self._rise(at * direction.scale))
-        ax.plot(at, 1e4 * field, color=picture.ORANGE)
+        ax.plot(at, 1e4 * field, color=chart.ORANGE)
         if direction.fit:
             fitted = direction.fit.nugget + direction.fit.sill * self._rise(
                 at / direction.fit.range
             )
-            ax.plot(at, 1e4 * fitted, color=picture.BLUE, linewidth=1.0)
+            ax.plot(at, 1e4 * fitted, color=chart.BLUE, linewidth=1.0)
         size = 10.0 + 50.0 * mean.pairs / mean.pairs.max(initial=1.0)
-        ax.scatter(mean.distances, 1e4 * mean.values, s=size, color=picture.BLUE, zorder=3)
-        title = f"{direction.name}: {len(direction.distances)} pairs"
+        ax.scatter(mean.distances, 1e4 * mean.values, s=size, color=chart.BLUE, zorder=3)
+        title = f"{chart.label(direction.name)}: {len(direction.distances)} pairs"
         ax.set(title=title, xlabel=direction.unit, xlim=(0.0, 1.03 * far))
 
     def _rise(self, distances: Floats) -> Floats:
@@ -132,11 +135,11 @@ class Variograms:
 
 
 def of(trained: Trained, controls: tuple[Control, ...]) -> Variograms:
-    """Variograms of a trained model's pose field over its controls."""
+    """Return the variograms of a trained model's poses over its controls."""
     hyper, points = trained.pose.hyper, trained.laid.half_ranges
     left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
     first, second = np.triu_indices(len(points), k=1)
-    # The tensor sums over joints and frames; a mean is what can be read.
+    # The tensor sums over joints and frames; the chart shows a mean.
     shared = trained.tensor.weight * trained.tensor.values.shape[1]
     halves = 0.5 * np.sum(np.square(left[first] - left[second]), axis=1) / shared
     gaps = np.abs(points[first] - points[second])
@@ -144,11 +147,13 @@ def of(trained: Trained, controls: tuple[Control, ...]) -> Variograms:
     directions = []
     for control, gap, scale in zip(controls, gaps.T, hyper.scales, strict=True):
         along = (gap >= ALONG * ways) & (ways > 0.0)
-        of_unit = control.name, "half-ranges"
-        mean = by_lag(gap[along], halves[along])
+        pairs = gap[along], halves[along]
+        mean = by_lag(*pairs)
         fit = _fit(mean, hyper.covariance)
-        directions.append(Direction(*of_unit, gap[along], halves[along], mean, fit, float(scale)))
-    others = left_out.performers(trained)[first] != left_out.performers(trained)[second]
+        own = Direction(control.name, "half-ranges", *pairs, mean, fit, float(scale))
+        directions.append(own)
+    performers = np.array([example.row.performer for example in trained.examples])
+    others = performers[first] != performers[second]
     scaled = np.sqrt(np.sum(np.square(gaps * hyper.scales), axis=1) + hyper.label**2 * others)
     mean = by_lag(scaled, halves)
     fit = _fit(mean, hyper.covariance)
@@ -159,7 +164,7 @@ def of(trained: Trained, controls: tuple[Control, ...]) -> Variograms:
 
 
 def by_lag(distances: Floats, semivariances: Floats) -> Experimental:
-    """Means (L,) over the lags with enough pairs of (P,) pairs, by the variogram's own lags."""
+    """Return the means (L,) of pairs (P,) over the variogram's lags that have enough pairs."""
     far = variogram.FAR * distances.max(initial=0.0)
     edges = np.linspace(0.0, far, variogram.LAGS + 1)
     lag = np.searchsorted(edges, distances, side="left") - 1

@@ -1,1 +1,1 @@
-"""Procedural sample motions, whose truth is known at every control point."""
+"""Procedural sample motions with a known truth at every control point."""

@@ -1,7 +1,7 @@
-"""The arm that reaches, the arm that balances, and their hands.
+"""The reaching arm, the balancing arm, and their hands.
 
-Angles are those of the right arm. A left arm is its mirror image: x keeps its sign, y and z change
-theirs. About z a positive angle lowers the arm and curls a finger, about y it brings arm and
+Angles are those of the right arm. The left arm is its mirror image: x keeps its sign, y and z
+change theirs. A positive angle about z lowers the arm and curls a finger, about y it brings arm and
 forearm forwards, about x it turns the palm from inwards to down.
 """
 
@@ -19,7 +19,7 @@ from service.motion.skeleton import Skeleton
 _MIRROR = {side: np.array([1.0, -sign, -sign]) for side, sign in body.SIDES.items()}
 
 _ELBOW_SIDE = np.array([-0.68, -0.70, -0.22])
-"""Where the right elbow points seen from the chest: outwards, down and a little back."""
+"""Direction of the right elbow in the chest's frame: outwards, down and a little back."""
 
 _RIPE = {
     "Thumb1": (0.30, -0.50, 0.20),
@@ -33,8 +33,11 @@ _RIPE = {
 
 @dataclass(frozen=True)
 class Pose:
-    """An arm: Euler angles (..., 3) of the shoulder blade, the upper arm's rotation (..., 4),
-    the elbow's flexion (...), the forearm's pronation (...) and the wrist's Euler angles (..., 3).
+    """Pose of an arm.
+
+    blade: Euler angles (..., 3) of the shoulder blade. upper: rotation (..., 4) of the upper arm.
+    flexion: of the elbow (...). pronation: of the forearm (...). wrist: Euler angles (..., 3).
+    Angles in rad.
     """
 
     blade: Floats
@@ -59,7 +62,7 @@ def _named(pose: Pose, side: str) -> dict[str, Floats]:
 
 
 def _rest(controls: Controls) -> Pose:
-    """Hanging beside the body when standing, hand on the thigh when sitting."""
+    """Return the arm at rest: beside the body when standing, hand on the thigh when sitting."""
     sitting = 1.0 - controls.uprightness
     hanging = quat.from_euler(np.array([-0.05 - 0.25 * sitting, 1.33 - 0.06 * sitting]), "XZ")
     return Pose(
@@ -72,7 +75,7 @@ def _rest(controls: Controls) -> Pose:
 
 
 def blade(controls: Controls, goal: Effort, u: Floats) -> Floats:
-    """Rotation (P, 4) of the right shoulder blade, which decides where the arm begins."""
+    """Return rotations (P, 4) of the right shoulder blade, which moves the root of the arm."""
     end = np.array([0.35 * goal.low - 0.06, 0.14 + 0.06 * controls.azimuth, 0.08 * goal.low])
     return quat.from_euler(_blend(_rest(controls).blade, end, timing.shoulder(u)), "ZYX")
 
@@ -82,7 +85,10 @@ def _blend(start: Floats, end: Floats, progress: Floats) -> Floats:
 
 
 def _reached(controls: Controls, goal: Effort, figure: Skeleton, to_target: Floats) -> Pose:
-    """Arm at the end, palm on the target; to_target (3,) from shoulder in the blade's frame."""
+    """Return the final pose of the arm, with the palm on the target.
+
+    to_target: from the shoulder (3,), m, in the blade's frame.
+    """
     pronation = np.array(0.35 + 0.5 * goal.low)
     wrist = np.array([-0.22 + 0.25 * goal.low, 0.10, 0.04 * controls.azimuth])
     hand, middle = (body.offset(figure, "Right" + name) for name in ("Hand", "Middle1"))
@@ -98,13 +104,13 @@ def _reached(controls: Controls, goal: Effort, figure: Skeleton, to_target: Floa
 def right(
     controls: Controls, goal: Effort, figure: Skeleton, to_target: Floats, u: Floats
 ) -> dict[str, Floats]:
-    """Rotations (P, 4) of the arm that reaches, shoulder blade apart.
+    """Return rotations (P, 4) of the reaching arm, without the shoulder blade.
 
-    to_target (3,): from the shoulder to the target at the end, in the shoulder blade's frame.
+    to_target: (3,), m, from the shoulder to the target at the end, in the shoulder blade's frame.
     """
     start, end = _rest(controls), _reached(controls, goal, figure, to_target)
     early, late = timing.shoulder(u), timing.elbow(u)
-    # The hand takes off with a bent elbow, so that it goes round the body's own parts.
+    # The elbow bends on the way, so that the hand does not pass through the body.
     flexion = start.flexion + late * (end.flexion - start.flexion) + 0.3 * timing.swell(u)
     pose = Pose(
         blade=np.zeros((len(u), 3)),
@@ -117,7 +123,7 @@ def right(
 
 
 def left(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
-    """Rotations (P, 4) of the arm that balances: it swings out, and hangs under a lean."""
+    """Return rotations (P, 4) of the balancing arm, which swings out and hangs under a lean."""
     start, progress = _rest(controls), timing.shoulder(u)
     away = 0.10 + 0.12 * goal.lean - 0.08 * controls.azimuth
     swing = quat.from_euler(np.stack([-0.55 * goal.lean * progress, 0.0 * u], axis=-1), "XZ")
@@ -133,7 +139,7 @@ def left(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
 
 
 def fingers(goal: Effort, u: Floats) -> dict[str, Floats]:
-    """Rotations (P, 4) of all fingers: the right hand opens on its way and closes at the end."""
+    """Return rotations (P, 4) of all fingers; the right hand opens and finally closes."""
     opening, closing = timing.minimum_jerk(u, 0.2, 0.7), timing.minimum_jerk(u, 0.6, 1.0)
     grip = {
         "Left": 0.35 + 0.10 * timing.trunk(u),
@@ -147,13 +153,13 @@ def fingers(goal: Effort, u: Floats) -> dict[str, Floats]:
 
 
 def palm(positions: Floats) -> Floats:
-    """Middle of the right hand (..., 3) from joint positions (..., J, 3): the part that reaches."""
+    """Return the middle of the right hand (..., 3) from joint positions (..., J, 3)."""
     wrist, middle = (positions[..., body.INDEX["Right" + name], :] for name in ("Hand", "Middle1"))
     return 0.5 * (wrist + middle)
 
 
 def reach(figure: Skeleton) -> float:
-    """Distance, m, from the right shoulder to the middle of the hand of a straight arm."""
+    """Return the distance, m, from the right shoulder to the palm of a straight arm."""
     upper, fore, middle = (
         body.offset(figure, "Right" + name) for name in ("ForeArm", "Hand", "Middle1")
     )

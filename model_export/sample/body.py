@@ -1,4 +1,4 @@
-"""The performer's skeleton as a smooth function of stature: 33 joints, 94 degrees of freedom."""
+"""Skeleton as a smooth function of stature: 33 joints, 94 degrees of freedom."""
 
 from collections.abc import Iterator
 
@@ -82,10 +82,10 @@ _TIPS = _tips()
 
 
 def _segments(stature: float) -> dict[str, float]:
-    """Size of each segment relative to the average body, times stature.
+    """Return the size of each segment relative to the average body, times stature.
 
-    z is -1, 0 and 1 at the three performers. The torso takes what is left of the stature, so that
-    the crown is exactly at stature in the rest pose.
+    z is -1, 0 and 1 for the three performers. The torso takes the remaining height, so that the
+    crown is exactly at stature in the rest pose.
     """
     z = (stature - 1.75) / 0.13
     ratio = {
@@ -102,7 +102,7 @@ def _segments(stature: float) -> dict[str, float]:
 
 
 def skeleton(stature: float) -> Skeleton:
-    """Skeleton of that stature in m: a T-pose facing +Z with the toes' tips on the floor."""
+    """Return the skeleton of a stature, m: a T-pose facing +Z with the toes' tips on the floor."""
     size = _segments(stature)
     offsets = np.array([(0.0, 0.0, 0.0), *(offset for _, _, _, offset in _BONES)])
     offsets[1:] *= np.array([size[segment] for _, _, segment, _ in _BONES])[:, None]
@@ -113,22 +113,22 @@ def skeleton(stature: float) -> Skeleton:
 
 
 def offset(body: Skeleton, name: str) -> Floats:
-    """Rest offset (3,) of the joint of that name, m."""
+    """Return the rest offset (3,), m, of a joint by name."""
     found: Floats = body.offsets[INDEX[name]]
     return found
 
 
 def ankle_height(stature: float) -> float:
-    """Height of the ankle of a foot flat on the floor, m."""
+    """Return the height of the ankle of a foot flat on the floor, m."""
     return 0.042 * _segments(stature)["foot"]
 
 
 def sitting_hip(stature: float) -> float:
-    """Height of the root of a performer who sits on a chair of common height, m."""
+    """Return the height of the root of a performer who sits on a chair of common height, m."""
     return 0.295 * stature
 
 
 def standing_hip(stature: float) -> float:
-    """Height of the root of a performer who stands upright, knees unlocked, m."""
+    """Return the height of the root of a performer who stands upright, knees unlocked, m."""
     size = _segments(stature)
     return ankle_height(stature) + 0.982 * 0.487 * size["leg"] + 0.020 * size["torso"]

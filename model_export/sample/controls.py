@@ -1,4 +1,4 @@
-"""The four controls of the family, their ranges, and what a body of given controls can do."""
+"""The four controls of the family, their ranges, and the limits of the body."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,10 +11,10 @@ STATURES = {"short": 1.62, "middle": 1.75, "tall": 1.88}
 """The three performers and their statures, m."""
 
 SEAT_RANGE = 0.03
-"""How far a seat may lie below or above the common height, m."""
+"""Largest distance of a seat below or above the common height, m."""
 
 STAND_RANGE = 0.03
-"""How far a standing hip may lie below the upright one, m."""
+"""Largest distance of a standing hip below the upright one, m."""
 
 RANGES: dict[str, tuple[float, float, str, str]] = {
     "stature": (1.62, 1.88, "m", "Height of the performer"),
@@ -29,7 +29,7 @@ RANGES: dict[str, tuple[float, float, str, str]] = {
 }
 """Name: (minimum, maximum, unit, description), in the order of the controls.
 
-These are the corners of the box; the body narrows hip_height and target_height: `limits`.
+The limits of the body reduce the ranges of hip_height and target_height, see `limits`.
 """
 
 
@@ -44,18 +44,18 @@ class Controls:
 
     @property
     def azimuth(self) -> float:
-        """Rotation about +Y from straight ahead to the target, rad: negative to the right."""
+        """Return the rotation about +Y from forward to the target, rad; negative to the right."""
         return -math.radians(self.turn)
 
     @property
     def uprightness(self) -> float:
-        """Zero at the sitting hip height, one at the standing one, linear between and beyond."""
+        """Return 0 at the sitting hip height, 1 at the standing one, linear between and beyond."""
         low, high = body.sitting_hip(self.stature), body.standing_hip(self.stature)
         return (self.hip_height - low) / (high - low)
 
 
 def limits(name: str, stature: float, hip_height: float) -> tuple[float, float]:
-    """Range of a control that a body of that stature and hip height can follow."""
+    """Return the range of a control that a body of a stature and hip height, m, can reach."""
     low, high, _, _ = RANGES[name]
     if name == "hip_height":
         return body.sitting_hip(stature) - SEAT_RANGE, body.standing_hip(stature)
@@ -66,9 +66,9 @@ def limits(name: str, stature: float, hip_height: float) -> tuple[float, float]:
 
 
 def parse(controls: Mapping[str, float] | Sequence[float]) -> Controls:
-    """Controls from a mapping by name or from four values in the order of RANGES.
+    """Return controls from a mapping by name or from four values in the order of RANGES.
 
-    Raises InvalidField for a control that is missing, unknown or out of the body's range.
+    Raises InvalidField for a missing or unknown control, and for one outside the body's limits.
     """
     values = controls if isinstance(controls, Mapping) else _named(controls)
     for name in values:
@@ -89,7 +89,7 @@ def _named(values: Sequence[float]) -> dict[str, float]:
 def _checked(controls: Controls) -> Controls:
     for (name, (_, _, unit, _)), value in zip(RANGES.items(), astuple(controls), strict=True):
         low, high = limits(name, controls.stature, controls.hip_height)
-        # A bound that was printed and read again is still inside.
+        # Tolerance for limits that were printed and read again.
         if not low - 1e-6 <= value <= high + 1e-6:
             allowed = f"{low:.6g} to {high:.6g} {unit}"
             raise InvalidField(name, f"{value:.6g} {unit} cannot be reached, expected {allowed}")

@@ -1,4 +1,4 @@
-"""The 92 samples: where the controls were measured, and the trials with their noise."""
+"""The 92 samples: their control points, and trials with noise."""
 
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
@@ -20,20 +20,20 @@ SEED = 2006
 _GROUPS = 2 * len(STATURES)
 
 NOISE = np.radians(0.4)
-"""Root mean square of the noise about each axis over a clip, rad; legs have a share of it."""
+"""Root mean square of the noise about each axis over a clip, rad."""
 
 _LEG_SHARE = 0.5
-"""Share of pelvis and legs in the noise: a body that stands or sits is steadier below."""
+"""Share of the noise for pelvis and legs, which are steadier when standing or sitting."""
 
 _DURATION_SPREAD = 0.04
 _WARP_SPREAD = 0.05
 _HARMONICS = np.array([0.5, 1.0, 1.5, 2.0])
-"""Cycles a clip of the noise."""
+"""Frequencies of the noise, cycles per clip."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One trial: who reached, what was asked of them, and the motion as it was captured."""
+    """One trial: performer, nominal controls, and the noisy motion."""
 
     performer: str
     controls: Controls
@@ -41,9 +41,10 @@ class Sample:
 
 
 def _spread(group: int, index: int, size: int) -> Floats:
-    """Point (3,) of a group's Fibonacci lattice over turn and target height, and a free third.
+    """Return a point (3,) of a group's Fibonacci lattice over turn and target height.
 
-    The groups' lattices are shifted against each other, so that together they fill the gaps.
+    The third component is for the hip height. The groups' lattices are shifted against each other,
+    so that together they fill the gaps.
     """
     offset = (group + 0.5) / _GROUPS
     turn = (index + offset) / size
@@ -52,7 +53,7 @@ def _spread(group: int, index: int, size: int) -> Floats:
 
 
 def _asked(stature: float, standing: bool, spread: Floats) -> Controls:
-    """Controls of a trial, rounded as the table prints them."""
+    """Return the controls of a trial, rounded as the table prints them."""
     low, high = controls.limits("hip_height", stature, 0.0)
     band = (high - controls.STAND_RANGE, high) if standing else (low, low + 2 * controls.SEAT_RANGE)
     hip = round(float(np.interp(spread[2], (0, 1), band)), 4)
@@ -64,7 +65,7 @@ def _asked(stature: float, standing: bool, spread: Floats) -> Controls:
 
 
 def design() -> Iterator[tuple[str, Controls]]:
-    """Performer and controls of each sample: short, middle, tall, each standing then sitting."""
+    """Yield performer and controls of each sample: by stature, each standing, then sitting."""
     groups = product(STATURES, (True, False))
     for group, (name, standing) in enumerate(groups):
         size = len(range(group, COUNT, _GROUPS))
@@ -72,8 +73,8 @@ def design() -> Iterator[tuple[str, Controls]]:
             yield name, _asked(STATURES[name], standing, _spread(group, index, size))
 
 
-def _wander(rng: Generator, frames: int, shape: tuple[int, int]) -> Floats:
-    """Smooth noise (frames, *shape), rad: a few slow sinusoids of random phase and size."""
+def smooth_noise(rng: Generator, frames: int, shape: tuple[int, int]) -> Floats:
+    """Return noise (frames, *shape), rad: slow sinusoids of random phase and amplitude."""
     size = NOISE * rng.standard_normal((len(_HARMONICS), *shape)) * np.sqrt(2 / len(_HARMONICS))
     phase = rng.uniform(0.0, 2.0 * np.pi, size.shape)
     elapsed = np.arange(frames) / (frames - 1)
@@ -84,7 +85,7 @@ def _wander(rng: Generator, frames: int, shape: tuple[int, int]) -> Floats:
 
 
 def _unrest() -> Floats:
-    """How much each axis (J, 3) of each joint takes of the noise: a hinge only its own."""
+    """Return the share (J, 3) of the noise for each axis of each joint; hinges have one axis."""
     share = np.ones((len(body.NAMES), 3))
     share[[body.INDEX[name] for name in body.HINGES], 1:] = 0.0
     share[: body.INDEX["LowerBack"]] *= _LEG_SHARE
@@ -92,12 +93,12 @@ def _unrest() -> Floats:
 
 
 def _shaken(clip: Clip, rng: Generator) -> Clip:
-    noise = _wander(rng, len(clip), (len(body.NAMES), 3)) * _unrest()
+    noise = smooth_noise(rng, len(clip), (len(body.NAMES), 3)) * _unrest()
     return replace(clip, rotations=quat.mul(clip.rotations, quat.exp(noise)))
 
 
 def trial(where: Controls, rng: Generator) -> Clip:
-    """One try: as the truth, but a little sooner or later, and not quite steady."""
+    """Return one noisy trial: the true motion with varied duration, timing and rotations."""
     seconds = truth.duration(astuple(where))
     pace = truth.warp(where)
     late = np.exp(_DURATION_SPREAD * rng.standard_normal())
@@ -107,7 +108,7 @@ def trial(where: Controls, rng: Generator) -> Clip:
 
 
 def samples() -> Iterator[Sample]:
-    """All samples in order; the same at every call."""
+    """Yield all samples in order; every call yields the same."""
     rng = Generator(PCG64(SEED))
     for performer, where in design():
         yield Sample(performer, where, trial(where, rng))

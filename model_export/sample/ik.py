@@ -12,16 +12,16 @@ def _direction(v: Floats) -> Floats:
 
 
 def _frame(along: Floats, side: Floats) -> Floats:
-    """Orthonormal columns (..., 3, 3): along, the part of side square to it, and their product."""
+    """Return orthonormal columns (..., 3, 3): along, side's part normal to it, their product."""
     first = _direction(along)
     second = _direction(side - np.sum(side * first, axis=-1, keepdims=True) * first)
     return np.stack([first, second, np.cross(first, second)], axis=-1)
 
 
 def align(along: Floats, side: Floats, to_along: Floats, to_side: Floats) -> Floats:
-    """Rotation (..., 4) of one vector onto another that keeps a second on its side.
+    """Return the rotation (..., 4) of one vector onto another that keeps a second on its side.
 
-    `along` lands on the direction of `to_along`, `side` in the half plane of `to_side`.
+    `along` maps to the direction of `to_along`, `side` into the half plane of `to_side`.
     """
     here, there = _frame(along, side), _frame(to_along, to_side)
     return quat.from_matrix(there @ np.swapaxes(here, -1, -2))
@@ -30,10 +30,10 @@ def align(along: Floats, side: Floats, to_along: Floats, to_side: Floats) -> Flo
 def knee(
     thigh: float, shin: float, hip_to_ankle: Floats, forwards: Floats
 ) -> tuple[Floats, Floats]:
-    """Rotation (..., 4) of the hip and angle (...) of the knee about x, both bones along -y.
+    """Return the rotation (..., 4) of the hip and the angle (...), rad, of the knee about x.
 
-    hip_to_ankle, forwards (..., 3): in the frame that the rotation is wanted in; the knee bends
-    towards `forwards`.
+    Both bones lie along -y at rest. hip_to_ankle, forwards: (..., 3), in the parent's frame; the
+    knee bends towards `forwards`.
     """
     reach = np.sum(hip_to_ankle**2, axis=-1)
     angle = np.arccos((reach - thigh**2 - shin**2) / (2.0 * thigh * shin))
@@ -43,10 +43,11 @@ def knee(
 
 
 def elbow(upper: float, palm: Floats, reach: float) -> float:
-    """Angle about y of a right elbow that puts the palm at that distance from the shoulder.
+    """Return the angle about y, rad, of a right elbow that puts the palm at a distance `reach`.
 
-    upper: length of the upper arm, along -x. palm (3,): palm in the forearm's frame. The palm
-    need not lie on the forearm's axis, so the law of cosines holds up to a constant lag.
+    upper: length of the upper arm, along -x. palm: (3,), in the forearm's frame. reach: from the
+    shoulder to the palm. The palm can lie off the forearm's axis, which adds a constant angle to
+    the law of cosines.
     """
     lag = np.arctan2(palm[2], -palm[0])
     level = np.hypot(palm[0], palm[2])

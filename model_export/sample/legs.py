@@ -1,4 +1,4 @@
-"""Legs whose feet stay where they stand."""
+"""Legs with feet fixed on the floor."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from service.motion.conventions import UP, Floats
 from service.motion.skeleton import Skeleton
 
 _TOE_OUT = 0.12
-"""How far each foot points outwards, rad."""
+"""Angle by which each foot points outwards, rad."""
 
 _X = np.array([1.0, 0.0, 0.0])
 _FORWARDS = np.array([0.0, 0.0, 1.0])
@@ -21,7 +21,10 @@ def _foot_turn(side: str) -> Floats:
 
 
 def _ankle(controls: Controls, figure: Skeleton, side: str) -> Floats:
-    """Where the ankle stays: below the hips when standing, a thigh ahead of them when sitting."""
+    """Return the fixed position (3,), m, of the ankle.
+
+    It is below the hips when standing, and a thigh's length ahead when sitting.
+    """
     thigh = -body.offset(figure, side + "Leg")[1]
     ahead = (1.0 - controls.uprightness) * 0.93 * thigh
     across = 1.15 * body.offset(figure, side + "UpLeg")[0]
@@ -31,7 +34,7 @@ def _ankle(controls: Controls, figure: Skeleton, side: str) -> Floats:
 def rotations(
     controls: Controls, figure: Skeleton, goal: Effort, pelvis: tuple[Floats, Floats], u: Floats
 ) -> dict[str, Floats]:
-    """Rotations (P, 4) of both legs under a pelvis of given positions and orientations."""
+    """Return rotations (P, 4) of both legs under a pelvis of given positions and orientations."""
     return {
         name: turn
         for side in body.SIDES
@@ -48,7 +51,7 @@ def _leg(
     toes = quat.rotate(back, quat.rotate(_foot_turn(side), _FORWARDS))
     thigh, shin = (-body.offset(figure, side + name)[1] for name in ("Leg", "Foot"))
     to_ankle = quat.rotate(back, _ankle(controls, figure, side) - hip)
-    # The knee bends half way between where the toes and where the pelvis point.
+    # The knee bends half way between the directions of the toes and the pelvis.
     upper, angle = ik.knee(thigh, shin, to_ankle, toes + _FORWARDS)
     bend = quat.about(_X, angle)
     lower = quat.mul(turn, quat.mul(upper, bend))
@@ -57,7 +60,7 @@ def _leg(
 
 
 def _toes(goal: Effort, u: Floats) -> dict[str, Floats]:
-    """The toes grip a little, as far as shoes let them: lifted when low, one side first."""
+    """Return rotations (P, 4) of the toes, which lift slightly for a low target."""
     lift = 0.05 + 0.10 * goal.lean
     return {
         "LeftToeBase": quat.about(_X, -lift * (0.4 + 0.6 * timing.trunk(u))),

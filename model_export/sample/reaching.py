@@ -1,8 +1,8 @@
-"""The motion of a reach as a pure function of the controls and of phase.
+"""Reaching motion as a function of controls and phase.
 
-The trunk goes first: it decides where the right shoulder ends, and that decides how far away the
-target is. The arm's last pose then follows by inverse kinematics, and each joint goes there with
-its own onset. The legs follow the pelvis by inverse kinematics at every phase.
+The trunk determines the final position of the right shoulder, and with it the distance of the
+target. The arm's final pose follows by inverse kinematics, and each joint moves there with its own
+onset. The legs follow the pelvis by inverse kinematics at every phase.
 """
 
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ from service.motion.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class Motion:
-    """Poses at given phases: rotations (P, J, 4), root path (P, 3), and whose they are."""
+    """Poses at given phases. figure: skeleton. rotations: (P, J, 4). root_path: (P, 3), m."""
 
     figure: Skeleton
     rotations: Floats
     root_path: Floats
 
     def forward(self) -> tuple[Floats, Floats]:
-        """Joint positions (P, J, 3), m, and orientations (P, J, 4)."""
+        """Return joint positions (P, J, 3), m, and orientations (P, J, 4)."""
         translations = skeleton.translations(self.figure.offsets, self.root_path)
         return skeleton.forward(self.figure.parents, self.rotations, translations)
 
     def turned(self, turns: dict[str, Floats]) -> "Motion":
-        """The same with the rotations (P, 4) of the named joints replaced."""
+        """Return the motion with the rotations (P, 4) of the named joints replaced."""
         rotations = self.rotations.copy()
         for name, turn in turns.items():
             rotations[:, body.INDEX[name]] = turn
@@ -39,7 +39,7 @@ class Motion:
 
 
 def _carriage(controls: Controls, goal: Effort, u: Floats) -> Motion:
-    """What carries the reaching arm, from the pelvis to the right shoulder blade."""
+    """Return the motion of the trunk and the right shoulder blade, which carry the reaching arm."""
     still = np.tile(quat.IDENTITY, (len(u), len(body.NAMES), 1))
     path = trunk.root_path(controls, goal, u)
     turns = trunk.rotations(controls, goal, u)
@@ -48,16 +48,16 @@ def _carriage(controls: Controls, goal: Effort, u: Floats) -> Motion:
 
 
 def _shoulder(carriage: Motion) -> tuple[Floats, Floats]:
-    """Position (3,) of the right shoulder and orientation (4,) of its blade at the last phase."""
+    """Return position (3,) of the right shoulder and orientation (4,) of its blade at the end."""
     positions, turns = carriage.forward()
     return positions[-1, body.INDEX["RightArm"]], turns[-1, body.INDEX["RightShoulder"]]
 
 
 def _in_front(controls: Controls, figure: Skeleton, shoulder: Floats) -> Floats:
-    """Target (3,) in the given direction from the origin at a comfortable distance.
+    """Return the target (3,), m, in the given direction from the origin at a comfortable distance.
 
-    Nearer as it lies above, below or beside the shoulder, so that the elbow never locks: the arm
-    is stretched to sqrt(0.68² + w² / 2) of its length, where w of its length are not ahead.
+    It is nearer if it lies above, below or beside the shoulder, so that the elbow never locks: the
+    arm is extended to sqrt(0.68² + w² / 2) of its length, where w of its length are not ahead.
     """
     ahead = np.array([np.sin(controls.azimuth), 0.0, np.cos(controls.azimuth)])
     length = arms.reach(figure)
@@ -69,13 +69,13 @@ def _in_front(controls: Controls, figure: Skeleton, shoulder: Floats) -> Floats:
 
 
 def target(controls: Controls) -> Floats:
-    """Where the target is (3,), m."""
+    """Return the position of the target (3,), m."""
     end = _carriage(controls, trunk.effort(controls), np.ones(1))
     return _in_front(controls, end.figure, _shoulder(end)[0])
 
 
 def motion(controls: Controls, u: Floats) -> Motion:
-    """Poses at phases u (P,) in [0, 1]; at 1 the middle of the right hand is at the target."""
+    """Return poses at phases u (P,) in [0, 1]; at 1 the right palm is at the target."""
     goal = trunk.effort(controls)
     shoulder, blade = _shoulder(_carriage(controls, goal, np.ones(1)))
     aim = _in_front(controls, body.skeleton(controls.stature), shoulder)
@@ -95,7 +95,7 @@ def motion(controls: Controls, u: Floats) -> Motion:
 
 
 def hand_travel(controls: Controls) -> float:
-    """Straight distance, m, from where the hand rests to the target."""
+    """Return the distance, m, from the hand at rest to the target."""
     ends = motion(controls, np.array([0.0, 1.0]))
     first, last = arms.palm(ends.forward()[0])
     return float(np.linalg.norm(last - first))

@@ -1,7 +1,6 @@
-"""A procedural walk whose feet stand still: strides of two walkers at several speeds and turns.
+"""A procedural walk with fixed stance feet: strides of two walkers at several speeds and turns.
 
-Its controls have names and units that nobody would guess, so that what asks for a speed has to ask
-the model.
+Its controls have unusual names and units, to test that clients read them from the model.
 """
 
 import tomllib
@@ -12,7 +11,7 @@ import numpy as np
 
 from model_export.recipe import Recipe
 from model_export.sample import ik
-from service.motion import bvh, quat
+from service.motion import bvh_writer, quat
 from service.motion.clip import Clip, assemble
 from service.motion.conventions import UP, Floats
 from service.motion.skeleton import Skeleton
@@ -22,7 +21,7 @@ THIGH = SHIN = 0.45
 ANKLE, HIPS, WIDTH = 0.08, 0.82, 0.1
 STANCE = 0.6
 SIDES = {"Left": (1.0, 0.0), "Right": (-1.0, 0.5)}
-"""Which way each foot is off the middle, and the phase at which it comes down."""
+"""Sign of each foot's sideways offset, and the phase at which it lands."""
 
 SKELETON = Skeleton(
     ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot"),
@@ -73,12 +72,12 @@ rms_budget_cm = 0.2
 
 
 def recipe() -> Recipe:
-    """The recipe of the strides."""
+    """Return the recipe of the strides."""
     return Recipe.model_validate(tomllib.loads(TOML))
 
 
 def stride(speed: float, turn: float, sway: float) -> Clip:
-    """One stride at a speed, m/s, that turns by so many rad, of a walker who sways, m."""
+    """Return one stride at a speed, m/s, with a turn, rad, and a sideways sway, m."""
     frames = round(RATE * (0.5 + 0.45 * speed) / speed)
     length = speed * frames / RATE
     u = np.linspace(0.0, 1.0, frames + 1)
@@ -92,7 +91,7 @@ def stride(speed: float, turn: float, sway: float) -> Clip:
 
 
 def _along(u: Floats, length: float, turn: float, left: Floats | float) -> Floats:
-    """Points on the floor (..., 3) beside the arc of a stride after shares u of it."""
+    """Return points on the floor (..., 3) beside the arc of a stride after shares u of it."""
     on = length * u * np.exp(0.5j * turn * u) * np.sinc(turn * u / (2 * np.pi))
     place = on + 1j * left * np.exp(1j * turn * u)
     return np.stack([place.imag, np.zeros_like(u), place.real], axis=-1)
@@ -101,14 +100,14 @@ def _along(u: Floats, length: float, turn: float, left: Floats | float) -> Float
 def _leg(
     side: str, u: Floats, length: float, turn: float, hips: Floats, pelvis: Floats
 ) -> list[Floats]:
-    """Rotations of a leg whose foot stands still, then swings to where it stands next."""
+    """Return the rotations of a leg; the foot is fixed in stance, then swings to the next."""
     off, down = SIDES[side]
     steps = np.floor(u - down)
     since = u - down - steps
     swing = np.clip((since - STANCE) / (1.0 - STANCE), 0.0, 1.0)
-    # A foot stands under the middle of its time on the ground.
+    # A foot stands at the path's position in the middle of its stance.
     at = steps + down + 0.5 * STANCE
-    # It leaves the ground before it goes ahead, and has gone before it comes down.
+    # The foot lifts before it moves ahead, and stops before it lands.
     share = np.clip((swing - 0.2) / 0.6, 0.0, 1.0)
     gone = share * share * (3.0 - 2.0 * share)
     here, there = (_along(at + more, length, turn, off * WIDTH) for more in (0.0, 1.0))
@@ -125,13 +124,13 @@ def _leg(
 
 
 def write(folder: Path) -> Path:
-    """Folder of strides and the table that lists them."""
+    """Write the strides and their table to a folder and return it."""
     rows = ["file,who,haste,veer"]
     points = product((0.7, 0.9, 1.1, 1.3, 1.5), (-0.5, -0.2, 0.2, 0.5))
     for index, (speed, turn) in enumerate(points):
         who, sway = (("ann", 0.02), ("ben", 0.05))[index % 3 == 0]
         clip = stride(speed, turn, sway)
-        (folder / f"{index}.bvh").write_bytes(bvh.dumps(clip, metres_per_unit=1.0))
+        (folder / f"{index}.bvh").write_bytes(bvh_writer.dumps(clip, metres_per_unit=1.0))
         rows.append(f"{index}.bvh,{who},{3.6 * speed},{1000 * turn}")
     (folder / "strides.csv").write_text("\n".join(rows) + "\n")
     return folder

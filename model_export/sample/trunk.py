@@ -1,4 +1,4 @@
-"""Pelvis, spine and neck of a reach: how far they go, and their rotations at each phase."""
+"""Pelvis, spine and neck of a reach: their final poses, and their rotations at each phase."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ _SLOUCH = {"Hips": -0.12, "LowerBack": 0.08, "Spine": 0.06, "Spine1": 0.03}
 _YAW = {"LowerBack": 0.30, "Spine": 0.35, "Spine1": 0.35}
 _LEAN = {"LowerBack": 0.40, "Spine": 0.35, "Spine1": 0.25}
 _ROLL = {"LowerBack": 0.30, "Spine": 0.40, "Spine1": 0.30}
-"""Shares of the spine's joints in what the pelvis leaves over."""
+"""Shares of the spine's joints in the rotation that the pelvis leaves."""
 
 _GAZE = {"Neck": 0.25, "Neck1": 0.30, "Head": 0.45}
 """Shares of the neck's joints in turning the head."""
@@ -23,9 +23,10 @@ _GAZE = {"Neck": 0.25, "Neck1": 0.30, "Head": 0.45}
 
 @dataclass(frozen=True)
 class Effort:
-    """How far the trunk goes, rad and m: yaw left, lean forwards, roll right, drop and shift.
+    """Final displacement of the trunk.
 
-    low: how far the target lies below the resting shoulder, as a fraction of stature.
+    low: height of the resting shoulder above the target, as a fraction of stature. yaw: left, rad.
+    lean: forwards, rad. roll: right, rad. drop, shift: of the root, m.
     """
 
     low: float
@@ -37,22 +38,22 @@ class Effort:
 
 
 def _softplus(x: float, width: float) -> float:
-    """Smooth form of max(x, 0)."""
+    """Return a smooth form of max(x, 0)."""
     return width * float(np.logaddexp(0.0, x / width))
 
 
 def effort(controls: Controls) -> Effort:
-    """What the trunk must do to carry the shoulder near to the target."""
+    """Return the displacement of the trunk that brings the shoulder near to the target."""
     stature, upright = controls.stature, controls.uprightness
     low = (controls.hip_height + 0.27 * stature - controls.target_height) / stature
     lean = 0.06 + (3.9 - 1.9 * upright) * _softplus(low - 0.08, 0.08)
     # A right-handed reach brings the right shoulder forwards, which is a turn to the left.
     yaw = (0.68 + 0.08 * upright) * controls.azimuth + 0.17
-    # The pelvis turns least: what the lean misses of the target's direction is a bend sideways.
+    # The lean is not quite towards the target, because the pelvis turns less; roll sideways for it.
     aside = lean * np.sin(controls.azimuth - 0.6 * yaw)
     drop = stature * (0.004 + 0.48 * upright * _softplus(low - 0.18, 0.08))
     forwards = stature * (0.01 + 0.035 * upright)
-    # The pelvis backs off under a leaning trunk: the balance stays over the feet.
+    # The pelvis moves back under a leaning trunk to keep the centre of mass over the feet.
     backwards = stature * 0.09 * upright * lean
     return Effort(
         low=low,
@@ -65,7 +66,7 @@ def effort(controls: Controls) -> Effort:
 
 
 def root_path(controls: Controls, goal: Effort, u: Floats) -> Floats:
-    """Root positions (P, 3), m: from over the origin towards the target, and down."""
+    """Return root positions (P, 3), m: from above the origin towards the target, and down."""
     heading = 0.5 * controls.azimuth
     way = np.array([goal.shift * np.sin(heading), -goal.drop, goal.shift * np.cos(heading)])
     start = np.array([0.0, controls.hip_height, 0.0])
@@ -74,7 +75,7 @@ def root_path(controls: Controls, goal: Effort, u: Floats) -> Floats:
 
 
 def rotations(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
-    """Rotations (P, 4) of pelvis and spine."""
+    """Return rotations (P, 4) of pelvis and spine."""
     pelvis = np.array(
         [0.12 + 0.26 * controls.uprightness, 0.42 - 0.02 * controls.uprightness, 0.15]
     )
@@ -92,9 +93,9 @@ def rotations(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
 
 
 def neck_rotations(to_target: Floats, u: Floats) -> dict[str, Floats]:
-    """Rotations (P, 4) that bring the gaze to the target.
+    """Return rotations (P, 4) that turn the gaze to the target.
 
-    to_target (P, 3): from the neck's base to the target, in the chest's frame.
+    to_target: (P, 3), from the neck's base to the target, in the chest's frame.
     """
     x, y, z = np.moveaxis(to_target, -1, 0)
     yaw, pitch = np.arctan2(x, z), -np.arctan2(y, np.hypot(x, z))

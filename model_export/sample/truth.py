@@ -1,4 +1,4 @@
-"""The noise-free answer at every control point, for measuring what a model gets wrong."""
+"""Noise-free motion at every control point, for measuring a model's errors."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,32 +15,32 @@ Point = Mapping[str, float] | Sequence[float]
 
 
 def poses(point: Point, phases: Floats) -> tuple[Floats, Floats, Floats]:
-    """Rotations (P, J, 4), root path (P, 3) and bone offsets (J, 3) at unwarped phases (P,).
+    """Return rotations (P, J, 4), root path (P, 3) and bone offsets (J, 3) at unwarped phases (P,).
 
-    Phases run from 0 to 1, where the hand is at the target. Raises InvalidField for controls that
-    the body cannot follow; so does every function here.
+    Phases run from 0 to 1, when the hand is at the target. Raises InvalidField for controls outside
+    the body's limits, as every function here.
     """
     motion = reaching.motion(controls.parse(point), phases)
     return motion.rotations, motion.root_path, motion.figure.offsets
 
 
 def target(point: Point) -> Floats:
-    """Where the middle of the right hand, `arms.palm`, is at the end (3,), m."""
+    """Return the final position (3,), m, of the middle of the right hand, `arms.palm`."""
     return reaching.target(controls.parse(point))
 
 
 def duration(point: Point) -> float:
-    """Seconds from rest to the target."""
+    """Return the time from rest to the target, s."""
     return _duration(controls.parse(point))
 
 
 def phases(point: Point, elapsed: Floats) -> Floats:
-    """Phase at each elapsed fraction of the clip: strictly increasing from 0 to 1."""
+    """Return the phase at each elapsed fraction of the clip, strictly increasing from 0 to 1."""
     return warp(controls.parse(point)).phase(elapsed)
 
 
 def clip(point: Point, rate: float) -> Clip:
-    """Clip at that many frames a second with its own duration and timing.
+    """Return the clip at a frame rate, with its own duration and timing.
 
     It ends on the target: the duration is rounded to whole frames.
     """
@@ -53,13 +53,13 @@ def _duration(where: Controls) -> float:
 
 
 def warp(where: Controls) -> Warp:
-    """Timing that the controls ask for: high targets start briskly, turned ones are put off."""
+    """Return the timing of controls: high targets start fast, turned ones late."""
     above = where.target_height - where.hip_height
     return Warp(a=0.10 - 0.10 * where.uprightness, b=0.12 * above - 0.10 * where.azimuth**2)
 
 
 def play(where: Controls, seconds: float, pace: Warp, rate: float) -> Clip:
-    """Clip of that duration, to the nearest whole frame, in that timing."""
+    """Return the clip of a duration, s, rounded to whole frames, with a given timing."""
     steps = max(1, round(seconds * rate))
     motion = reaching.motion(where, pace.phase(np.arange(steps + 1) / steps))
     figure = motion.figure

@@ -1,4 +1,4 @@
-"""The family as files: motions in BVH, the table of their controls, and the recipe."""
+"""Files of the family: motions in BVH, the table of their controls, and the recipe."""
 
 import csv
 import io
@@ -84,7 +84,7 @@ _BALL = "Zrotation Yrotation Xrotation"
 
 
 def _files(chosen: Iterable[Sample]) -> dict[str, bytes]:
-    """Every file of some samples by its path under their directory."""
+    """Return the contents of all files of some samples, by path relative to their directory."""
     files: dict[str, bytes] = {}
     rows: list[list[str]] = []
     for number, sample in enumerate(chosen, start=1):
@@ -94,13 +94,13 @@ def _files(chosen: Iterable[Sample]) -> dict[str, bytes]:
     return files | {"clips.csv": _table(rows).encode(), "recipe.toml": _recipe().encode()}
 
 
-def family(output: Path) -> Path:
-    """Write the family to a directory, whole or not at all, and return its recipe's path.
+def family(output: Path, chosen: Iterable[Sample] | None = None) -> Path:
+    """Write samples to a directory atomically and return their recipe's path.
 
-    A directory that already holds just this family is left as it is; raises FileError for a file
-    in the way or a directory with anything else in it.
+    chosen: samples; default: the family's 92. A directory with exactly these files is left
+    unchanged; raises FileError for an existing file, or a directory with other content.
     """
-    files = _files(samples())
+    files = _files(samples() if chosen is None else chosen)
     if output.exists() and not output.is_dir():
         raise FileError(output, "found a file, expected a new or empty directory")
     if output.is_dir() and any(output.iterdir()):
@@ -110,16 +110,10 @@ def family(output: Path) -> Path:
     return output / "recipe.toml"
 
 
-def some(output: Path, chosen: Iterable[Sample]) -> Path:
-    """Write samples of one's own to a new directory, as a family, and return its recipe's path."""
-    _place(output, _files(chosen))
-    return output / "recipe.toml"
-
-
 def _place(output: Path, files: dict[str, bytes]) -> None:
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}-") as scratch:
-        # A directory of our own making, for the scratch itself is closed to other users.
+        # A subdirectory, because the temporary directory is readable by its owner only.
         whole = Path(scratch) / "family"
         for path, content in files.items():
             (whole / path).parent.mkdir(parents=True, exist_ok=True)
@@ -159,9 +153,10 @@ def _table(rows: list[list[str]]) -> str:
 
 
 def bvh(clip: Clip) -> str:
-    """BVH text of a clip of the family, in metres: hinges have one channel, all others three.
+    """Return the BVH text of a clip of the family, in metres.
 
-    The root's offset is zero, its channels hold its whole path.
+    Hinges have one channel, other joints three. The root's offset is zero; its channels contain its
+    whole path.
     """
     head = "\n".join(["HIERARCHY", *_joint(clip.skeleton, 0), "MOTION"])
     lines = (" ".join(f"{value:.6f}" for value in row) for row in _channels(clip).tolist())
@@ -175,7 +170,7 @@ def _offset(indent: str, offset: Floats) -> str:
 
 
 def _joint(figure: Skeleton, joint: int, depth: int = 0) -> Iterator[str]:
-    """Lines of a joint and all below it."""
+    """Yield the lines of a joint and its descendants."""
     outer, inner = "  " * depth, "  " * (depth + 1)
     yield f"{outer}{'JOINT' if joint else 'ROOT'} {figure.names[joint]}"
     yield f"{outer}{{"
@@ -197,7 +192,7 @@ def _channel_names(figure: Skeleton, joint: int) -> str:
 
 
 def _channels(clip: Clip) -> Floats:
-    """Values (F, 94) as they are printed: m and degrees, minus zero as zero."""
+    """Return values (F, 94) as printed: m and degrees, minus zero as zero."""
     columns = [clip.root_path]
     for joint, name in enumerate(clip.skeleton.names):
         turn = clip.rotations[:, joint]

@@ -1,9 +1,6 @@
-"""Clips as all others predict them, put back together from their leave-one-out residuals."""
+"""Leave-one-out predictions of clips, restored from their residuals."""
 
 from dataclasses import dataclass
-
-import numpy as np
-import numpy.typing as npt
 
 from model_export.ingest import Example
 from model_export.train import Trained
@@ -11,27 +8,22 @@ from service.motion import quat, skeleton
 from service.motion.conventions import Floats
 
 
-def performers(trained: Trained) -> npt.NDArray[np.str_]:
-    """Names (N,) of who moved in each clip."""
-    return np.array([example.row.performer for example in trained.examples])
-
-
-def motion(trained: Trained, clip: int) -> Floats:
-    """Slice (D', T) of the motion tensor that all other clips predict for one."""
-    gap = trained.full.slices(trained.pose.residuals[[clip]])[:, :, 0]
-    return trained.tensor.values[:, :, clip] - gap
-
-
 @dataclass(frozen=True)
 class Body:
-    """Positions (T, J, 3) of joints and (T, E, 3) of end sites, m."""
+    """Positions of joints (T, J, 3) and of end sites (T, E, 3), m."""
 
     joints: Floats
     tips: Floats
 
 
+def motion(trained: Trained, clip: int) -> Floats:
+    """Return the slice (D', T) of the motion tensor predicted for a clip from all others."""
+    residual = trained.full.slices(trained.pose.residuals[[clip]])[:, :, 0]
+    return trained.tensor.values[:, :, clip] - residual
+
+
 def body(trained: Trained, clip: int, own_motion: Floats) -> Body:
-    """Where a slice (D', T) of the tensor puts the body of a clip's performer."""
+    """Return the body of a clip's performer in a slice (D', T) of the motion tensor."""
     example, tensor = trained.examples[clip], trained.tensor
     rotations, root = tensor.chart.poses(tensor.numbers(own_motion[:, :, None])[0])
     translations = skeleton.translations(example.offsets, root)
@@ -42,5 +34,5 @@ def body(trained: Trained, clip: int, own_motion: Floats) -> Body:
 
 
 def label(example: Example) -> str:
-    """How a clip is named on the page: its file, and its line where a file has several clips."""
+    """Return a clip's name on the page: its file, and its line in the table of clips."""
     return f"{example.row.place.name.removesuffix('.bvh')} (line {example.row.line})"

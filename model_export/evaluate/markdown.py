@@ -1,10 +1,10 @@
-"""Tables in Markdown that are even for who reads them as they are."""
+"""Tables in Markdown."""
 
 from collections.abc import Sequence
 
 
-def even(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table with all cells of a column of one width."""
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table with cells padded to the width of their column."""
     listed = [head, *rows]
     widths = [max(len(row[i]) for row in listed) for i in range(len(head))]
     lines = [

@@ -1,4 +1,4 @@
-"""How holding the model's answers to captured events went: as JSON and as a table."""
+"""Results of correcting answers to the captured event: as JSON and as a table."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -6,21 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from model_export.evaluate import columns
+from model_export.evaluate import markdown
 from model_export.evaluate.errors import Errors
 from model_export.evaluate.exact import BEYOND, Correction, Far
 from model_export.evaluate.methods import EXACT, OURS
 from model_export.evaluate.protocol import Result
-from model_export.report import plain
+from model_export.report import rounding
 from service.motion.conventions import Floats
 
-HEAD = ("held to the captured event", "mean", "worst")
+HEAD = ("correction to the captured event", "mean", "worst")
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One number of every clip (C,): what it is, how it is written, whether its worst says more
-    than its mean."""
+    """One figure of every clip.
+
+    key: name in the JSON. words: title of its row. values: (C,). shown: format of its cells. worst:
+    True if the largest value is reported beside the mean.
+    """
 
     key: str
     words: str
@@ -29,19 +32,19 @@ class Figure:
     worst: bool = True
 
     def cells(self) -> tuple[str, ...]:
-        """Its row of the table."""
+        """Return the row of the table."""
         worst = self.shown.format(self.values.max()) if self.worst else ""
         return self.words, self.shown.format(self.values.mean()), worst
 
     def facts(self) -> dict[str, float]:
-        """The same by name."""
-        own = {self.key: plain.number(float(self.values.mean()))}
-        worst = {f"{self.key}_worst": plain.number(float(self.values.max()))}
+        """Return mean and worst by name."""
+        own = {self.key: rounding.number(float(self.values.mean()))}
+        worst = {f"{self.key}_worst": rounding.number(float(self.values.max()))}
         return {**own, **worst} if self.worst else own
 
 
 def figures(result: Result) -> list[Figure]:
-    """All figures of a result; none where nothing was held to anything."""
+    """Return all figures of a result; none if no answer was corrected."""
     found = result.corrections
     if not found:
         return []
@@ -50,24 +53,38 @@ def figures(result: Result) -> list[Figure]:
         return np.array([float(value(correction)) for correction in found])
 
     return [
-        Figure("effector_cm", "effector, cm", 100.0 * _effector(result), "{:.4f}"),
-        Figure("steps", "steps", of(lambda c: c.steps), "{:.1f}"),
+        Figure(
+            "effector_cm",
+            "remaining distance of the effector (cm)",
+            100.0 * _effector(result),
+            "{:.4f}",
+        ),
+        Figure("steps", "solver steps", of(lambda c: c.steps), "{:.1f}"),
         Figure("acceleration", "acceleration, after over before", of(lambda c: c.acceleration)),
         *_changes(result),
-        _time("ms", "a clip, median, ms", of(lambda c: c.seconds)),
-        _time("plain_ms", "the same uncorrected, ms", of(lambda c: c.plain_seconds)),
-        Figure("distance", "distance, standard deviations", of(lambda c: c.distance)),
-        Figure("out_of_reach", "told to be out of reach", of(lambda c: not c.reached), **SHARE),
+        _time("ms", "time per clip, median (ms)", of(lambda c: c.seconds)),
+        _time(
+            "plain_ms",
+            "time per clip without correction, median (ms)",
+            of(lambda c: c.plain_seconds),
+        ),
+        Figure(
+            "distance",
+            "distance of the target from the prediction (sigma)",
+            of(lambda c: c.distance),
+        ),
+        Figure("out_of_reach", UNREACHABLE, of(lambda c: not c.reached), **SHARE),
         *_beyond(found),
         *_far([correction.far for correction in found if correction.far]),
     ]
 
 
 SHARE: dict[str, Any] = {"shown": "{:.1%}", "worst": False}
+UNREACHABLE = "reported as unreachable"
 
 
 def _time(key: str, words: str, seconds: Floats) -> Figure:
-    # A median: some clips come when the machine has woken up.
+    # A median, because single clips are delayed by other work of the machine.
     return Figure(key, words, 1e3 * np.full(1, np.median(seconds)), worst=False)
 
 
@@ -76,7 +93,7 @@ def _effector(result: Result) -> Floats:
 
 
 def _changes(result: Result) -> Iterator[Figure]:
-    """Of the mean distances, as shares of those of the answers before."""
+    """Return the changes of the mean distances, as shares of those without correction."""
 
     def means(name: str, distance: str) -> Floats:
         return np.array([_mean(error, distance) for error in result.of(name, result.asked(name))])
@@ -84,7 +101,7 @@ def _changes(result: Result) -> Iterator[Figure]:
     for distance, word in (("relative", "relative"), ("absolute", "global")):
         before, after = means(OURS, distance), means(EXACT, distance)
         change = np.full(1, after.mean() / before.mean() - 1.0)
-        words = f"{word}, change of the mean"
+        words = f"change of the mean {word} error"
         yield Figure(f"{word}_change", words, change, "{:+.1%}", worst=False)
 
 
@@ -96,7 +113,10 @@ def _beyond(found: tuple[Correction, ...]) -> Iterator[Figure]:
     for place, metres in enumerate(BEYOND[: len(found[0].beyond)]):
         told = np.array([float(not correction.beyond[place]) for correction in found])
         centimetres = round(100 * metres)
-        key, words = f"out_of_reach_{centimetres}cm", f"the same {centimetres} cm beyond"
+        key, words = (
+            f"out_of_reach_{centimetres}cm",
+            f"{UNREACHABLE}, target {centimetres} cm farther",
+        )
         yield Figure(key, words, told, **SHARE)
 
 
@@ -107,24 +127,24 @@ def _far(found: list[Far]) -> list[Figure]:
         [(not far.reached, far.acceleration, far.root, far.steps) for far in found], np.float64
     ).T
     return [
-        Figure("far_out_of_reach", "the same a metre beyond", told, **SHARE),
-        Figure("far_acceleration", "there: acceleration", acceleration),
-        Figure("far_root_cm", "there: root moved, cm", 100.0 * root),
-        Figure("far_steps", "there: steps", steps, "{:.1f}"),
+        Figure("far_out_of_reach", f"{UNREACHABLE}, target 1 m farther", told, **SHARE),
+        Figure("far_acceleration", "acceleration, target 1 m farther", acceleration),
+        Figure("far_root_cm", "movement of the root, target 1 m farther (cm)", 100.0 * root),
+        Figure("far_steps", "solver steps, target 1 m farther", steps, "{:.1f}"),
     ]
 
 
 def facts(result: Result) -> dict[str, Any]:
-    """Figures by name: centimetres, milliseconds, plain shares."""
+    """Return the figures by name: centimetres, milliseconds, shares."""
     return {key: value for own in figures(result) for key, value in own.facts().items()}
 
 
 def rows(result: Result) -> tuple[tuple[str, ...], ...]:
-    """Rows of a table, to stand under HEAD."""
+    """Return the rows of the table under HEAD."""
     return tuple(own.cells() for own in figures(result))
 
 
 def table(result: Result) -> str:
-    """The same in Markdown; empty where nothing was held to anything."""
+    """Return the table in Markdown; empty if no answer was corrected."""
     found = rows(result)
-    return columns.even(HEAD, found) if found else ""
+    return markdown.table(HEAD, found) if found else ""

@@ -1,4 +1,4 @@
-"""Numbers as JSON holds them: rounded to six digits, more than anything here is worth."""
+"""Numbers for JSON, rounded to six significant digits."""
 
 from typing import Any
 
@@ -7,11 +7,11 @@ import numpy.typing as npt
 
 
 def number(value: Any) -> float:
-    """One number."""
+    """Return a number rounded to six significant digits."""
     return float(f"{float(value):.6g}")
 
 
 def numbers(values: npt.ArrayLike) -> Any:
-    """Nested lists of the numbers of an array."""
+    """Return an array as nested lists of rounded numbers."""
     array = np.asarray(values, dtype=np.float64)
     return [numbers(row) for row in array] if array.ndim else number(array)

@@ -1,0 +1,85 @@
+"""Charts as SVG images in one style; equal data give equal bytes."""
+
+import base64
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from matplotlib import style
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+
+# Readable on white, and distinguishable with red-green colour blindness.
+INK, GREY, FAINT, BLUE, ORANGE = "#24313f", "#7b8794", "#b9c2cc", "#2b6ca3", "#d9660a"
+WIDTH = 10.0
+"""Inches."""
+LABEL = 28
+"""Characters of a label: a longer one would leave no space for the chart."""
+# Resolution of point clouds, which are embedded as bitmaps.
+DOTS_PER_INCH = 170
+
+_STYLE = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": GREY,
+    "axes.grid": True,
+    "axes.labelcolor": INK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "figure.constrained_layout.w_pad": 0.08,
+    "figure.dpi": 100,
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
+    "font.size": 9,
+    "grid.color": "#e6eaee",
+    "grid.linewidth": 0.7,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "svg.fonttype": "none",
+    # Without a fixed salt the ids in the file are random.
+    "svg.hashsalt": "posefield",
+    "text.color": INK,
+    # Labels are user-given text, in which "$" does not start a formula.
+    "text.parse_math": False,
+    "xtick.color": "#52606d",
+    "ytick.color": "#52606d",
+}
+_NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+
+
+@dataclass(frozen=True)
+class Chart:
+    """SVG file, its text alternative and its caption."""
+
+    svg: bytes
+    alt: str
+    caption: str
+
+    @property
+    def source(self) -> str:
+        """Return the data URI of the image."""
+        return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
+
+
+def draw(height: float, paint: Callable[[Figure], None], alt: str, caption: str) -> Chart:
+    """Return the chart that `paint` draws on an empty figure of WIDTH × height inches."""
+    buffer = io.BytesIO()
+    # "default" undoes the settings of the user's own matplotlibrc.
+    with style.context(["default", _STYLE]):
+        figure = Figure((WIDTH, height), layout="constrained")
+        paint(figure)
+        figure.savefig(buffer, format="svg", dpi=DOTS_PER_INCH, metadata=_NO_METADATA)
+    return Chart(buffer.getvalue(), alt, caption)
+
+
+def label(text: str) -> str:
+    """Return a user-given name as the label of a chart, with "…" for what exceeds LABEL."""
+    return text if len(text) <= LABEL else f"{text[: LABEL - 1]}…"
+
+
+def plain_logarithm(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers; the default labels are formulas."""
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
