@@ -1,6 +1,6 @@
-"""Makes the add-on's archive, as Blender installs it: python clients/blender/archive.py FOLDER.
+"""Build the add-on's archive for Blender: python clients/blender/archive.py FOLDER.
 
-The same files always give the same bytes.
+Equal files give equal bytes.
 """
 
 import sys
@@ -11,13 +11,13 @@ from pathlib import Path
 ADDON = Path(__file__).with_name("posefield")
 LICENCE = Path(__file__).parents[2] / "LICENSE"
 
-# The first moment a zip archive can name: the bytes hang on the files alone.
+# Earliest time of a zip archive, so that the bytes depend on the files alone.
 TIME = (1980, 1, 1, 0, 0, 0)
 READABLE = 0o644 << 16
 
 
 def build(folder: Path) -> Path:
-    """The archive posefield-blender-VERSION.zip in a folder."""
+    """Build posefield-blender-VERSION.zip in a folder and return its path."""
     manifest = tomllib.loads((ADDON / "blender_manifest.toml").read_text())
     made = folder / f"posefield-blender-{manifest['version']}.zip"
     folder.mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,7 @@ def build(folder: Path) -> Path:
 
 
 def files() -> dict[str, Path]:
-    """What is in it, by name."""
+    """Return the archive's files by their names in it."""
     code = (*ADDON.rglob("*.py"), ADDON / "blender_manifest.toml")
     return {"LICENSE": LICENCE} | {file.relative_to(ADDON).as_posix(): file for file in code}
 

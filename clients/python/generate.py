@@ -55,6 +55,7 @@ Of answers: fields that a newer service adds are passed over, and an enumeration
 Of questions: what is UNSET is not sent.
 """
 
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
@@ -64,12 +65,21 @@ CONTRACT = {version}
 
 
 class Operation(NamedTuple):
-    """How something is asked for, and the media types that it may be answered in."""
+    """Method and path of a request, and the media types of its answers.
+
+    formats: media types by the formats that may end the path; empty where it has no `{format}`.
+    """
 
     id: str
     method: str
     path: str
     media_types: tuple[str, ...]
+    formats: Mapping[str, str]
+
+    def in_format(self, name: str) -> "Operation":
+        """Return the operation with a format in its path and that format's media type alone."""
+        path = self.path.replace("{format}", name)
+        return self._replace(path=path, media_types=(self.formats[name],))
 '''
 
 
@@ -81,7 +91,7 @@ def main() -> None:
 def module(contract: Node) -> str:
     """Source of the module, as ruff formats it."""
     schemas = contract["components"]["schemas"]
-    parts = [HEAD.format(version=json.dumps(contract["info"]["version"]))]
+    parts = [HEAD.replace("{version}", json.dumps(contract["info"]["version"]))]
     for name in _ordered(schemas, (*QUESTIONS, *ANSWERS)):
         parts.extend(Writer(schemas, asked=name in QUESTIONS).classes(name, schemas[name]))
     parts.append(_table(contract))
@@ -213,9 +223,10 @@ def _table(contract: Node) -> str:
         for method in METHODS:
             if method in item:
                 operation = item[method]
-                types = _media_types(contract, operation)
+                types, formats = _media_types(contract, operation), _formats(contract, item, method)
                 words = (operation["operationId"], method.upper(), path)
-                lines.append(f"Operation({', '.join(map(json.dumps, words))}, {types!r}),")
+                named = ", ".join(map(json.dumps, words))
+                lines.append(f"Operation({named}, {types!r}, {json.dumps(formats)}),")
     lines += ["    )", "}", '"""All operations of the contract, by their ids."""']
     return "\n".join(lines)
 
@@ -225,6 +236,15 @@ def _media_types(contract: Node, operation: Node) -> tuple[str, ...]:
     if "$ref" in answer:
         answer = contract["components"]["responses"][answer["$ref"].rpartition("/")[2]]
     return tuple(answer.get("content", ()))
+
+
+def _formats(contract: Node, item: Node, method: str) -> Node:
+    """Media types by format, of the parameter that ends an operation's path."""
+    for given in (*item.get("parameters", ()), *item[method].get("parameters", ())):
+        found = contract["components"]["parameters"][given["$ref"].rpartition("/")[2]]
+        if "x-media-types" in found:
+            return dict(found["x-media-types"])
+    return {}
 
 
 def _formatted(source: str) -> str:

@@ -23,21 +23,12 @@ const LOOKED_AT = [
   "Trust",
 ];
 
-/** Paths of files; their endings are the formats that one asks for by name. */
-const FILES = /^\/v1\/models\/\{model\}\/(?:clips?|crowd)\.(\w+)$/;
-const RESPONSES = "#/components/responses/";
-
 interface Contract {
   readonly info: { readonly version: string };
-  readonly paths: Record<string, Record<"get" | "post", Operation | undefined>>;
   readonly components: {
     readonly schemas: Record<string, Schema>;
-    readonly responses: Record<string, { readonly content?: object }>;
+    readonly parameters: Record<string, { readonly "x-media-types"?: object }>;
   };
-}
-
-interface Operation {
-  readonly responses: Record<"200", { readonly $ref?: string }>;
 }
 
 interface Schema {
@@ -76,14 +67,10 @@ function listsOf({ required = [], properties = {} }: Schema): readonly string[] 
   return required.filter((key) => properties[key]?.type === "array");
 }
 
-function mediaTypes({ paths, components }: Contract): object {
-  const found: Record<string, string | undefined> = {};
-  for (const [path, { get, post }] of Object.entries(paths)) {
-    const [, format] = FILES.exec(path) ?? [];
-    const named = (get ?? post)?.responses[200].$ref?.slice(RESPONSES.length) ?? "";
-    if (format) found[format] = Object.keys(components.responses[named]?.content ?? {})[0];
-  }
-  return found;
+/** Media types of all formats that may end a path. */
+function mediaTypes({ components }: Contract): object {
+  const formats = Object.values(components.parameters).map((each) => each["x-media-types"] ?? {});
+  return Object.assign({}, ...formats) as object;
 }
 
 function text(value: unknown): string {

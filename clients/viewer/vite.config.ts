@@ -1,7 +1,7 @@
 import { defineConfig } from "vite";
 import { viteSingleFile } from "vite-plugin-singlefile";
 
-// One file, which the service answers `/` with: see service/web/pages/viewer.py.
+// One file, which the service answers `/` with: see service/web/pages/standalone.py.
 export default defineConfig({
   plugins: [viteSingleFile({ removeViteModuleLoader: true })],
   build: { outDir: "../../service/web/viewer", emptyOutDir: true, modulePreload: false },

@@ -1,7 +1,7 @@
-"""posefield in Blender: pick a model of a motion service, set its controls, and import the clip.
+"""Blender add-on: pick a model of a motion service, set its controls, and import the clip.
 
-The panel stands in the sidebar of the 3D view. Whatever needs no Blender is in `without_blender`;
-`rig` and `action` put a clip on an armature, `live` keeps it as the sliders say.
+The panel is in the sidebar of the 3D view. `without_blender` has the code without bpy, `rig` and
+`action` write a clip to an armature, `live` updates it when a slider moves.
 """
 
 from . import handlers, live, operators, panel, preferences, properties, sliders
@@ -10,15 +10,15 @@ CLASSES = (*preferences.CLASSES, *properties.CLASSES, *operators.CLASSES, *panel
 
 
 def register() -> None:
-    """Called by Blender when the add-on is switched on."""
+    """Register the add-on; called by Blender when it is enabled."""
     properties.register(CLASSES)
     handlers.register()
 
 
 def unregister() -> None:
-    """Called by Blender when it is switched off: no timer or handler is left.
+    """Unregister the add-on, with all timers and handlers; called by Blender when it is disabled.
 
-    A thread that still asks ends with its answer, which is dropped, or at the timeout.
+    A thread with a pending request ends with its response, which is dropped, or at the timeout.
     """
     handlers.unregister()
     live.stop()

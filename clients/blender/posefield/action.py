@@ -1,6 +1,6 @@
-"""Keys on an armature: one slotted action, all keys of a curve at once.
+"""Keyframes on an armature: one slotted action, with all keys of a curve written together.
 
-Blender 4.5 and 5.0 are written alike: action, slot, layer, strip, channelbag.
+The layered API (action, slot, layer, strip, channelbag) is the same in Blender 4.5 and 5.0.
 """
 
 import json
@@ -14,21 +14,21 @@ from .without_blender.bones import Channels
 from .without_blender.clips import Clip
 
 MARK = "posefield"
-"""Property of an action that we made: what the service says of the clip."""
+"""Property of an action made by this add-on, with the clip's trust as JSON."""
 
 LINEAR = 1
-"""Interpolation, as Blender counts them."""
+"""Blender's number of linear interpolation."""
 
 STILL = 1e-7
-"""Shifts of a bone up to here need no key, m."""
+"""Largest shift of a bone without a key, m."""
 
 
 @dataclass(frozen=True)
 class Placing:
-    """Where keys stand in the scene.
+    """Position of the keys in the scene.
 
-    start: frame of the first. step: frames of the scene from one to the next. repeated: by Cycles
-    modifiers, before and after.
+    start: frame of the first. step: scene frames between keys. repeated: True for Cycles modifiers,
+    before and after.
     """
 
     start: float
@@ -36,12 +36,12 @@ class Placing:
     repeated: bool
 
     def frames(self, count: int):
-        """Frames of so many keys."""
+        """Return the frames of `count` keys."""
         return self.start + self.step * np.arange(count)
 
 
 def begin(armature, name: str) -> list[str]:
-    """A new action for an armature; what was there before is kept, and said."""
+    """Assign a new action to an armature, keep the previous one, and return notes on it."""
     made = bpy.data.actions.new(name)
     slot = made.slots.new(id_type="OBJECT", name=armature.name)
     made.layers.new("Layer").strips.new(type="KEYFRAME")
@@ -56,7 +56,7 @@ def begin(armature, name: str) -> list[str]:
 
 
 def own(armature):
-    """The armature's action, which we made; Fault where another has taken its place."""
+    """Return the armature's action; raise Fault if it was not created by this add-on."""
     data = armature.animation_data
     found = data.action if data else None
     if found is None or MARK not in found:
@@ -66,12 +66,12 @@ def own(armature):
 
 
 def keeps_lengths(armature) -> bool:
-    """Whether the armature's own bone lengths were kept when its clip was imported."""
+    """Return True if the armature kept its own bone lengths when its clip was imported."""
     return bool(json.loads(own(armature)[MARK])["keep_lengths"])
 
 
 def write(armature, clip: Clip, channels: Channels, placing: Placing, keep_lengths: bool) -> None:
-    """All keys of a clip on the armature's action, in place of those before."""
+    """Replace all keys of the armature's action by those of a clip."""
     data = armature.animation_data
     action = data.action
     bag = action.layers[0].strips[0].channelbag(data.action_slot, ensure=True)
@@ -89,7 +89,7 @@ def write(armature, clip: Clip, channels: Channels, placing: Placing, keep_lengt
 
 
 class _Curves:
-    """The curves of a channelbag, found by name once instead of each time."""
+    """Curves of a channelbag, indexed once by name."""
 
     def __init__(self, bag, placing: Placing) -> None:
         self._bag, self._placing = bag, placing
@@ -97,7 +97,7 @@ class _Curves:
         self._groups = {group.name: group for group in bag.groups}
 
     def put(self, bone: str, path: str, values) -> None:
-        """Keys at all frames: values (F, n) of n curves."""
+        """Write keys at all frames. values: (F, n), of n curves."""
         frames = self._placing.frames(len(values))
         for index, column in enumerate(values.T):
             curve = self._curve(bone, path, index)
@@ -105,7 +105,7 @@ class _Curves:
             _repeat(curve, self._placing.repeated, onward=path.endswith(".location"))
 
     def hold(self, bone: str, path: str, values) -> None:
-        """One key that holds; none where the bone never was elsewhere."""
+        """Write one constant key; none for a bone without curves and a shift of at most STILL."""
         if np.abs(values).max() <= STILL and (path, 0) not in self._known:
             return
         for index, value in enumerate(values):
@@ -134,7 +134,7 @@ def _key(curve, frames, values) -> None:
 
 
 def _repeat(curve, repeated: bool, onward: bool) -> None:
-    """A Cycles modifier, or none; onward: each time from where the last has led."""
+    """Add or remove a Cycles modifier. onward: True to continue from the last value."""
     for modifier in [each for each in curve.modifiers if each.type == "CYCLES"]:
         curve.modifiers.remove(modifier)
     if repeated:

@@ -1,4 +1,4 @@
-"""When another file is loaded, nothing of the one before is still asked or applied."""
+"""Handlers of loaded files: pending requests and responses of the previous file are dropped."""
 
 import bpy
 from bpy.app.handlers import persistent
@@ -8,7 +8,7 @@ from . import live, session
 
 @persistent
 def before_load(*_) -> None:
-    """Whatever comes back belongs to a file that is gone."""
+    """Stop requests, because their responses belong to the file that is closed."""
     live.stop()
     session.current.clip = None
     session.current.tell()
@@ -16,19 +16,19 @@ def before_load(*_) -> None:
 
 @persistent
 def after_load(*_) -> None:
-    """A file that is opened asks nobody by itself."""
+    """Turn live updates off, so that an opened file sends no request by itself."""
     for scene in bpy.data.scenes:
         scene.posefield.live = False
 
 
 def register() -> None:
-    """Know of loaded files."""
+    """Add the handlers."""
     bpy.app.handlers.load_pre.append(before_load)
     bpy.app.handlers.load_post.append(after_load)
 
 
 def unregister() -> None:
-    """Care for them no more."""
+    """Remove the handlers."""
     bpy.app.handlers.load_pre.remove(before_load)
     bpy.app.handlers.load_post.remove(after_load)
     session.forget()

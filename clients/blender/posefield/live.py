@@ -1,4 +1,4 @@
-"""The imported clip follows the sliders: asked in a thread, applied by a timer in Blender's own."""
+"""Live updates of the imported clip: requests in a thread, results applied by a Blender timer."""
 
 import traceback
 from dataclasses import dataclass
@@ -12,14 +12,15 @@ from .without_blender.latest import Latest
 from .without_blender.service import Service
 
 INTERVAL = 0.02
-"""Seconds between two looks for an answer; no screen shows more."""
+"""Seconds between two checks for a response; screens are hardly faster."""
 
-_asking: Latest | None = None
+asking: Latest | None = None
+"""Thread of the requests; None without requests."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """A question, and the scene on whose behalf."""
+    """A question, and the name of the scene it belongs to."""
 
     service: Service
     question: Question
@@ -27,7 +28,7 @@ class Asked:
 
 
 def changed(scene) -> None:
-    """Called when anything of what is asked for changes."""
+    """Request the clip again after a change of a setting, if live updates are on."""
     if scene.posefield.live:
         try:
             ask(scene)
@@ -36,30 +37,30 @@ def changed(scene) -> None:
 
 
 def ask(scene) -> None:
-    """Ask for the clip as the sliders are now; what was still waiting is forgotten."""
-    global _asking
+    """Request the clip of the current sliders; a request that still waits is replaced."""
+    global asking
     action.own(character(scene))
     asked = Asked(preferences.service(bpy.context), questions.question(scene), scene.name)
-    if _asking is None:
-        _asking = Latest(_answered)
-    _asking.ask(asked)
+    if asking is None:
+        asking = Latest(_answered)
+    asking.ask(asked)
     if not bpy.app.timers.is_registered(tick):
         bpy.app.timers.register(tick, first_interval=INTERVAL)
 
 
 def tick() -> float | None:
-    """Apply an answer, if there is one; seconds until the next look, None at the end."""
-    if _asking is None:
+    """Apply a response, if there is one; return the seconds to the next call, None to end."""
+    if asking is None:
         return None
-    for found in _asking.take():
+    for found in asking.take():
         _take(found)
-    return INTERVAL if _asking is not None and _asking.busy else None
+    return INTERVAL if asking is not None and asking.busy else None
 
 
 def stop() -> Latest | None:
-    """Forget what was asked, and let timer and thread end; the thread, where there was one."""
-    global _asking
-    ended, _asking = _asking, None
+    """Drop pending requests, and end timer and thread; return the thread, None if there is none."""
+    global asking
+    ended, asking = asking, None
     if ended is not None:
         ended.close()
     if bpy.app.timers.is_registered(tick):
@@ -68,16 +69,16 @@ def stop() -> Latest | None:
 
 
 def character(scene):
-    """The armature that was imported; Fault where it is gone."""
+    """Return the imported armature; raise Fault if it was deleted."""
     found = scene.posefield.character
-    # A deleted object lives on as long as our pointer holds it, but in no scene.
+    # The pointer keeps a deleted object, but no scene contains it.
     if found is None or found.name not in scene.objects:
         raise faults.Fault("there is no imported armature in this scene: import a clip first")
     return found
 
 
 def _answered(asked: Asked) -> tuple[Asked, Clip]:
-    """In the thread: nothing of Blender may be touched here."""
+    """Fetch the clip; runs in the thread, where bpy must not be used."""
     return asked, clips.ask(asked.service, asked.question)
 
 

@@ -1,4 +1,4 @@
-"""What the panel's buttons do, and scripts: `bpy.ops.posefield`."""
+"""Operators of the panel's buttons, also for scripts: `bpy.ops.posefield`."""
 
 import json
 import math
@@ -31,7 +31,7 @@ class POSEFIELD_OT_refresh(bpy.types.Operator):
     bl_options = {"REGISTER"}  # noqa: RUF012
 
     def execute(self, context):
-        """Models and card anew; nothing changes where the service does not answer."""
+        """Fetch models and card again; on an error nothing changes."""
         try:
             questions.refresh(context, context.scene)
         except faults.Fault as fault:
@@ -40,14 +40,14 @@ class POSEFIELD_OT_refresh(bpy.types.Operator):
 
 
 class POSEFIELD_OT_reset(bpy.types.Operator):
-    """Set all controls to the middle of what was sampled"""
+    """Set all controls to their defaults"""
 
     bl_idname = "posefield.reset"
     bl_label = "Reset controls"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     def execute(self, context):
-        """Every slider to its default."""
+        """Set every slider to its default."""
         try:
             sliders.reset(context.scene, questions.card_of(context.scene))
         except faults.Fault as fault:
@@ -88,7 +88,7 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
     )
 
     def execute(self, context):
-        """Ask first, then look whether the clip fits, and only then change anything."""
+        """Fetch the clip, check that it fits, and only then change the scene."""
         try:
             armature = self._armature(context)
             asked = preferences.service(context).in_all()

@@ -1,4 +1,4 @@
-"""The panel in the sidebar of the 3D view."""
+"""Panel in the sidebar of the 3D view."""
 
 import textwrap
 
@@ -8,11 +8,11 @@ from . import preferences, questions, session, sliders
 from .without_blender import faults, marks
 
 WIDTH = 44
-"""Letters that a row holds at the sidebar's usual width."""
+"""Characters per row at the sidebar's default width."""
 
 
 class VIEW3D_PT_posefield(bpy.types.Panel):
-    """Model, controls, and what becomes of the clip."""
+    """Panel with model, controls, import and trust of the clip."""
 
     bl_label = "posefield"
     bl_category = "posefield"
@@ -20,7 +20,7 @@ class VIEW3D_PT_posefield(bpy.types.Panel):
     bl_region_type = "UI"
 
     def draw(self, context):
-        """Everything from top to bottom; what is not known yet is left out."""
+        """Draw the panel; without a card, draw the reason in place of the controls."""
         layout, scene = self.layout, context.scene
         draw_service(layout, context)
         try:
@@ -36,7 +36,7 @@ class VIEW3D_PT_posefield(bpy.types.Panel):
 
 
 def draw_service(layout, context) -> None:
-    """Address, refresh and model."""
+    """Draw address, refresh button and model."""
     row = layout.row(align=True)
     row.prop(preferences.of(context), "address", text="")
     row.operator("posefield.refresh", text="", icon="FILE_REFRESH")
@@ -44,7 +44,7 @@ def draw_service(layout, context) -> None:
 
 
 def draw_controls(layout, scene, card) -> None:
-    """A slider for each control, and the values that were sampled where they are few."""
+    """Draw a slider for each control, and its sampled values if they are few."""
     column = layout.column(align=True)
     for control in card.controls:
         column.prop(getattr(scene, sliders.PLACE), sliders.attribute(control), slider=True)
@@ -54,7 +54,7 @@ def draw_controls(layout, scene, card) -> None:
 
 
 def draw_choices(layout, own, card) -> None:
-    """What else is asked for."""
+    """Draw the other settings of a request."""
     if card.performers:
         layout.prop(own, "performer")
     layout.prop(own, "level")
@@ -70,7 +70,7 @@ def draw_choices(layout, own, card) -> None:
 
 
 def draw_import(layout, context) -> None:
-    """Import, onto a new armature or the active one, and live."""
+    """Draw the import buttons, for a new armature and for the active one, and the live switch."""
     own = context.scene.posefield
     made = layout.operator("posefield.import_clip", icon="IMPORT")
     made.onto, made.set_scene = "NEW", own.set_scene
@@ -83,10 +83,10 @@ def draw_import(layout, context) -> None:
 
 
 def draw_trust(layout, scene, card) -> None:
-    """What the clip is worth, and where it leaves what was sampled."""
+    """Draw the clip's sigma and support, and controls outside the sampled range."""
     clip, now = session.current.clip, sliders.values(scene, card)
     who = scene.posefield.performer_name or None
-    # It belongs to one point: it is not shown beside sliders that stand elsewhere.
+    # Sigma holds for the clip's controls only; hide it when the sliders differ.
     if clip is not None and clip.answers(card.identity, now, who):
         far = f"{100 * clip.sigma:.1f} cm"
         draw_text(layout, f"A captured clip would lie about {far} from this", "INFO")
@@ -97,19 +97,19 @@ def draw_trust(layout, scene, card) -> None:
 
 
 def draw_mark(layout, mark, good: str, other: str) -> None:
-    """Words under a sign of their own; nothing where the service does not say."""
+    """Draw a mark with its icon; nothing if the service does not report it."""
     if mark is not None:
         draw_text(layout, mark.words, good if mark.held else other)
 
 
 def draw_said(layout) -> None:
-    """What was last reported."""
+    """Draw the last report."""
     for sentence in session.current.said:
         draw_text(layout, sentence, "CANCEL" if session.current.failed else "CHECKMARK")
 
 
 def draw_text(layout, text: str, icon: str) -> None:
-    """A sentence in as many rows as it takes."""
+    """Draw a sentence, wrapped to several rows."""
     column = layout.column(align=True)
     column.alert = icon in ("ERROR", "CANCEL")
     for place, line in enumerate(textwrap.wrap(text, WIDTH)):

@@ -1,4 +1,4 @@
-"""A clip onto an armature and into the time of a scene."""
+"""Placement of a clip on an armature and in the time of a scene."""
 
 import math
 
@@ -8,19 +8,18 @@ from .without_blender import bones, rates
 from .without_blender.clips import Clip
 
 STRAIGHT = 1e-3
-"""Up to this turn of a cycle, rad, it can be repeated by an offset alone."""
+"""Largest turn of a cycle, rad, that Cycles modifiers with an offset can repeat."""
 
 
 def put(scene, armature, clip: Clip, keep_lengths: bool, loop: bool) -> None:
-    """Write the clip on the armature's action, at the scene's rate."""
+    """Write the clip to the armature's action, at the scene's rate."""
     channels = bones.channels(clip, rig.rest(armature, clip), keep_lengths)
     repeated = loop and bones.heading_left(clip) <= STRAIGHT
     action.write(armature, clip, channels, _placing(scene, clip, repeated), keep_lengths)
 
 
 def set_scene(scene, armature, clip: Clip, loop: bool) -> list[str]:
-    """Let the scene play the clip as fast as it is, from its first frame to its last; what
-    changed."""
+    """Set the scene's rate and range to the clip's and return notes on the changes."""
     before, now = _rate(scene), clip.rate
     said = []
     if not rates.same(before, now):
@@ -35,14 +34,17 @@ def set_scene(scene, armature, clip: Clip, loop: bool) -> list[str]:
 
 
 def frames(scene, clip: Clip, loop: bool) -> tuple[int, int]:
-    """First and last frame to play; a loop's last key is its first again, and not played."""
+    """Return the first and last frame to play.
+
+    The last key of a loop repeats its first and is not played.
+    """
     placing = _placing(scene, clip, loop)
     last = math.ceil(placing.start + placing.step * (len(clip) - 1) - 1e-6) - loop
     return int(placing.start), max(last, int(placing.start))
 
 
 def unrepeated(clip: Clip, loop: bool) -> list[str]:
-    """Why a loop has no Cycles modifiers, if it has none."""
+    """Return the reason that a loop has no Cycles modifiers; empty if it has some."""
     turn = bones.heading_left(clip)
     if not loop or turn <= STRAIGHT:
         return []

@@ -1,4 +1,4 @@
-"""Where the service is and who asks it: kept in Blender's preferences, not in files of scenes."""
+"""Preferences: address, key and timeout, stored in Blender's preferences, not in scene files."""
 
 import bpy
 from bpy.props import FloatProperty, StringProperty
@@ -8,7 +8,7 @@ from .without_blender.service import Service
 
 
 class PosefieldPreferences(bpy.types.AddonPreferences):
-    """Address, key and patience."""
+    """Address, key and timeout of the service."""
 
     bl_idname = __package__
 
@@ -31,7 +31,7 @@ class PosefieldPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, _context):
-        """Settings, and what becomes of the key."""
+        """Draw the settings, with warnings on the storage and transport of the key."""
         self.layout.prop(self, "address")
         self.layout.prop(self, "key")
         self.layout.prop(self, "seconds")
@@ -44,12 +44,12 @@ class PosefieldPreferences(bpy.types.AddonPreferences):
 
 
 def of(context) -> PosefieldPreferences:
-    """The add-on's settings."""
+    """Return the add-on's preferences."""
     return context.preferences.addons[__package__].preferences
 
 
 def service(context) -> Service:
-    """The service that is asked; BadAddress, or Offline where Blender may not ask it."""
+    """Return the service; raise BadAddress, or Offline if Blender may not access it."""
     own = of(context)
     found = Service(own.address, own.key, own.seconds)
     if not found.is_here and not bpy.app.online_access:

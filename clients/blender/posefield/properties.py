@@ -1,4 +1,4 @@
-"""What the panel asks for, kept with each scene."""
+"""Settings of the panel, stored with each scene."""
 
 import bpy
 from bpy.props import (
@@ -14,7 +14,7 @@ from . import live, questions, session
 
 ANYBODY = "ANYBODY"
 
-# Blender keeps no reference to the texts of items made on the fly; they must live on here.
+# Blender keeps no reference to the strings of dynamic enum items, so they are kept here.
 _kept: dict[str, list[tuple[str, str, str]]] = {}
 
 
@@ -28,7 +28,7 @@ def _models(own, _context):
     if not own.model_name:
         found.append(("NONE", "(refresh first)", ""))
     elif all(name != own.model_name for name, _, _ in found):
-        # What a file was made with is shown even where the service has it no more.
+        # The file's model is shown even if the service no longer has it.
         found.append((own.model_name, own.model_name, "Not known: refresh"))
     return _items("models", found)
 
@@ -96,7 +96,7 @@ def _is_armature(_own, found):
 
 
 class PosefieldSettings(bpy.types.PropertyGroup):
-    """Which model, how it is asked, and which armature moves."""
+    """Model, request settings, and imported armature of a scene."""
 
     model_name: StringProperty(options={"HIDDEN"})
     performer_name: StringProperty(options={"HIDDEN"})
@@ -190,14 +190,14 @@ CLASSES = (PosefieldSettings,)
 
 
 def register(classes) -> None:
-    """All classes of the add-on, and the settings of scenes."""
+    """Register the add-on's classes and the settings of scenes."""
     for each in classes:
         bpy.utils.register_class(each)
     bpy.types.Scene.posefield = PointerProperty(type=PosefieldSettings)
 
 
 def unregister(classes) -> None:
-    """Away with them; what scenes hold stays in their files."""
+    """Unregister the add-on's classes; the data of scenes stay in their files."""
     del bpy.types.Scene.posefield
     for each in reversed(classes):
         bpy.utils.unregister_class(each)

@@ -1,4 +1,4 @@
-"""What is asked of the service on behalf of a scene."""
+"""Requests to the service for a scene."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from .without_blender.service import Service
 
 @dataclass(frozen=True)
 class Picked:
-    """A model that a scene may take. models: all of the service, empty where it was not asked."""
+    """A model for a scene. models: all of the service; empty if they were not requested."""
 
     name: str
     card: Card
@@ -19,12 +19,12 @@ class Picked:
 
 
 def refresh(context, scene) -> None:
-    """Ask which models there are, and for the card of the picked one, or the first."""
+    """Fetch the list of models, and the card of the picked one, or of the first."""
     take(scene, found(preferences.service(context).in_all(), scene))
 
 
 def found(asked: Service, scene) -> Picked:
-    """The scene's model as the service has it now, or the first; nothing is changed."""
+    """Return the scene's model as the service has it now, or the first; the scene is unchanged."""
     models = service.models(asked)
     known = [name for name, _ in models]
     own = scene.posefield
@@ -35,7 +35,7 @@ def found(asked: Service, scene) -> Picked:
 
 
 def pick(context, scene) -> None:
-    """Ask for the card of the model that was just picked; what is wrong shows in the panel."""
+    """Fetch the card of the model that was picked; errors are shown in the panel."""
     name = scene.posefield.model_name
     try:
         take(scene, Picked(name, cards.get(preferences.service(context), name)))
@@ -46,7 +46,7 @@ def pick(context, scene) -> None:
 
 
 def take(scene, picked: Picked) -> None:
-    """Make sliders of a card; at their defaults, unless the scene had this model's before."""
+    """Make the sliders of a card, at their defaults unless the scene already used this model."""
     own = scene.posefield
     fresh = not _has(scene, picked)
     session.current.card = picked.card
@@ -54,7 +54,7 @@ def take(scene, picked: Picked) -> None:
     sliders.make(picked.card)
     own.model_name = own.sliders_of = picked.name
     if fresh:
-        # Sliders come last: where the clip follows them, what they ask is what counts.
+        # Reset the sliders last, because each change can send a live request.
         own.performer_name, own.level_number, own.loop = "", 0, False
         sliders.reset(scene, picked.card)
 
@@ -64,7 +64,7 @@ def _has(scene, picked: Picked) -> bool:
 
 
 def card_of(scene) -> Card:
-    """Card of the scene's model; Fault where it is not known."""
+    """Return the card of the scene's model; raise Fault if it is unknown."""
     card = session.current.card
     if card is None or scene.posefield.sliders_of != scene.posefield.model_name:
         raise faults.Fault("no model is picked: refresh, and pick one")
@@ -75,12 +75,12 @@ def card_of(scene) -> Card:
 
 
 def question(scene) -> Question:
-    """What the panel asks for."""
+    """Return the panel's request for a clip."""
     return question_of(scene, Picked(scene.posefield.model_name, card_of(scene)), {})
 
 
 def question_of(scene, picked: Picked, others: dict[str, float]) -> Question:
-    """What the panel would ask for if it had taken the model, but with others for some controls."""
+    """Return the request for a model with the panel's settings and some other control values."""
     card, own, had = picked.card, scene.posefield, _has(scene, picked)
     if had and own.loop and not card.cyclic:
         raise faults.Fault(f"{card.name} is no cycle, and cannot be a loop")
@@ -97,13 +97,13 @@ def question_of(scene, picked: Picked, others: dict[str, float]) -> Question:
 
 def _values(scene, card: Card) -> dict[str, float]:
     if session.current.card is None:
-        # What a file kept of its sliders can be read once they are made.
+        # The sliders' values in a file are readable only after the sliders are made.
         sliders.make(card)
     return sliders.values(scene, card)
 
 
 def fps(scene) -> float:
-    """Frames a second that are asked for."""
+    """Return the requested frames per second."""
     if scene.posefield.rate == "SCENE":
         return rates.rate(scene.render.fps, scene.render.fps_base)
     return rates.shortest(scene.posefield.fps)

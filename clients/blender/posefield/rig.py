@@ -1,4 +1,4 @@
-"""Armatures: a new one for a clip, and what an existing one is at rest."""
+"""Armatures: creation for a clip, and rest pose of existing ones."""
 
 import bpy
 import numpy as np
@@ -9,11 +9,11 @@ from .without_blender.cards import Card
 from .without_blender.clips import Clip
 
 EVEN = 1e-4
-"""How far the scales along two axes may differ, of the larger."""
+"""Largest difference between the scales of two axes, as a share of the larger."""
 
 
 def make(context, card: Card, clip: Clip):
-    """A new armature for a checked clip in the active collection, with bones of its lengths."""
+    """Create an armature with the bone lengths of a checked clip in the active collection."""
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     armature = bpy.data.objects.new(card.name, bpy.data.armatures.new(card.name))
@@ -39,7 +39,7 @@ def _bones(edited, clip: Clip, card: Card) -> None:
 
 
 def check(armature, clip: Clip) -> None:
-    """Refuse an armature on which the clip has no place; Mismatch says why."""
+    """Raise Mismatch for an armature that does not fit the clip."""
     if not armature.is_editable or not armature.data.is_editable:
         raise faults.Mismatch(f"the armature {armature.name} is linked from another file")
     own = armature.data.bones
@@ -54,14 +54,14 @@ def check(armature, clip: Clip) -> None:
 
 
 def rest(armature, clip: Clip) -> Rest:
-    """Rest matrices of a checked armature in the clip's order."""
+    """Return the rest matrices of a checked armature in the clip's order."""
     own = armature.data.bones
     matrices = np.array([own[name].matrix_local for name in clip.names], dtype=float)
     return Rest(matrices, float(_scale(armature).mean()))
 
 
 def settle(armature) -> list[str]:
-    """Turn all bones by quaternions, and take away what is not keyed; what is said of it."""
+    """Set all bones to quaternions, clear location and scale, and return notes."""
     posed = armature.pose.bones
     others = [bone for bone in posed if bone.rotation_mode != "QUATERNION"]
     for bone in others:
@@ -72,7 +72,7 @@ def settle(armature) -> list[str]:
 
 
 def disturbed(armature) -> list[str]:
-    """What keeps an armature from moving as its action says, in words."""
+    """Return notes on constraints, NLA tracks and tilt, which change the armature's motion."""
     constrained = sum(bool(bone.constraints) for bone in armature.pose.bones)
     tracks = len(armature.animation_data.nla_tracks) if armature.animation_data else 0
     tilt = np.degrees(np.arccos(np.clip(_upright(armature), -1, 1)))
@@ -97,6 +97,6 @@ def _scale(armature):
 
 
 def _upright(armature) -> float:
-    """Cosine between the armature's Z axis and the world's."""
+    """Return the cosine between the armature's Z axis and the world's."""
     axis = np.array(armature.matrix_world, dtype=float)[:3, 2]
     return float(axis[2] / np.linalg.norm(axis))

@@ -1,4 +1,4 @@
-"""What is known since the last refresh. It belongs to the running Blender and not to its files."""
+"""State since the last refresh, of the running Blender, not of its files."""
 
 from dataclasses import dataclass, field
 
@@ -8,8 +8,11 @@ from .without_blender.clips import Clip
 
 @dataclass
 class Session:
-    """models: name and description of each. card: of the model that was picked. said: what the
-    panel shows, and whether it is a fault."""
+    """State of the add-on.
+
+    models: name and description of each. card: of the picked model. clip: last imported clip. said:
+    messages in the panel. failed: True if they report an error.
+    """
 
     models: tuple[tuple[str, str], ...] = ()
     card: Card | None = None
@@ -18,7 +21,7 @@ class Session:
     failed: bool = False
 
     def tell(self, *sentences: str, failed: bool = False) -> None:
-        """Show sentences in place of those before."""
+        """Replace the messages."""
         self.said, self.failed = [each for each in sentences if each], failed
 
 
@@ -26,6 +29,6 @@ current = Session()
 
 
 def forget() -> None:
-    """Know nothing any more."""
+    """Clear the state."""
     current.models, current.card, current.clip = (), None, None
     current.tell()

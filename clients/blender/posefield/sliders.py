@@ -1,4 +1,4 @@
-"""A slider for each control of the picked model, made from its card."""
+"""Sliders for the controls of the picked model, made from its card."""
 
 import bpy
 from bpy.props import FloatProperty, PointerProperty
@@ -7,11 +7,11 @@ from . import live
 from .without_blender.cards import Card, Control
 
 PLACE = "posefield_controls"
-"""Where they are on each scene."""
+"""Scene property that holds the sliders."""
 
 
 def make(card: Card) -> None:
-    """Sliders of a card in place of those before; values of the same name stay."""
+    """Replace the sliders by those of a card; values of the same name are kept."""
     remove()
     own = {attribute(each): _slider(each) for each in card.controls}
     made = type("PosefieldControls", (bpy.types.PropertyGroup,), {"__annotations__": own})
@@ -20,7 +20,7 @@ def make(card: Card) -> None:
 
 
 def remove() -> None:
-    """Take the sliders away."""
+    """Remove the sliders."""
     if hasattr(bpy.types.Scene, PLACE):
         made = bpy.types.Scene.bl_rna.properties[PLACE].fixed_type
         delattr(bpy.types.Scene, PLACE)
@@ -28,25 +28,25 @@ def remove() -> None:
 
 
 def reset(scene, card: Card) -> None:
-    """Every slider to its control's default."""
+    """Set every slider to its control's default."""
     put(scene, card, card.defaults)
 
 
 def put(scene, card: Card, values: dict[str, float]) -> None:
-    """Some sliders to values, by control."""
+    """Set some sliders to values, by control."""
     for control in card.controls:
         if control.name in values:
             setattr(getattr(scene, PLACE), attribute(control), values[control.name])
 
 
 def values(scene, card: Card) -> dict[str, float]:
-    """What the sliders say, by control."""
+    """Return the values of the sliders, by control."""
     own = getattr(scene, PLACE)
     return {each.name: each.exact(getattr(own, attribute(each))) for each in card.controls}
 
 
 def attribute(control: Control) -> str:
-    """Name of a slider as an attribute; Blender has some names for itself."""
+    """Return the attribute name of a slider; Blender reserves some names."""
     taken = hasattr(bpy.types.PropertyGroup, control.name)
     return f"{control.name}_" if taken else control.name
 

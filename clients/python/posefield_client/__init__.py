@@ -1,12 +1,12 @@
-"""Asks a posefield service: poses as NumPy arrays, clips and crowds as files, crowds as tables.
+"""Client of a posefield service: poses as NumPy arrays, clips and crowds as files or tables.
 
     from posefield_client import Client
 
     with Client("http://localhost:8000") as client:
         client.model("walk").clip(speed=1.4).save("clip.usdc")
 
-Metres, seconds, Y up; quaternions are unit, w x y z, local to the parent. What can go wrong is
-drawn in posefield_client.errors.
+Metres, seconds, Y up; quaternions are unit, w x y z, local to the parent. posefield_client.errors
+lists the exceptions.
 """
 
 from posefield_client import errors

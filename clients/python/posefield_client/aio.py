@@ -1,4 +1,4 @@
-"""The client that others need not wait for: the same questions, awaited."""
+"""Asynchronous client, with the requests of `client` as coroutines."""
 
 from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import closing
@@ -28,7 +28,7 @@ Later = Coroutine[Any, Any, T]
 
 
 def _ask(question: Callable[P, Call[T]]) -> Callable[Concatenate["AsyncClient", P], Later[T]]:
-    """Method that asks a question of the service."""
+    """Return a method of the client that sends a request."""
 
     @wraps(question)
     async def method(self: "AsyncClient", /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -40,7 +40,7 @@ def _ask(question: Callable[P, Call[T]]) -> Callable[Concatenate["AsyncClient", 
 def _ask_model(
     question: Callable[Concatenate[str, P], Call[T]],
 ) -> Callable[Concatenate["AsyncModel", P], Later[T]]:
-    """Method that asks a question of the model."""
+    """Return a method of the model that sends a request."""
 
     @wraps(question)
     async def method(self: "AsyncModel", /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -53,7 +53,7 @@ def _ask_model(
 def _lazy(
     kind: Callable[["AsyncClient", Files], F], question: Callable[Concatenate[str, P], Files]
 ) -> Callable[Concatenate["AsyncModel", P], F]:
-    """Method that gives what will be asked for when it is needed."""
+    """Return a method of the model that sends its request when the result is read or saved."""
 
     @wraps(question)
     def method(self: "AsyncModel", /, *args: P.args, **kwargs: P.kwargs) -> F:
@@ -63,10 +63,9 @@ def _lazy(
 
 
 class AsyncClient:
-    """A service at an address, asked from one event loop; arguments as Client.
+    """Client of a service at an address, for one event loop; arguments as `Client`.
 
-    Files and what is kept on disk are written between two pieces of an answer, which takes the loop
-    about as long as a small write does.
+    Writes to files and to the disk cache block the event loop for one small write each.
     """
 
     def __init__(
@@ -89,11 +88,11 @@ class AsyncClient:
     ready = _ask(questions.ready)
 
     def model(self, name: str) -> "AsyncModel":
-        """The model of a name, or of name@hash; it is not asked for anything yet."""
+        """Return a model by name or name@hash, without a request."""
         return AsyncModel(self, asking.model_name(name))
 
     async def close(self) -> None:
-        """End all connections."""
+        """Close all connections."""
         await self._http.aclose()
 
     async def __aenter__(self) -> "AsyncClient":
@@ -103,7 +102,7 @@ class AsyncClient:
         await self.close()
 
     async def run(self, steps: Steps[T]) -> T:
-        """What comes of steps, each of which is taken. Raises PosefieldError."""
+        """Run the steps of a generator and return its result. Raises PosefieldError."""
         step = partial(steps.send, None)
         with closing(steps):
             while True:
@@ -143,19 +142,19 @@ class AsyncClient:
 
 
 class AsyncSaving:
-    """What is asked for when it is saved or read."""
+    """Request that is sent when its result is saved or read."""
 
     def __init__(self, client: AsyncClient, files: Files) -> None:
         self._client = client
         self._files = files
 
     async def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
-        """Write to a file whose ending says in which format; it is whole, or not there."""
+        """Write the result to a file atomically; the path's suffix selects the format."""
         steps = saving.save(self._client.core, self._files, Path(path), progress)
         return await self._client.run(steps)
 
     async def content(self, format: str) -> bytes:  # noqa: A002  # the contract's own word
-        """The bytes of a format."""
+        """Return the result as bytes in a format."""
         return await self._client.run(saving.content(self._client.core, self._files, format))
 
     async def _numbers(self, read: Callable[[Reply], T], ending: str = "msgpack") -> T:
@@ -168,25 +167,28 @@ class AsyncClip(AsyncSaving):
 
     @property
     def numbers(self) -> Later[ClipNumbers]:
-        """Its frames as arrays, to be awaited."""
+        """Return a coroutine of the frames as arrays."""
         return self._numbers(numbers.clip)
 
 
 class AsyncCrowd(AsyncSaving):
-    """A pose of each of many characters."""
+    """One pose each of many characters."""
 
     @property
     def numbers(self) -> Later[CrowdPoses]:
-        """The poses as arrays, to be awaited."""
+        """Return a coroutine of the poses as arrays."""
         return self._numbers(numbers.crowd)
 
     async def table(self) -> Any:
-        """The poses as a pyarrow.Table, one row a character; needs posefield-client[arrow]."""
+        """Return the poses as a pyarrow.Table, one row per character.
+
+        Needs posefield-client[arrow].
+        """
         return await self._numbers(tables.read, "arrow")
 
 
 class AsyncModel:
-    """A model of a service, by its name."""
+    """A model of a service, by name."""
 
     def __init__(self, client: AsyncClient, name: str) -> None:
         self.client = client
@@ -205,12 +207,12 @@ class AsyncModel:
 
     @property
     def card(self) -> Later[ModelCard]:
-        """What the model says of itself, to be awaited; kept as soon as it has come."""
+        """Return a coroutine of the model card, which is cached."""
         return self._read_once()
 
     @property
     def controls(self) -> Later[dict[str, Control]]:
-        """Its controls by name, in the card's order, to be awaited."""
+        """Return a coroutine of the controls by name, in the card's order."""
         return self._controls()
 
     async def _read_once(self) -> ModelCard:

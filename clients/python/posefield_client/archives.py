@@ -1,4 +1,4 @@
-"""Archives of clips: how many are there so far, and whether all are there in the end."""
+"""Archives of clips: count of files received, and check for completeness."""
 
 import tarfile
 import zipfile
@@ -12,13 +12,13 @@ from posefield_client.generated import ManifestEntry
 MANIFEST = "manifest.jsonl"
 ZIP_HEAD, TAR_BLOCK = 30, 512
 STREAMED = 0x8
-"""Flag of a zip's file whose size follows it; our archives say it before."""
+"""Flag of a zip member with its size after the data; the service writes the size before."""
 
 _ENTRY = msgspec.json.Decoder(ManifestEntry)
 
 
 class Counter:
-    """Counts the files of an archive while it comes, by the heads that stand before them."""
+    """Counter of the files of an archive while it is received, by their headers."""
 
     def __init__(self, ending: str) -> None:
         self.files = 0
@@ -29,7 +29,7 @@ class Counter:
         self._ended = False
 
     def feed(self, chunk: bytes) -> None:
-        """Take the next bytes."""
+        """Count files in the next bytes."""
         rest = memoryview(chunk)
         while rest and not self._ended:
             rest = self._pass(rest) if self._left else self._take(rest)
@@ -51,7 +51,7 @@ class Counter:
 
 
 def _zip(head: bytes) -> tuple[int, bool]:
-    """Bytes that follow a head, and whether it is a file's; neither at the end."""
+    """Return the number of bytes after a header and True for a file; (0, False) at the end."""
     if head[:4] != b"PK\3\4" or head[6] & STREAMED:
         return 0, False
     ends = ((18, 22), (26, 28), (28, 30))
@@ -64,7 +64,7 @@ def _tar(head: bytes) -> tuple[int, bool]:
 
 
 def check(file: BinaryIO, ending: str, count: int) -> tuple[ManifestEntry, ...]:
-    """What the manifest says of each clip; IncompleteAnswer where not all of it is there."""
+    """Return the manifest's entries; IncompleteAnswer if the archive does not match them."""
     try:
         sizes, manifest = {"zip": _of_zip, "tar": _of_tar}[ending](file)
         entries = tuple(map(_ENTRY.decode, manifest.splitlines()))

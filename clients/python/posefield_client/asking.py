@@ -1,5 +1,4 @@
-"""Requests made of what is asked: by GET where a cache can keep the answer, by POST where that
-would be too long a line."""
+"""HTTP requests from arguments: GET, which can be cached, or POST for long queries."""
 
 import math
 import re
@@ -14,34 +13,46 @@ import numpy.typing as npt
 from msgspec import UNSET, Struct
 
 from posefield_client.errors import WrongQuestion
-from posefield_client.generated import OPERATIONS, Target
+from posefield_client.generated import OPERATIONS, Operation, Target
 from posefield_client.wire import Request
 
 MODEL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}(@[0-9a-f]{16})?", re.ASCII)
 LONGEST = 4000
-"""Characters of path and query asked by GET; services take 8,192, unless told otherwise."""
+"""Longest path and query of a GET request; services accept 8,192 characters by default."""
 _SAID_OTHERWISE = {"times": "time"}
 
 
-def plain(operation: str, model: str, words: Mapping[str, Any] | None = None) -> Request:
-    """Request by GET."""
-    return Request(OPERATIONS[operation], _target(operation, model, words or {}))
+def plain(
+    name: str, model: str, words: Mapping[str, Any] | None = None, form: str | None = None
+) -> Request:
+    """Return a GET request. form: the format at the end of its path; None without format."""
+    operation = _operation(name, form)
+    return Request(operation, _target(operation, model, words or {}))
 
 
-def body(operation: str, model: str, question: Struct) -> Request:
-    """Request by POST."""
-    content = msgspec.json.encode(sayable(operation, question))
-    return Request(OPERATIONS[operation], _target(operation, model, {}), content)
+def body(name: str, model: str, question: Struct, form: str | None = None) -> Request:
+    """Return a POST request. form: the format at the end of its path; None without format."""
+    operation = _operation(name, form)
+    content = msgspec.json.encode(sayable(name, question))
+    return Request(operation, _target(operation, model, {}), content)
 
 
-def either(noun: str, model: str, question: Struct) -> Request:
-    """Request of get<noun>, or of query<noun> where the line would be too long."""
-    asked = plain(f"get{noun}", model, _words(question))
-    return asked if len(asked.target) <= LONGEST else body(f"query{noun}", model, question)
+def either(noun: str, model: str, question: Struct, form: str | None = None) -> Request:
+    """Return a get<noun> request, or query<noun> if its path and query exceed LONGEST.
+
+    form: the format at the end of its path; None without format.
+    """
+    asked = plain(f"get{noun}", model, _words(question), form)
+    return asked if len(asked.target) <= LONGEST else body(f"query{noun}", model, question, form)
+
+
+def _operation(name: str, form: str | None) -> Operation:
+    found = OPERATIONS[name]
+    return found if form is None else found.in_format(form)
 
 
 def _words(question: Struct) -> dict[str, Any]:
-    """A question as the parameters of a query: each control is one."""
+    """Return a question as query parameters, with one parameter per control."""
     words: dict[str, Any] = {}
     for key in question.__struct_fields__:
         value = getattr(question, key)
@@ -57,13 +68,13 @@ def _words(question: Struct) -> dict[str, Any]:
 
 
 def _spelt(target: Target) -> str:
-    """A target in words."""
+    """Return a target as the value of a query parameter."""
     moment = target.at if target.time is UNSET else digits(target.time)
     return f"{target.joint}@{moment}:{','.join(map(digits, target.position))}"
 
 
-def _target(operation: str, model: str, words: Mapping[str, Any]) -> str:
-    path = OPERATIONS[operation].path.replace("{model}", model)
+def _target(operation: Operation, model: str, words: Mapping[str, Any]) -> str:
+    path = operation.path.replace("{model}", model)
     query = "&".join(_pairs(words))
     return f"{path}?{query}" if query else path
 
@@ -82,20 +93,20 @@ def _text(value: Any) -> str:
 
 
 def digits(value: Any) -> str:
-    """A number without an exponent, whose + a query takes for a space."""
+    """Return a number without an exponent, because a query decodes "+" as a space."""
     text = repr(value)
     return format(Decimal(text), "f") if "e" in text else text
 
 
 def model_name(name: str) -> str:
-    """The name, if one can be asked for it."""
+    """Return the name; raise WrongQuestion if it is not a valid model name."""
     if MODEL_NAME.fullmatch(name) is None:
         raise WrongQuestion(f"model {name!r}, expected a name or name@hash")
     return name
 
 
 def number(name: str, value: Any) -> float:
-    """A finite number as Python's own, a whole one whole; NumPy's are taken too."""
+    """Return a finite number as a Python int or float; NumPy scalars are accepted."""
     found = value.item() if isinstance(value, np.generic) else value
     if type(found) not in (int, float) or not _is_finite(found):
         raise WrongQuestion(f"{name} is {value!r}, expected a finite number")
@@ -104,7 +115,7 @@ def number(name: str, value: Any) -> float:
 
 
 def _is_finite(value: float) -> bool:
-    """Whether a number is finite, and within what floating point holds."""
+    """Return True for a finite number within the range of float."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -112,7 +123,7 @@ def _is_finite(value: float) -> bool:
 
 
 def numbers(name: str, values: Any) -> tuple[float, ...]:
-    """Finite numbers of one, of a list or of an array."""
+    """Return finite numbers from a number, a list or an array."""
     if isinstance(values, list | tuple):
         return tuple([number(name, value) for value in values])
     found = _array(name, values)
@@ -122,7 +133,7 @@ def numbers(name: str, values: Any) -> tuple[float, ...]:
 
 
 def column(name: str, values: Any) -> Any:
-    """A number, or one for each character; a word stays as it is."""
+    """Return a number, or a list with one per character; a string is returned unchanged."""
     if isinstance(values, str):
         return values
     found = _array(name, values)
@@ -130,7 +141,7 @@ def column(name: str, values: Any) -> Any:
 
 
 def columns(**given: Any) -> dict[str, Any]:
-    """Those that are said, each as column."""
+    """Return the arguments that are not None, each as `column` returns it."""
     return {name: column(name, values) for name, values in given.items() if values is not None}
 
 
@@ -149,12 +160,12 @@ def _finite(name: str, found: npt.NDArray[Any]) -> list[Any]:
 
 
 def controls(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> dict[str, float]:
-    """Controls by keyword, by a mapping, or both; WrongQuestion where one is given twice."""
+    """Return controls given by keyword, by a mapping, or both; WrongQuestion for duplicates."""
     return {name: number(name, value) for name, value in together(given, named).items()}
 
 
 def together(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Both mappings as one; WrongQuestion where they share a name."""
+    """Return both mappings as one; WrongQuestion if they share a name."""
     if not given:
         return named
     if twice := sorted(given.keys() & named.keys()):
@@ -163,12 +174,12 @@ def together(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> Mappi
 
 
 def said(**words: Any) -> dict[str, Any]:
-    """Those that are said: not None. NumPy's become Python's own; numbers are finite."""
+    """Return the arguments that are not None, as JSON values."""
     return {name: sayable(name, value) for name, value in words.items() if value is not None}
 
 
 def sayable(name: str, value: Any) -> Any:
-    """A value of Python's own, and all in it, as JSON can say it; WrongQuestion where none does."""
+    """Return a value as JSON types, recursively; WrongQuestion if that is impossible."""
     if isinstance(value, Struct):
         value = {key: getattr(value, key) for key in value.__struct_fields__}
     found = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
@@ -178,5 +189,5 @@ def sayable(name: str, value: Any) -> Any:
         return [sayable(name, each) for each in found]
     if isinstance(found, bool | str | None):
         return found
-    # What is not finite would be null, which means something else.
+    # JSON would encode a non-finite number as null, which has another meaning.
     return number(name, found)

@@ -1,4 +1,4 @@
-"""Answers kept: what may be used unasked, and what is asked for again by its entity tag."""
+"""Cache of responses, with freshness by max-age and revalidation by entity tag (RFC 9111)."""
 
 import re
 import threading
@@ -16,7 +16,7 @@ _AGE = re.compile(r"\bmax-age=(\d+)\b", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """An answer at hand. until: moment (Unix time) up to which it may be used unasked."""
+    """A cached response. until: Unix time until which it is fresh, s."""
 
     headers: dict[str, str]
     content: bytes
@@ -24,45 +24,45 @@ class Kept:
 
     @property
     def holds(self) -> bool:
-        """Whether it may be used unasked."""
+        """Return True if it is fresh."""
         return time.time() < self.until
 
     def renewed(self, headers: Mapping[str, str]) -> "Kept":
-        """The same, which the service has just said to be still right."""
+        """Return the response with the freshness of a revalidation's headers."""
         return replace(self, until=until(headers))
 
 
 class Cache(Protocol):
-    """Where answers are kept. largest: bytes of the largest that is."""
+    """Store of responses. largest: size limit of one response, bytes."""
 
     largest: int
 
     def find(self, name: str) -> Kept | None:
-        """The answer of that name."""
+        """Return the response of a name; None if missing."""
 
     def keep(self, name: str, kept: Kept) -> None:
-        """Keep an answer under a name."""
+        """Store a response under a name."""
 
 
 def scope(*parts: str) -> bytes:
-    """Digest of all that makes the same question another one: contract, address, key."""
+    """Return a digest of the parts that responses depend on: contract, address, key."""
     return blake2b("\0".join(parts).encode(), digest_size=32).digest()
 
 
 def name(of: bytes, target: str) -> str:
-    """What an answer is called: a digest, from which neither key nor question can be read."""
+    """Return the cache key of a request target, from which key and request cannot be read."""
     return blake2b(target.encode(), key=of, digest_size=20).hexdigest()
 
 
 def until(headers: Mapping[str, str]) -> float:
-    """Moment up to which an answer may be used unasked; 0: not at all."""
+    """Return the Unix time until which a response is fresh, s; 0 for never."""
     said = headers.get("cache-control", "")
     age = _AGE.search(said)
     return time.time() + int(age[1]) if age and "no-cache" not in said else 0.0
 
 
 def kept(headers: Mapping[str, str], content: bytes) -> Kept | None:
-    """The answer as it is kept; None where it is not to be."""
+    """Return the response to store; None if it must not be stored."""
     if "no-store" in headers.get("cache-control", "no-store") or "etag" not in headers:
         return None
     told = {
@@ -74,7 +74,7 @@ def kept(headers: Mapping[str, str], content: bytes) -> Kept | None:
 
 
 class Memory:
-    """The answers used last, up to some bytes of content, for as long as the client lives."""
+    """Least-recently-used cache in memory. limit: total size, bytes."""
 
     def __init__(self, limit: int = 16 * 2**20) -> None:
         self.limit = limit
@@ -84,7 +84,7 @@ class Memory:
         self._lock = threading.Lock()
 
     def find(self, name: str) -> Kept | None:
-        """The answer of that name."""
+        """Return the response of a name; None if missing."""
         with self._lock:
             found = self._answers.get(name)
             if found is not None:
@@ -92,7 +92,7 @@ class Memory:
             return found
 
     def keep(self, name: str, kept: Kept) -> None:
-        """Keep an answer, and let go of those that were not used for longest."""
+        """Store a response, and evict the least recently used ones above the limit."""
         with self._lock:
             before = self._answers.pop(name, None)
             self._size += len(kept.content) - (len(before.content) if before else 0)
@@ -102,4 +102,4 @@ class Memory:
 
 
 NOTHING = Memory(0)
-"""Keeps nothing."""
+"""Cache without capacity."""

@@ -1,4 +1,4 @@
-"""The client that waits for its answers."""
+"""Synchronous client."""
 
 import time
 from collections.abc import Callable
@@ -27,7 +27,7 @@ F = TypeVar("F")
 
 
 def _ask(question: Callable[P, Call[T]]) -> Callable[Concatenate["Client", P], T]:
-    """Method that asks a question of the service."""
+    """Return a method of the client that sends a request."""
 
     @wraps(question)
     def method(self: "Client", /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -39,7 +39,7 @@ def _ask(question: Callable[P, Call[T]]) -> Callable[Concatenate["Client", P], T
 def _ask_model(
     question: Callable[Concatenate[str, P], Call[T]],
 ) -> Callable[Concatenate["Model", P], T]:
-    """Method that asks a question of the model."""
+    """Return a method of the model that sends a request."""
 
     @wraps(question)
     def method(self: "Model", /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -52,7 +52,7 @@ def _ask_model(
 def _lazy(
     kind: Callable[["Client", Files], F], question: Callable[Concatenate[str, P], Files]
 ) -> Callable[Concatenate["Model", P], F]:
-    """Method that gives what will be asked for when it is needed."""
+    """Return a method of the model that sends its request when the result is read or saved."""
 
     @wraps(question)
     def method(self: "Model", /, *args: P.args, **kwargs: P.kwargs) -> F:
@@ -62,11 +62,11 @@ def _lazy(
 
 
 class Client:
-    """A service at an address, asked by one or more threads.
+    """Client of a service at an address, for one or more threads.
 
-    key: an API key or token; timeout: seconds without a word from the service; cache: a folder, or
-    where else answers are kept (a Memory of 16 MiB, if nothing is said; NOTHING keeps none); sleep:
-    how to wait.
+    key: an API key or token. timeout: seconds without data from the service. cache: a folder or a
+    Cache; None for a Memory of 16 MiB, NOTHING for no cache. sleep: function that waits for
+    seconds.
     """
 
     def __init__(
@@ -89,11 +89,11 @@ class Client:
     ready = _ask(questions.ready)
 
     def model(self, name: str) -> "Model":
-        """The model of a name, or of name@hash; it is not asked for anything yet."""
+        """Return a model by name or name@hash, without a request."""
         return Model(self, asking.model_name(name))
 
     def close(self) -> None:
-        """End all connections."""
+        """Close all connections."""
         self._http.close()
 
     def __enter__(self) -> "Client":
@@ -103,7 +103,7 @@ class Client:
         self.close()
 
     def run(self, steps: Steps[T]) -> T:
-        """What comes of steps, each of which is taken. Raises PosefieldError."""
+        """Run the steps of a generator and return its result. Raises PosefieldError."""
         step = partial(steps.send, None)
         with closing(steps):
             while True:
@@ -140,18 +140,18 @@ class Client:
 
 
 class Saving:
-    """What is asked for when it is saved or read."""
+    """Request that is sent when its result is saved or read."""
 
     def __init__(self, client: Client, files: Files) -> None:
         self._client = client
         self._files = files
 
     def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
-        """Write to a file whose ending says in which format; it is whole, or not there."""
+        """Write the result to a file atomically; the path's suffix selects the format."""
         return self._client.run(saving.save(self._client.core, self._files, Path(path), progress))
 
     def content(self, format: str) -> bytes:  # noqa: A002  # the contract's own word
-        """The bytes of a format."""
+        """Return the result as bytes in a format."""
         return self._client.run(saving.content(self._client.core, self._files, format))
 
     def _numbers(self, read: Callable[[Reply], T], ending: str = "msgpack") -> T:
@@ -163,25 +163,28 @@ class Clip(Saving):
 
     @cached_property
     def numbers(self) -> ClipNumbers:
-        """Its frames as arrays; asked for once."""
+        """Return the frames as arrays, requested once."""
         return self._numbers(numbers.clip)
 
 
 class Crowd(Saving):
-    """A pose of each of many characters."""
+    """One pose each of many characters."""
 
     @cached_property
     def numbers(self) -> CrowdPoses:
-        """The poses as arrays; asked for once."""
+        """Return the poses as arrays, requested once."""
         return self._numbers(numbers.crowd)
 
     def table(self) -> Any:
-        """The poses as a pyarrow.Table, one row a character; needs posefield-client[arrow]."""
+        """Return the poses as a pyarrow.Table, one row per character.
+
+        Needs posefield-client[arrow].
+        """
         return self._numbers(tables.read, "arrow")
 
 
 class Model:
-    """A model of a service, by its name."""
+    """A model of a service, by name."""
 
     def __init__(self, client: Client, name: str) -> None:
         self.client = client
@@ -199,12 +202,12 @@ class Model:
 
     @cached_property
     def card(self) -> ModelCard:
-        """What the model says of itself; asked for once."""
+        """Return the model card, requested once."""
         return self.read_card()
 
     @cached_property
     def controls(self) -> dict[str, Control]:
-        """Its controls by name, in the card's order."""
+        """Return the controls by name, in the card's order."""
         return {control.name: control for control in self.card.controls}
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Answers kept in a folder, which several processes may share."""
+"""Cache of responses in a folder that several processes can share."""
 
 import os
 import re
@@ -15,17 +15,17 @@ from posefield_client.cache import Kept
 
 DIGEST = 16
 NAME = re.compile(r"[0-9a-f]{40}(\.[0-9a-f]{12}\.part)?")
-"""What our files are called, as cache.name does: the folder may hold others."""
+"""Names of the cache's files, from cache.name; the folder may hold other files."""
 FORGOTTEN = 3600.0
-"""Seconds after which what a process left half-written is taken away."""
+"""Age after which an incomplete file is deleted, s."""
 
 
 class Disk:
-    """The answers used last, up to some bytes, one file each.
+    """Least-recently-used cache with one file per response. limit: total size, bytes.
 
-    A file is written beside and renamed, and begins with the digest of the rest: whatever else is
-    found there is none. Each process looks at the folder's size after it has written a sixteenth of
-    the limit; meanwhile it may be passed by as much.
+    A file is written under a temporary name and renamed, and starts with a digest of its content;
+    invalid files are ignored. Each process evicts files after it has written a sixteenth of the
+    limit, so each can exceed the limit by that much.
     """
 
     def __init__(self, folder: Path, limit: int = 2**30) -> None:
@@ -36,19 +36,19 @@ class Disk:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
 
     def find(self, name: str) -> Kept | None:
-        """The answer of that name."""
+        """Return the response of a name; None if missing or invalid."""
         path = self.folder / name
         try:
             found = _read(path.read_bytes())
         except (OSError, ValueError):
             return None
-        # What is used last is let go last, as far as the folder may be written.
+        # Mark the file as recently used; the folder may be read-only.
         with suppress(OSError):
             os.utime(path)
         return found
 
     def keep(self, name: str, kept: Kept) -> None:
-        """Keep an answer; where the folder cannot be written, warn and go on without."""
+        """Store a response; warn if the folder cannot be written."""
         content = msgspec.msgpack.encode((kept.headers, kept.content, kept.until))
         try:
             self._write(name, content)
@@ -73,19 +73,19 @@ class Disk:
             raise
 
     def _tidy(self) -> None:
-        """Take away what was not used for longest, down to seven eighths of the limit."""
+        """Delete the least recently used responses, down to seven eighths of the limit."""
         ours = (path for path in self.folder.iterdir() if NAME.fullmatch(path.name))
         found = sorted(filter(None, map(_looked_at, ours)), reverse=True)
         size = 0
         for used, length, path in found:
             if path.suffix == ".part":
-                # Somebody may be writing it just now.
+                # Another process may still be writing it.
                 needless = used < time.time() - FORGOTTEN
             else:
                 size += length
                 needless = size > self.limit * 7 // 8
             if needless:
-                # Another process may have been faster.
+                # Another process may have deleted it.
                 with suppress(OSError):
                     path.unlink()
 
@@ -106,7 +106,7 @@ _KEPT = msgspec.msgpack.Decoder(tuple[dict[str, str], bytes, float])
 
 
 def _read(content: bytes) -> Kept:
-    """ValueError where these are not the bytes that were written."""
+    """Return a response from a file's content; ValueError if the digest does not match."""
     if content[:DIGEST] != _digest(content[DIGEST:]):
         raise ValueError("no answer, or a torn one")
     return Kept(*_KEPT.decode(content[DIGEST:]))

@@ -1,25 +1,25 @@
-"""What can go wrong, as one tree.
+"""Exceptions of the client, as one tree.
 
 PosefieldError
-├── WrongQuestion              nothing was sent: a name, ending or number that cannot be
-├── Problem                    the service says what is wrong; itself, of a kind still unknown
-│   ├── WrongRequest           the request breaks the contract
-│   │   ├── BadParameter, BadBody, MalformedRequest, UnsupportedMediaType, NotAcceptable,
+├── WrongQuestion              invalid argument: a name, format or number; nothing was sent
+├── Problem                    problem document of the service; itself for an unknown type
+│   ├── WrongRequest           the request violates the contract
+│   │   ├── BadParameter, BadBody, UnsupportedMediaType, NotAcceptable,
 │   │   ├── NoSuchPath, MethodNotAllowed,
-│   │   └── BodyTooLarge, UrlTooLong, HeadTooLarge, RequestTooSlow
-│   ├── NotAllowed             the key
+│   │   └── BodyTooLarge, UrlTooLong, HeadTooLarge, UnknownHost
+│   ├── NotAllowed             the key was refused
 │   │   └── Unauthenticated, Forbidden
-│   ├── Unanswerable           there is no answer to this question
+│   ├── Unanswerable           a valid request without a result
 │   │   └── UnknownModel, UnknownFormat, InvalidField, OutsideSamples,
 │   │       OutOfReach
-│   ├── Busy                   asked again by itself, until patience ends
-│   │   └── Overloaded, Late, NotReady, NoConnectionLeft
+│   ├── Busy                   temporary; retried
+│   │   └── Overloaded, Late, NotReady
 │   └── InternalError          the service failed
-├── Unreachable                no service answers; asked again by itself
-├── TimedOut                   it took too long; asked again by itself
-├── Broken                     the answer was cut in its middle; asked again by itself
-│   └── IncompleteAnswer       it ended, but is not whole
-└── Unexpected                 this is no answer of the contract that this client knows
+├── Unreachable                no service responds; retried
+├── TimedOut                   the timeout was exceeded; retried
+├── Broken                     the response was interrupted; retried
+│   └── IncompleteAnswer       the response ended, but is incomplete
+└── Unexpected                 the response does not follow the contract of this client
 """
 
 import time
@@ -35,27 +35,27 @@ from posefield_client.generated import CONTRACT
 TYPE_PREFIX = "urn:posefield:problem:"
 MEDIA_TYPE = "application/problem+json"
 GATEWAYS = (429, 502, 503, 504)
-"""Statuses by which something before the service says that it is not there now."""
+"""Statuses with which a gateway reports that the service is unavailable."""
 
 
 class PosefieldError(Exception):
-    """Whatever this client raises on purpose."""
+    """Base of all exceptions that this client raises deliberately."""
 
     again: ClassVar[bool] = False
-    """Whether the same question may have an answer later."""
+    """True if a retry can succeed."""
     retry_after: float | None = None
-    """Seconds after which the service wants to be asked again."""
+    """Seconds after which the service accepts a retry."""
 
 
 class WrongQuestion(PosefieldError, ValueError):
-    """Nothing was sent: what is asked for cannot be."""
+    """Invalid argument; no request was sent."""
 
 
 class Problem(PosefieldError):
-    """The service says what is wrong, by a document of RFC 9457.
+    """Problem document of the service (RFC 9457).
 
-    status: of HTTP; kind: the last part of `type`; title, detail: for people; instance: the
-    request's id, which the service's log has; errors: where in the request the fault lies.
+    status: of HTTP. kind: last part of `type`. title, detail: for people. instance: request id, as
+    in the service's log. errors: locations of the errors in the request.
     """
 
     kinds: ClassVar[dict[str, type["Problem"]]] = {}
@@ -76,12 +76,12 @@ class Problem(PosefieldError):
         self.retry_after = retry_after
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # From worker to caller: an exception is made anew from what it was made of.
+        # Pickling between processes needs the arguments of the constructor.
         return type(self), (self.said, self.retry_after), vars(self)
 
 
 class WrongRequest(Problem):
-    """The request breaks the contract."""
+    """The request violates the contract."""
 
 
 class BadParameter(WrongRequest, kind="bad-parameter"):
@@ -92,64 +92,60 @@ class BadBody(WrongRequest, kind="bad-body"):
     """The body cannot be read."""
 
 
-class MalformedRequest(WrongRequest, kind="malformed-request"):
-    """What arrived was not HTTP as the service reads it."""
-
-
 class UnsupportedMediaType(WrongRequest, kind="unsupported-media-type"):
     """The body must be JSON."""
 
 
 class NotAcceptable(WrongRequest, kind="not-acceptable"):
-    """Nothing that is accepted is there."""
+    """The resource has none of the accepted media types."""
 
 
 class NoSuchPath(WrongRequest, kind="no-such-path"):
-    """Nothing lies at this path: the address is another's, or the service is older."""
+    """The service lacks this path: another service, or an older version."""
 
 
 class MethodNotAllowed(WrongRequest, kind="method-not-allowed"):
-    """The path does not take this method."""
+    """The path does not support this method."""
 
 
 class BodyTooLarge(WrongRequest, kind="body-too-large"):
-    """The question is larger than the service accepts."""
+    """The request's body exceeds the limit of the service."""
 
 
 class UrlTooLong(WrongRequest, kind="url-too-long"):
-    """The URL is longer than the service accepts."""
+    """The URL exceeds the limit of the service."""
 
 
 class HeadTooLarge(WrongRequest, kind="head-too-large"):
-    """The request's head is larger than the service accepts."""
+    """The request's headers exceed the limit of the service."""
 
 
-class RequestTooSlow(WrongRequest, kind="request-too-slow"):
-    """The request took too long to arrive."""
+class UnknownHost(WrongRequest, kind="unknown-host"):
+    """The service refuses the request's Host header."""
 
 
 class NotAllowed(Problem):
-    """The key does not do."""
+    """The key was refused."""
 
 
 class Unauthenticated(NotAllowed, kind="unauthenticated"):
-    """The service wants a key, and there is none, or one that does not hold."""
+    """The key is missing or invalid."""
 
 
 class Forbidden(NotAllowed, kind="forbidden"):
-    """The key may not do this."""
+    """The key lacks the permission."""
 
 
 class Unanswerable(Problem):
-    """The question is well said, and has no answer."""
+    """The request is valid but has no result."""
 
 
 class UnknownModel(Unanswerable, kind="unknown-model"):
-    """No model of that name, or none that the key may read."""
+    """The model does not exist, or the key cannot read it."""
 
 
 class UnknownFormat(Unanswerable, kind="unknown-format"):
-    """No format of that name."""
+    """The format does not exist."""
 
 
 class InvalidField(Unanswerable, kind="invalid-field"):
@@ -157,66 +153,62 @@ class InvalidField(Unanswerable, kind="invalid-field"):
 
 
 class OutsideSamples(Unanswerable, kind="outside-samples"):
-    """Nothing like the controls was captured, and `extrapolate` is "refuse"."""
+    """The controls are not supported by the samples, and `extrapolate` is "refuse"."""
 
 
 class OutOfReach(Unanswerable, kind="out-of-reach"):
-    """The motion cannot meet a target, and was not to come as near as it can."""
+    """The motion cannot meet a target, and the request does not allow the nearest solution."""
 
 
 class Busy(Problem):
-    """The service, or what stands before it, cannot answer now."""
+    """The service, or a gateway, cannot respond now."""
 
     again = True
 
 
 class Overloaded(Busy, kind="overloaded"):
-    """The service has too much to do."""
+    """The service is overloaded."""
 
 
 class Late(Busy, kind="late"):
-    """The answer took the service too long."""
+    """The service exceeded its own time limit."""
 
 
 class NotReady(Busy, kind="not-ready"):
-    """The service should not be asked now."""
-
-
-class NoConnectionLeft(Busy, kind="no-connection-left"):
-    """The service has no connection left."""
+    """The service is not ready for requests."""
 
 
 class InternalError(Problem, kind="internal-error"):
-    """The service failed; its log says how, under `instance`."""
+    """The service failed; its log has the cause under `instance`."""
 
 
 class Unreachable(PosefieldError):
-    """No service answers at the address."""
+    """No service responds at the address."""
 
     again = True
 
 
 class TimedOut(PosefieldError):
-    """No answer in time."""
+    """The response exceeded the timeout."""
 
     again = True
 
 
 class Broken(PosefieldError):
-    """The answer was cut in its middle."""
+    """The response was interrupted."""
 
     again = True
 
 
 class IncompleteAnswer(Broken):
-    """The answer ended, but is not whole."""
+    """The response ended, but is incomplete."""
 
 
 class Unexpected(PosefieldError):
-    """This is no answer of the contract that this client knows.
+    """The response does not follow the contract of this client.
 
-    found: what came instead; service: the version of the contract that the service says it speaks,
-    None where it says none; client: the one that this client was made for.
+    found: description of the response. service: the service's contract version; None if unknown.
+    client: the contract version of this client.
     """
 
     client = CONTRACT
@@ -239,7 +231,7 @@ _PROBLEM = msgspec.json.Decoder(generated.Problem)
 def of_answer(
     status: int, headers: Mapping[str, str], content: bytes, asked: str
 ) -> PosefieldError:
-    """Error that an answer other than a good one means; asked: for what, in words."""
+    """Return the exception for an unsuccessful response. asked: the request, in words."""
     fault = _of_anything(status, headers, content, asked)
     fault.retry_after = _seconds(headers)
     return fault
@@ -264,18 +256,21 @@ def _of_anything(
 
 
 def _of_problem(status: int, said: generated.Problem) -> Problem:
-    # Of a kind that is unknown, the status still says whether it may pass.
+    # For an unknown type, the status still tells whether the problem is temporary.
     unknown = Busy if status in GATEWAYS else Problem
     return Problem.kinds.get(said.type.removeprefix(TYPE_PREFIX), unknown)(said)
 
 
 def media_type(headers: Mapping[str, str]) -> str:
-    """What an answer says it is, without its parameters."""
+    """Return the media type of a response, without its parameters."""
     return headers.get("content-type", "").partition(";")[0].strip() or "no media type"
 
 
 def _seconds(headers: Mapping[str, str]) -> float | None:
-    """Of a Retry-After header; a date is held against the service's own, for clocks differ."""
+    """Return the seconds of a Retry-After header; None without one.
+
+    A date is compared with the response's own Date header, because clocks differ.
+    """
     text = headers.get("retry-after", "")
     if text.isascii() and text.isdigit():
         return float(text)

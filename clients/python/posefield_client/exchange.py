@@ -1,7 +1,7 @@
-"""How an answer is come by: from what is kept or from the service, asked again where that helps.
+"""Responses from the cache, or over HTTP with retries.
 
-Generators that say what is to be done next and are told what came of it: the clients, blocking and
-not, differ in nothing but how they do it.
+The generators yield the steps to execute and receive their results, so that the synchronous and the
+asynchronous client share all logic but the execution.
 """
 
 import time
@@ -27,7 +27,7 @@ DOCUMENT = Request(OPERATIONS["getContractJson"], "/openapi.json")
 
 @dataclass(frozen=True, slots=True)
 class Held(Generic[T]):
-    """An answer that is kept, and what was read from it."""
+    """A cached response and its decoded value."""
 
     kept: Kept
     found: T
@@ -35,7 +35,7 @@ class Held(Generic[T]):
 
 @dataclass(frozen=True)
 class Core:
-    """What a client is but for its connections. scope: digest of all that answers depend on."""
+    """State of a client without its connections. scope: digest of all that responses depend on."""
 
     cache: Cache
     retry: Retry
@@ -43,9 +43,10 @@ class Core:
     clock: Callable[[], float] = time.monotonic
 
     def answer(self, call: Call[T], sink: Sink | None = None) -> Steps[T]:
-        """The answer to a question, read; its content in the sink, where there is one.
+        """Yield the steps of a request and return the decoded response.
 
-        It is read before it is kept, and within what is asked again. Raises PosefieldError.
+        sink: receives the content; None to hold it in memory. Decoding is part of each attempt, and
+        precedes caching. Raises PosefieldError.
         """
         return (yield from self._with_versions(self._found(call, sink)))
 
@@ -56,7 +57,7 @@ class Core:
         return found
 
     def _got(self, call: Call[T], sink: Sink | None) -> Steps[T]:
-        """The answer to a question by GET, which may be at hand."""
+        """Return the response to a GET request, from the cache if it is fresh."""
         name = caches.name(self.scope, call.request.target)
         held = self._held(name, call)
         if held is not None and held.kept.holds:
@@ -77,7 +78,7 @@ class Core:
         return found
 
     def _held(self, name: str, call: Call[T]) -> Held[T] | None:
-        """What is at hand; None where it cannot be read, so that it is asked for anew."""
+        """Return the cached response; None if missing or not decodable."""
         kept = self.cache.find(name)
         if kept is None:
             return None
@@ -99,7 +100,7 @@ class Core:
                 self.cache.keep(name, kept)
 
     def _sent(self, send: Send, look: Callable[[Reply], T]) -> Steps[tuple[Reply, T]]:
-        """Ask until there is an answer in which `look` finds no fault, or no hope of one."""
+        """Send until `look` accepts a response, or retries are exhausted."""
         began, asked = self.clock(), 0
         while True:
             asked += 1
@@ -113,7 +114,7 @@ class Core:
             yield Sleep(wait)
 
     def _with_versions(self, steps: Steps[T]) -> Steps[T]:
-        """The same; where what came is not of our contract, the service is asked for its own."""
+        """Run steps; add the service's contract version to errors that violate the contract."""
         try:
             return (yield from steps)
         except Unexpected as fault:
@@ -136,7 +137,7 @@ def _once(send: Send) -> Steps[Reply]:
 
 
 def contract() -> Steps[str | None]:
-    """Version of the contract that the service says it speaks; None where it says none."""
+    """Return the contract version that the service reports; None if it reports none."""
     for request, keys in ((LIVENESS, ("contract",)), (DOCUMENT, ("info", "version"))):
         try:
             reply = yield Send(request)
@@ -152,7 +153,7 @@ def contract() -> Steps[str | None]:
 
 
 def read(call: Call[T], reply: Reply) -> T:
-    """The answer as its operation promises it; Unexpected where it is none."""
+    """Return the decoded response; raise Unexpected if it is invalid for its operation."""
     expect(call.request.operation, reply.headers.get("content-type", ""))
     try:
         return call.read(reply)
@@ -162,7 +163,7 @@ def read(call: Call[T], reply: Reply) -> T:
 
 
 def expect(operation: Operation, content_type: str) -> None:
-    """Unexpected where an answer is of none of the operation's media types."""
+    """Raise Unexpected for a media type that the operation does not have."""
     found = content_type.partition(";")[0].strip()
     if found not in operation.media_types:
         expected = " or ".join(operation.media_types)
@@ -171,19 +172,19 @@ def expect(operation: Operation, content_type: str) -> None:
 
 
 def named(operation: Operation) -> str:
-    """An operation in messages."""
+    """Return an operation's name for messages."""
     return f"{operation.method} {operation.path}"
 
 
 def pour(kept: Kept, sink: Sink | None) -> None:
-    """Into a sink, where there is one, what was kept."""
+    """Write a cached response to a sink, if there is one."""
     if sink is not None:
         sink.begin(len(kept.content))
         sink.write(kept.content)
 
 
 class Copy:
-    """Sink that fills another and holds what went into it, as long as that is little."""
+    """Sink that forwards to another and keeps a copy of up to `largest` bytes."""
 
     def __init__(self, sink: Sink, largest: int) -> None:
         self._sink = sink
@@ -191,12 +192,12 @@ class Copy:
         self._held: bytearray | None = bytearray()
 
     def begin(self, total: int | None) -> None:
-        """Forget what came before."""
+        """Discard earlier content."""
         self._held = bytearray() if (total or 0) <= self._largest else None
         self._sink.begin(total)
 
     def write(self, chunk: bytes) -> None:
-        """Take the next bytes."""
+        """Forward and copy the next bytes."""
         self._sink.write(chunk)
         if self._held is not None:
             self._held += chunk
@@ -205,5 +206,5 @@ class Copy:
 
     @property
     def content(self) -> bytes:
-        """All that went in; nothing where that was too much."""
+        """Return the copy; empty if the content was too large."""
         return bytes(self._held or b"")

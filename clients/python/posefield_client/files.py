@@ -1,4 +1,4 @@
-"""What can be had as a file: clips, many clips, crowds; each in several formats."""
+"""Requests with files as results: clips, archives of clips, crowds, in several formats."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,32 +29,29 @@ ClipFormat = Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow
 Place = Sequence[float]
 
 
-def _formats(operation: str) -> tuple[str, ...]:
-    """Endings of a path that the contract has an operation for."""
-    found = (name.removeprefix(operation) for name in OPERATIONS if name.startswith(operation))
-    return tuple(ending.lower() for ending in found if ending)
-
-
-CLIP, CLIPS = _formats("getClip"), _formats("queryClips")
-CROWD, WALK = _formats("queryCrowd"), _formats("getCrowd")
+CLIP, CLIPS, CROWD, WALK = (
+    tuple(OPERATIONS[f"{name}InFormat"].formats)
+    for name in ("getClip", "queryClips", "queryCrowd", "getCrowd")
+)
+"""Formats that end a path of the contract."""
 
 
 @dataclass(frozen=True)
 class Files:
-    """A question that is answered with a file. count: clips in it, where it is an archive."""
+    """Request with a file as result. count: number of clips of an archive, else None."""
 
     formats: tuple[str, ...]
     ask: Callable[[str], Request]
     count: int | None = None
 
     def request(self, ending: str) -> Request:
-        """Request for a format; WrongQuestion where there is none of that name."""
+        """Return the request for a format; WrongQuestion for an unknown one."""
         if ending not in self.formats:
             raise WrongQuestion(f"format {ending!r}, expected one of {', '.join(self.formats)}")
-        return self.ask(ending.capitalize())
+        return self.ask(ending)
 
     def ending(self, path: Path) -> str:
-        """The format that a file's name asks for; WrongQuestion where there is none."""
+        """Return the format of a path's suffix; WrongQuestion for an unknown one."""
         found = path.suffix.removeprefix(".").lower()
         if found not in self.formats:
             raise WrongQuestion(f"{path.name} ends in none of .{', .'.join(self.formats)}")
@@ -83,7 +80,7 @@ def clip(
     controls: Controls | None = None,
     **named: float,
 ) -> Files:
-    """A clip, which is asked for when it is saved or its numbers are read."""
+    """Return a clip; the request is sent when it is saved or its numbers are read."""
     question = ClipQuestion(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
@@ -91,7 +88,7 @@ def clip(
         **asking.said(joint_sigma=joint_sigma),
         **holding.said(exact, targets, pin_feet),
     )
-    return Files(CLIP, lambda ending: asking.either(f"Clip{ending}", model, question))
+    return Files(CLIP, lambda ending: asking.either("ClipInFormat", model, question, ending))
 
 
 def clips(
@@ -103,12 +100,12 @@ def clips(
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
 ) -> Files:
-    """Many clips of one format in an archive, and a manifest of them."""
+    """Return an archive of many clips of one format, with a manifest."""
     if format not in CLIP:
         raise WrongQuestion(f"format {format!r}, expected one of {', '.join(CLIP)}")
     listed = tuple(_named(place, each) for place, each in enumerate(clips))
     question = ClipsQuestion(format=format, clips=listed, **asking.said(unit=unit, up=up))
-    ask = partial(_body, "queryClips", model, question)
+    ask = partial(asking.body, "queryClipsInFormat", model, question)
     return Files(CLIPS, ask, len(listed))
 
 
@@ -144,7 +141,10 @@ def crowd(
     controls: Mapping[str, Any] | None = None,
     **named: Any,
 ) -> Files:
-    """A pose of each of many characters: what is a list or an array has one value for each."""
+    """Return one pose each of many characters.
+
+    Lists and arrays have one value per character; other values hold for all characters.
+    """
     given = asking.together(controls, named)
     question = CrowdQuestion(
         controls={name: asking.column(name, values) for name, values in given.items()},
@@ -154,7 +154,7 @@ def crowd(
         **asking.said(performer=performer, camera=camera, pixels=pixels, budget_ms=budget_ms),
         **asking.said(root=root, extrapolate=extrapolate),
     )
-    return Files(CROWD, partial(_body, "queryCrowd", model, question))
+    return Files(CROWD, partial(asking.body, "queryCrowdInFormat", model, question))
 
 
 def walk(
@@ -173,7 +173,7 @@ def walk(
     pixels: float | None = None,
     instancing: Instancing | None = None,
 ) -> Files:
-    """A crowd that walks, each its own way; camera: x, y and z of where one looks from, m."""
+    """Return a walking crowd. camera: position x, y, z, m."""
     place = (
         None if camera is None else ",".join(map(asking.digits, asking.numbers("camera", camera)))
     )
@@ -182,8 +182,4 @@ def walk(
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
         **asking.said(instancing=instancing),
     }
-    return Files(WALK, lambda ending: asking.plain(f"getCrowd{ending}", model, words))
-
-
-def _body(operation: str, model: str, question: msgspec.Struct, ending: str) -> Request:
-    return asking.body(operation + ending, model, question)
+    return Files(WALK, partial(asking.plain, "getCrowdInFormat", model, words))

@@ -5,21 +5,31 @@ Of answers: fields that a newer service adds are passed over, and an enumeration
 Of questions: what is UNSET is not sent.
 """
 
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "2.2.0"
+CONTRACT = "3.0.0"
 """Version of the contract that this client was made for."""
 
 
 class Operation(NamedTuple):
-    """How something is asked for, and the media types that it may be answered in."""
+    """Method and path of a request, and the media types of its answers.
+
+    formats: media types by the formats that may end the path; empty where it has no `{format}`.
+    """
 
     id: str
     method: str
     path: str
     media_types: tuple[str, ...]
+    formats: Mapping[str, str]
+
+    def in_format(self, name: str) -> "Operation":
+        """Return the operation with a format in its path and that format's media type alone."""
+        path = self.path.replace("{format}", name)
+        return self._replace(path=path, media_types=(self.formats[name],))
 
 
 class Target(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -225,9 +235,7 @@ class Level(Struct, frozen=True, kw_only=True):
 
 
 class ModelCardKriging(Struct, frozen=True, kw_only=True):
-    """What the weights of the captured clips hang on; null in models trained before this was
-    kept.
-    """
+    """Parameters of the kriging that weighs the captured clips."""
 
     covariance: str
     drifts: tuple[int, ...]
@@ -237,9 +245,7 @@ class ModelCardKriging(Struct, frozen=True, kw_only=True):
 
 
 class ModelCardEvent(Struct, frozen=True, kw_only=True):
-    """What the motion is for; null where the recipe names nothing, and in models trained
-    before this was kept.
-    """
+    """What the motion is for; null where the recipe names nothing."""
 
     joint: int
     share: float
@@ -270,7 +276,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     roles: dict[str, str]
     sources: tuple[str, ...]
     joint_sigma: tuple[float, ...] = ()
-    kriging: ModelCardKriging | None
+    kriging: ModelCardKriging
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
 
@@ -352,7 +358,7 @@ class Suggestion(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     gain: float
     variance: float
-    nearest: str | None
+    nearest: str
     lacking: str
     gap: float
 
@@ -439,15 +445,14 @@ class Problem(Struct, frozen=True, kw_only=True):
     status: int
     detail: str
     instance: str
-    error: str | None = None
     errors: tuple[ProblemErrors, ...]
 
 
 OPERATIONS = {
     operation.id: operation
     for operation in (
-        Operation("listModels", "GET", "/v1/models", ("application/json",)),
-        Operation("getModel", "GET", "/v1/models/{model}", ("application/json",)),
+        Operation("listModels", "GET", "/v1/models", ("application/json",), {}),
+        Operation("getModel", "GET", "/v1/models/{model}", ("application/json",), {}),
         Operation(
             "getPose",
             "GET",
@@ -458,6 +463,7 @@ OPERATIONS = {
                 "application/x-npz",
                 "application/vnd.apache.arrow.stream",
             ),
+            {},
         ),
         Operation(
             "queryPose",
@@ -469,31 +475,41 @@ OPERATIONS = {
                 "application/x-npz",
                 "application/vnd.apache.arrow.stream",
             ),
-        ),
-        Operation("getPoseJson", "GET", "/v1/models/{model}/pose.json", ("application/json",)),
-        Operation("queryPoseJson", "POST", "/v1/models/{model}/pose.json", ("application/json",)),
-        Operation(
-            "getPoseMsgpack", "GET", "/v1/models/{model}/pose.msgpack", ("application/vnd.msgpack",)
+            {},
         ),
         Operation(
-            "queryPoseMsgpack",
-            "POST",
-            "/v1/models/{model}/pose.msgpack",
-            ("application/vnd.msgpack",),
-        ),
-        Operation("getPoseNpz", "GET", "/v1/models/{model}/pose.npz", ("application/x-npz",)),
-        Operation("queryPoseNpz", "POST", "/v1/models/{model}/pose.npz", ("application/x-npz",)),
-        Operation(
-            "getPoseArrow",
+            "getPoseInFormat",
             "GET",
-            "/v1/models/{model}/pose.arrow",
-            ("application/vnd.apache.arrow.stream",),
+            "/v1/models/{model}/pose.{format}",
+            (
+                "application/json",
+                "application/vnd.msgpack",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+            ),
+            {
+                "json": "application/json",
+                "msgpack": "application/vnd.msgpack",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+            },
         ),
         Operation(
-            "queryPoseArrow",
+            "queryPoseInFormat",
             "POST",
-            "/v1/models/{model}/pose.arrow",
-            ("application/vnd.apache.arrow.stream",),
+            "/v1/models/{model}/pose.{format}",
+            (
+                "application/json",
+                "application/vnd.msgpack",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+            ),
+            {
+                "json": "application/json",
+                "msgpack": "application/vnd.msgpack",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+            },
         ),
         Operation(
             "getClip",
@@ -510,6 +526,7 @@ OPERATIONS = {
                 "application/vnd.apache.arrow.stream",
                 "application/vnd.msgpack",
             ),
+            {},
         ),
         Operation(
             "queryClip",
@@ -526,55 +543,82 @@ OPERATIONS = {
                 "application/vnd.apache.arrow.stream",
                 "application/vnd.msgpack",
             ),
+            {},
         ),
-        Operation("getClipUsda", "GET", "/v1/models/{model}/clip.usda", ("model/vnd.usda",)),
-        Operation("queryClipUsda", "POST", "/v1/models/{model}/clip.usda", ("model/vnd.usda",)),
-        Operation("getClipUsdc", "GET", "/v1/models/{model}/clip.usdc", ("model/vnd.usdc",)),
-        Operation("queryClipUsdc", "POST", "/v1/models/{model}/clip.usdc", ("model/vnd.usdc",)),
-        Operation("getClipUsdz", "GET", "/v1/models/{model}/clip.usdz", ("model/vnd.usdz+zip",)),
-        Operation("queryClipUsdz", "POST", "/v1/models/{model}/clip.usdz", ("model/vnd.usdz+zip",)),
-        Operation("getClipJson", "GET", "/v1/models/{model}/clip.json", ("application/json",)),
-        Operation("queryClipJson", "POST", "/v1/models/{model}/clip.json", ("application/json",)),
-        Operation("getClipBvh", "GET", "/v1/models/{model}/clip.bvh", ("application/x-bvh",)),
-        Operation("queryClipBvh", "POST", "/v1/models/{model}/clip.bvh", ("application/x-bvh",)),
-        Operation("getClipGlb", "GET", "/v1/models/{model}/clip.glb", ("model/gltf-binary",)),
-        Operation("queryClipGlb", "POST", "/v1/models/{model}/clip.glb", ("model/gltf-binary",)),
-        Operation("getClipNpz", "GET", "/v1/models/{model}/clip.npz", ("application/x-npz",)),
-        Operation("queryClipNpz", "POST", "/v1/models/{model}/clip.npz", ("application/x-npz",)),
         Operation(
-            "getClipArrow",
+            "getClipInFormat",
             "GET",
-            "/v1/models/{model}/clip.arrow",
-            ("application/vnd.apache.arrow.stream",),
+            "/v1/models/{model}/clip.{format}",
+            (
+                "model/vnd.usdc",
+                "model/vnd.usda",
+                "model/vnd.usdz+zip",
+                "application/json",
+                "application/x-bvh",
+                "model/gltf-binary",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+                "application/vnd.msgpack",
+            ),
+            {
+                "usda": "model/vnd.usda",
+                "usdc": "model/vnd.usdc",
+                "usdz": "model/vnd.usdz+zip",
+                "json": "application/json",
+                "bvh": "application/x-bvh",
+                "glb": "model/gltf-binary",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+                "msgpack": "application/vnd.msgpack",
+            },
         ),
         Operation(
-            "queryClipArrow",
+            "queryClipInFormat",
             "POST",
-            "/v1/models/{model}/clip.arrow",
-            ("application/vnd.apache.arrow.stream",),
-        ),
-        Operation(
-            "getClipMsgpack", "GET", "/v1/models/{model}/clip.msgpack", ("application/vnd.msgpack",)
-        ),
-        Operation(
-            "queryClipMsgpack",
-            "POST",
-            "/v1/models/{model}/clip.msgpack",
-            ("application/vnd.msgpack",),
+            "/v1/models/{model}/clip.{format}",
+            (
+                "model/vnd.usdc",
+                "model/vnd.usda",
+                "model/vnd.usdz+zip",
+                "application/json",
+                "application/x-bvh",
+                "model/gltf-binary",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+                "application/vnd.msgpack",
+            ),
+            {
+                "usda": "model/vnd.usda",
+                "usdc": "model/vnd.usdc",
+                "usdz": "model/vnd.usdz+zip",
+                "json": "application/json",
+                "bvh": "application/x-bvh",
+                "glb": "model/gltf-binary",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+                "msgpack": "application/vnd.msgpack",
+            },
         ),
         Operation(
             "queryClips",
             "POST",
             "/v1/models/{model}/clips",
             ("application/zip", "application/x-tar"),
+            {},
         ),
-        Operation("queryClipsZip", "POST", "/v1/models/{model}/clips.zip", ("application/zip",)),
-        Operation("queryClipsTar", "POST", "/v1/models/{model}/clips.tar", ("application/x-tar",)),
+        Operation(
+            "queryClipsInFormat",
+            "POST",
+            "/v1/models/{model}/clips.{format}",
+            ("application/zip", "application/x-tar"),
+            {"zip": "application/zip", "tar": "application/x-tar"},
+        ),
         Operation(
             "getCrowd",
             "GET",
             "/v1/models/{model}/crowd",
             ("model/vnd.usdc", "model/vnd.usda", "model/vnd.usdz+zip"),
+            {},
         ),
         Operation(
             "queryCrowd",
@@ -586,27 +630,37 @@ OPERATIONS = {
                 "application/vnd.msgpack",
                 "application/json",
             ),
+            {},
         ),
         Operation(
-            "queryCrowdArrow",
-            "POST",
-            "/v1/models/{model}/crowd.arrow",
-            ("application/vnd.apache.arrow.stream",),
+            "getCrowdInFormat",
+            "GET",
+            "/v1/models/{model}/crowd.{format}",
+            ("model/vnd.usdc", "model/vnd.usda", "model/vnd.usdz+zip"),
+            {"usda": "model/vnd.usda", "usdc": "model/vnd.usdc", "usdz": "model/vnd.usdz+zip"},
         ),
-        Operation("queryCrowdNpz", "POST", "/v1/models/{model}/crowd.npz", ("application/x-npz",)),
         Operation(
-            "queryCrowdMsgpack",
+            "queryCrowdInFormat",
             "POST",
-            "/v1/models/{model}/crowd.msgpack",
-            ("application/vnd.msgpack",),
+            "/v1/models/{model}/crowd.{format}",
+            (
+                "application/vnd.apache.arrow.stream",
+                "application/x-npz",
+                "application/vnd.msgpack",
+                "application/json",
+            ),
+            {
+                "arrow": "application/vnd.apache.arrow.stream",
+                "npz": "application/x-npz",
+                "msgpack": "application/vnd.msgpack",
+                "json": "application/json",
+            },
         ),
-        Operation("queryCrowdJson", "POST", "/v1/models/{model}/crowd.json", ("application/json",)),
-        Operation("getCrowdUsda", "GET", "/v1/models/{model}/crowd.usda", ("model/vnd.usda",)),
-        Operation("getCrowdUsdc", "GET", "/v1/models/{model}/crowd.usdc", ("model/vnd.usdc",)),
-        Operation("getCrowdUsdz", "GET", "/v1/models/{model}/crowd.usdz", ("model/vnd.usdz+zip",)),
-        Operation("getWhy", "GET", "/v1/models/{model}/why", ("application/json",)),
-        Operation("queryWhy", "POST", "/v1/models/{model}/why", ("application/json",)),
-        Operation("getSuggestions", "GET", "/v1/models/{model}/suggestions", ("application/json",)),
+        Operation("getWhy", "GET", "/v1/models/{model}/why", ("application/json",), {}),
+        Operation("queryWhy", "POST", "/v1/models/{model}/why", ("application/json",), {}),
+        Operation(
+            "getSuggestions", "GET", "/v1/models/{model}/suggestions", ("application/json",), {}
+        ),
         Operation(
             "getSigma",
             "GET",
@@ -617,6 +671,7 @@ OPERATIONS = {
                 "application/x-npz",
                 "application/vnd.apache.arrow.stream",
             ),
+            {},
         ),
         Operation(
             "querySigma",
@@ -628,74 +683,50 @@ OPERATIONS = {
                 "application/x-npz",
                 "application/vnd.apache.arrow.stream",
             ),
+            {},
         ),
-        Operation("getSigmaJson", "GET", "/v1/models/{model}/sigma.json", ("application/json",)),
-        Operation("querySigmaJson", "POST", "/v1/models/{model}/sigma.json", ("application/json",)),
         Operation(
-            "getSigmaMsgpack",
+            "getSigmaInFormat",
             "GET",
-            "/v1/models/{model}/sigma.msgpack",
-            ("application/vnd.msgpack",),
+            "/v1/models/{model}/sigma.{format}",
+            (
+                "application/json",
+                "application/vnd.msgpack",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+            ),
+            {
+                "json": "application/json",
+                "msgpack": "application/vnd.msgpack",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+            },
         ),
         Operation(
-            "querySigmaMsgpack",
+            "querySigmaInFormat",
             "POST",
-            "/v1/models/{model}/sigma.msgpack",
-            ("application/vnd.msgpack",),
+            "/v1/models/{model}/sigma.{format}",
+            (
+                "application/json",
+                "application/vnd.msgpack",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+            ),
+            {
+                "json": "application/json",
+                "msgpack": "application/vnd.msgpack",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+            },
         ),
-        Operation("getSigmaNpz", "GET", "/v1/models/{model}/sigma.npz", ("application/x-npz",)),
-        Operation("querySigmaNpz", "POST", "/v1/models/{model}/sigma.npz", ("application/x-npz",)),
-        Operation(
-            "getSigmaArrow",
-            "GET",
-            "/v1/models/{model}/sigma.arrow",
-            ("application/vnd.apache.arrow.stream",),
-        ),
-        Operation(
-            "querySigmaArrow",
-            "POST",
-            "/v1/models/{model}/sigma.arrow",
-            ("application/vnd.apache.arrow.stream",),
-        ),
-        Operation("getMetrics", "GET", "/metrics", ("text/plain",)),
-        Operation("getInferenceServer", "GET", "/v2", ("application/json",)),
-        Operation("getInferenceLiveness", "GET", "/v2/health/live", ("application/json",)),
-        Operation("getInferenceReadiness", "GET", "/v2/health/ready", ("application/json",)),
-        Operation("getInferenceModel", "GET", "/v2/models/{model}", ("application/json",)),
-        Operation(
-            "getInferenceModelReadiness", "GET", "/v2/models/{model}/ready", ("application/json",)
-        ),
-        Operation(
-            "infer",
-            "POST",
-            "/v2/models/{model}/infer",
-            ("application/json", "application/octet-stream"),
-        ),
-        Operation(
-            "getInferenceVersion",
-            "GET",
-            "/v2/models/{model}/versions/{version}",
-            ("application/json",),
-        ),
-        Operation(
-            "getInferenceVersionReadiness",
-            "GET",
-            "/v2/models/{model}/versions/{version}/ready",
-            ("application/json",),
-        ),
-        Operation(
-            "inferVersion",
-            "POST",
-            "/v2/models/{model}/versions/{version}/infer",
-            ("application/json", "application/octet-stream"),
-        ),
-        Operation("getLiveness", "GET", "/livez", ("application/json",)),
-        Operation("getReadiness", "GET", "/readyz", ("application/json",)),
-        Operation("getContract", "GET", "/openapi.yaml", ("application/yaml",)),
-        Operation("getContractJson", "GET", "/openapi.json", ("application/json",)),
-        Operation("getViewer", "GET", "/", ("text/html",)),
-        Operation("getDocs", "GET", "/docs", ("text/html",)),
-        Operation("getProblems", "GET", "/problems", ("text/html",)),
+        Operation("getMetrics", "GET", "/metrics", ("text/plain",), {}),
+        Operation("getLiveness", "GET", "/livez", ("application/json",), {}),
+        Operation("getReadiness", "GET", "/readyz", ("application/json",), {}),
+        Operation("getContract", "GET", "/openapi.yaml", ("application/yaml",), {}),
+        Operation("getContractJson", "GET", "/openapi.json", ("application/json",), {}),
+        Operation("getViewer", "GET", "/", ("text/html",), {}),
+        Operation("getDocs", "GET", "/docs", ("text/html",), {}),
+        Operation("getProblems", "GET", "/problems", ("text/html",), {}),
     )
 }
 """All operations of the contract, by their ids."""

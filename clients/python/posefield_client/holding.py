@@ -1,4 +1,4 @@
-"""What poses and clips are held to: measured controls, and joints that are to be in places."""
+"""Constraints of poses and clips: exact measured controls, and target positions of joints."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
@@ -11,13 +11,13 @@ from posefield_client.errors import WrongQuestion
 from posefield_client.generated import Target
 
 Exact = Literal["auto", "none"] | str | Sequence[str]
-"""The usual, nothing, or the names of measured controls."""
+"""The service's default, none, or the names of measured controls."""
 
 Targets = Iterable[Target | Mapping[str, Any]]
 
 
 def said(exact: Exact | None, targets: Targets | None, pin_feet: bool | None) -> dict[str, Any]:
-    """Those that are said, as fields of a question."""
+    """Return the arguments that are not None, as fields of a question."""
     found: dict[str, Any] = {}
     if exact is not None:
         found["exact"] = _exact(exact)
@@ -35,7 +35,7 @@ def _exact(given: Exact) -> Any:
 
 
 def _target(place: int, given: Target | Mapping[str, Any]) -> Target:
-    """The target; WrongQuestion where it is none, or says not just one moment."""
+    """Return the target; WrongQuestion if it is invalid, or has not exactly one of time and at."""
     name = f"target {place}"
     try:
         found = msgspec.convert(asking.sayable(name, given), Target)

@@ -1,4 +1,4 @@
-"""Numbers as NumPy arrays, read from binary answers; arrays are read-only views of what came."""
+"""NumPy arrays from binary responses; arrays are read-only views of the received bytes."""
 
 from typing import Any, TypeVar
 
@@ -18,8 +18,8 @@ KINDS = "fiub"
 class Pose(Struct, frozen=True, eq=False):
     """Poses at S times of the J joints that the model's card names.
 
-    times [S], s; rotations [S, J, 4], unit quaternions w x y z, local to the parent; root_position
-    [S, 3] and bone_offsets [J, 3], m.
+    times: (S,), s. rotations: (S, J, 4), unit quaternions w x y z, local to the parent.
+    root_position: (S, 3), m. bone_offsets: (J, 3), m.
     """
 
     trust: Trust
@@ -30,9 +30,10 @@ class Pose(Struct, frozen=True, eq=False):
 
 
 class ClipNumbers(Struct, frozen=True, eq=False):
-    """A clip of F frames of J joints, as Pose; `rate` frames a second.
+    """A clip of F frames of J joints, with arrays as in Pose.
 
-    names, parents: of the joints, -1 for the root's parent; units: what the numbers are.
+    rate: frames per second. names, parents: of the joints; the root's parent is -1. units: of the
+    arrays, by name.
     """
 
     trust: Trust
@@ -47,10 +48,11 @@ class ClipNumbers(Struct, frozen=True, eq=False):
 
 
 class SigmaGrid(Struct, frozen=True, eq=False):
-    """Sigma over two controls: sigma and inside [rows, columns], m and whether all was sampled.
+    """Sigma over two controls.
 
-    across_values [columns], along_values [rows]; controls: values of the others. supported [rows,
-    columns], whether anything like it was captured, from services that say so.
+    across_values: (columns,). along_values: (rows,). controls: values of the other controls. sigma:
+    (rows, columns), m. inside: (rows, columns), True within all sampled ranges. supported: (rows,
+    columns), True near captured clips; None from services that do not report it.
     """
 
     model: str
@@ -67,11 +69,12 @@ class SigmaGrid(Struct, frozen=True, eq=False):
 
 
 class CrowdPoses(Struct, frozen=True, eq=False):
-    """A pose of each of N characters, J joints each, in the order of the question.
+    """One pose each of N characters of J joints, in the order of the request.
 
-    rotations [N, J, 4], the root's in the world; root_position [N, 3] in the world and bone_offsets
-    [N, J, 3], m; duration [N], s; sigma [N], m; levels [N]; error_px [N], with a camera; supported
-    [N], whether anything like it was captured, from services that say so.
+    rotations: (N, J, 4), the root's in world space. root_position: (N, 3) in world space, m.
+    bone_offsets: (N, J, 3), m. duration: (N,), s. sigma: (N,), m. levels: (N,). error_px: (N,);
+    None without a camera. supported: (N,), True near captured clips; None from services that do not
+    report it.
     """
 
     model: str
@@ -90,7 +93,7 @@ class CrowdPoses(Struct, frozen=True, eq=False):
 
 
 def _array(kind: type, found: Any) -> Array:
-    """An array as it travels: a map of `dtype`, `shape` and its little-endian bytes, `data`."""
+    """Return an array from its encoding: a map of `dtype`, `shape`, and little-endian `data`."""
     if not isinstance(found, dict) or not found.keys() >= {"dtype", "shape", "data"}:
         raise ValueError("expected a map of dtype, shape and data")
     dtype = np.dtype(found["dtype"])
@@ -129,13 +132,13 @@ SHAPES: dict[Any, dict[str, str]] = {
         "supported": "N",
     },
 }
-"""Axes of what answers hold: a letter is one length throughout an answer, a digit that length."""
+"""Axes of the arrays: a letter is one length throughout a response, a digit that length."""
 WHOLE = ("levels", "inside", "supported", "parents", "names")
-"""All others are of floating point."""
+"""Fields that are not floating point."""
 
 
 def _checked(found: T) -> T:
-    """ValueError where arrays do not fit each other."""
+    """Return the value; raise ValueError if the shapes of its arrays are inconsistent."""
     sizes: dict[str, int] = {"3": 3, "4": 4}
     for name, axes in SHAPES[type(found)].items():
         each = getattr(found, name)
@@ -159,20 +162,20 @@ _CROWD = msgspec.msgpack.Decoder(CrowdPoses, dec_hook=_array)
 
 
 def pose(reply: Reply) -> Pose:
-    """Poses of an answer in MessagePack; ValueError where it is none."""
+    """Return the poses of a MessagePack response; ValueError if it is invalid."""
     return _checked(_POSE.decode(reply.content))
 
 
 def clip(reply: Reply) -> ClipNumbers:
-    """A clip of an answer in MessagePack; ValueError where it is none."""
+    """Return the clip of a MessagePack response; ValueError if it is invalid."""
     return _checked(_CLIP.decode(reply.content))
 
 
 def grid(reply: Reply) -> SigmaGrid:
-    """A grid of an answer in MessagePack; ValueError where it is none."""
+    """Return the grid of a MessagePack response; ValueError if it is invalid."""
     return _checked(_GRID.decode(reply.content))
 
 
 def crowd(reply: Reply) -> CrowdPoses:
-    """Poses of a crowd of an answer in MessagePack; ValueError where it is none."""
+    """Return the crowd's poses of a MessagePack response; ValueError if it is invalid."""
     return _checked(_CROWD.decode(reply.content))

@@ -1,7 +1,7 @@
-"""What can be asked of a service and of a model: each question once, for both kinds of client.
+"""Requests to a service and to a model, shared by both clients.
 
-Controls are keywords, or a mapping `controls` where Python keeps their names. What is left
-out is left to the service, whose contract says what it then is.
+Controls are keywords, or a mapping `controls` for names that Python reserves. Arguments that are
+left out take the defaults of the service's contract.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,22 +36,22 @@ Times = float | Sequence[float] | npt.NDArray[Any]
 
 
 def models() -> Call[tuple[ModelSummary, ...]]:
-    """The models that the service answers for."""
+    """Return the models of the service."""
     return Call(Request(OPERATIONS["listModels"], "/v1/models"), _models)
 
 
 def live() -> Call[Liveness]:
-    """That the process answers, and what contract it speaks."""
+    """Return the liveness of the process, with its contract version."""
     return Call(Request(OPERATIONS["getLiveness"], "/livez"), _LIVENESS)
 
 
 def ready() -> Call[Readiness]:
-    """What the service has loaded; NotReady where it should not be asked now."""
+    """Return the loaded models; NotReady if the service is not ready."""
     return Call(Request(OPERATIONS["getReadiness"], "/readyz"), _READINESS)
 
 
 def card(model: str, /) -> Call[ModelCard]:
-    """What the model says of itself."""
+    """Return the model card."""
     return Call(asking.plain("getModel", model), _CARD)
 
 
@@ -70,7 +70,7 @@ def pose(
     controls: Controls | None = None,
     **named: float,
 ) -> Call[Pose]:
-    """Poses at one or more times, s, of a motion that is held to targets, if some are given."""
+    """Return poses at one or more times, s, with constraints if given."""
     question = PoseQuestion(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
@@ -78,7 +78,7 @@ def pose(
         **asking.said(joint_sigma=joint_sigma),
         **holding.said(exact, targets, pin_feet),
     )
-    return Call(asking.either("PoseMsgpack", model, question), numbers.pose)
+    return Call(asking.either("PoseInFormat", model, question, "msgpack"), numbers.pose)
 
 
 def why(
@@ -91,7 +91,7 @@ def why(
     controls: Controls | None = None,
     **named: float,
 ) -> Call[Reasons]:
-    """The captured clips nearest to these controls, and what each counts for."""
+    """Return the captured clips nearest to these controls, and their weights."""
     question = WhyQuestion(
         controls=asking.controls(controls, named),
         **asking.said(nearest=nearest, extrapolate=extrapolate, performer=performer),
@@ -102,7 +102,7 @@ def why(
 def suggest(
     model: str, /, *, count: int | None = None, performer: str | None = None
 ) -> Call[Suggestions]:
-    """Which clips to capture next; performer: whose alone count as captured."""
+    """Return the clips to capture next. performer: the one whose clips count as captured."""
     words = asking.said(count=count, performer=performer)
     return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
 
@@ -120,18 +120,18 @@ def sigma(
     controls: Controls | None = None,
     **named: float,
 ) -> Call[SigmaGrid]:
-    """Sigma over all values of two controls, and beyond by a share (margin) of their ranges."""
+    """Return sigma over the ranges of two controls, extended by a share `margin`."""
     question = SigmaQuestion(
         across=across,
         along=along,
         controls=asking.controls(controls, named),
         **asking.said(columns=columns, rows=rows, margin=margin, performer=performer),
     )
-    return Call(asking.either("SigmaMsgpack", model, question), numbers.grid)
+    return Call(asking.either("SigmaInFormat", model, question, "msgpack"), numbers.grid)
 
 
 class _Json:
-    """Reads a schema of the contract from JSON."""
+    """Decoder of a schema of the contract from JSON."""
 
     def __init__(self, kind: type[T]) -> None:
         self._decoder = msgspec.json.Decoder(kind)

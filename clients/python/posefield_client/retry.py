@@ -1,4 +1,4 @@
-"""When a question is asked again: every one may be, for none changes anything."""
+"""Retries of requests; all requests are idempotent."""
 
 import random
 from collections.abc import Callable
@@ -9,12 +9,11 @@ from posefield_client.errors import PosefieldError
 
 @dataclass(frozen=True)
 class Retry:
-    """Exponential backoff with full jitter, within limits.
+    """Exponential backoff with full jitter.
 
-    attempts: how often a question is asked at most; first: seconds that the first wait is at most,
-    each further one twice that, up to `longest`; patience: seconds since the question was first
-    asked after which it is not asked again. Where the service says Retry-After it is not asked
-    before, however long that is; where it would end patience, not at all.
+    attempts: largest number of attempts. first: upper bound of the first wait, s; it doubles with
+    each attempt up to `longest`. patience: time limit from the first attempt, s. The wait is added
+    to a Retry-After of the service; if it would exceed `patience`, the request fails.
     """
 
     attempts: int = 5
@@ -24,7 +23,10 @@ class Retry:
     chance: Callable[[], float] = random.random
 
     def wait(self, asked: int, fault: PosefieldError, elapsed: float) -> float | None:
-        """Seconds to wait after so many attempts that took so long; None: give up."""
+        """Return the seconds to wait after an attempt; None to give up.
+
+        asked: number of attempts so far. elapsed: since the first, s.
+        """
         told = fault.retry_after or 0.0
         if not fault.again or asked >= self.attempts:
             return None
@@ -33,4 +35,4 @@ class Retry:
 
 
 NEVER = Retry(attempts=1)
-"""Ask once."""
+"""One attempt, without retries."""

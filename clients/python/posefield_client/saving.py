@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and how far they have come."""
+"""Atomic writes of files with progress."""
 
 import io
 import secrets
@@ -23,7 +23,7 @@ from posefield_client.wire import Call, Reply, Steps
 
 @dataclass(frozen=True)
 class Progress:
-    """How far an answer has come: bytes, of how many where that is known; of an archive files."""
+    """Progress of a download: bytes received of total, and files of count for an archive."""
 
     received: int
     total: int | None = None
@@ -34,12 +34,12 @@ class Progress:
 Line = TypeVar("Line")
 
 Watch = Callable[[Progress], object]
-"""Told how far it is. What it raises ends the download, and no file is left."""
+"""Callback for progress. An exception from it ends the download without a file."""
 
 
 @dataclass(frozen=True)
 class Missed:
-    """By how much a clip misses something that it was held to, in that unit."""
+    """Distance of a clip from one of its constraints, in a unit."""
 
     what: str
     miss: float
@@ -48,11 +48,11 @@ class Missed:
 
 @dataclass(frozen=True)
 class Saved:
-    """A file that was written, and what the service said of it.
+    """A written file and the service's metadata of it.
 
-    model: name@hash; sigma, m, duration, s, whether anything like it was captured, the values that
-    were chosen for controls that were left out, and what it was held to and misses: of a clip;
-    entries: of an archive, one a clip.
+    model: name@hash. sigma: m. duration: s. supported: True near captured clips. inferred: values
+    chosen for omitted controls. missed: constraints that are not met. entries: one per clip of an
+    archive.
     """
 
     path: Path
@@ -68,10 +68,10 @@ class Saved:
 
 
 class Part:
-    """A file beside the one that is to be; renamed by `keep`, else gone at the end."""
+    """Temporary file beside the target; `keep` renames it, otherwise it is deleted at the end."""
 
     def __init__(self, path: Path) -> None:
-        # What a link points to is written, and the link stays.
+        # Write the target of a symbolic link, and keep the link.
         self.path = path.resolve()
         self._beside = self.path.with_name(f".{secrets.token_hex(6)}.part")
         self.file: BinaryIO
@@ -93,16 +93,16 @@ class Part:
             self._beside.unlink()
 
     def keep(self) -> None:
-        """The file is whole: give it its name."""
+        """Rename the complete file to its target."""
         self.file.close()
-        # Whoever might not read the file that was there may not read this one.
+        # Keep the permissions of an existing file.
         with suppress(FileNotFoundError):
             self._beside.chmod(S_IMODE(self.path.stat().st_mode))
         self._beside.replace(self.path)
 
 
 class Into:
-    """Sink that writes to a file and tells how far it is."""
+    """Sink that writes to a file and reports progress."""
 
     def __init__(self, file: BinaryIO, ending: str, count: int | None, watch: Watch | None) -> None:
         self._file = file
@@ -112,14 +112,14 @@ class Into:
         self.begin(None)
 
     def begin(self, total: int | None) -> None:
-        """Forget what came before."""
+        """Discard earlier content."""
         self._file.seek(0)
         self._file.truncate()
         self.received, self._total = 0, total
         self._counter = Counter(self._ending) if self._watch and self._count else None
 
     def write(self, chunk: bytes) -> None:
-        """Take the next bytes."""
+        """Write the next bytes."""
         self._file.write(chunk)
         self.received += len(chunk)
         if self._watch is not None:
@@ -129,13 +129,16 @@ class Into:
         if self._counter is None or self._count is None:
             return Progress(self.received, self._total)
         self._counter.feed(chunk)
-        # The manifest is a file too.
+        # The counter includes the manifest.
         whole = min(self._counter.files, self._count)
         return Progress(self.received, self._total, whole, self._count)
 
 
 def save(core: Core, files: Files, path: Path, watch: Watch | None) -> Steps[Saved]:
-    """Write an answer to a file; its ending says in which format. PosefieldError, OSError."""
+    """Write a response to a file; its suffix selects the format.
+
+    Raises PosefieldError and OSError.
+    """
     ending = files.ending(path)
     request = files.request(ending)
     with Part(path) as part:
@@ -150,7 +153,7 @@ def save(core: Core, files: Files, path: Path, watch: Watch | None) -> Steps[Sav
 
 
 def content(core: Core, files: Files, ending: str) -> Steps[bytes]:
-    """An answer in a format, as bytes."""
+    """Return a response in a format, as bytes."""
 
     def look(reply: Reply) -> bytes:
         _entries(io.BytesIO(reply.content), ending, files.count)
@@ -160,7 +163,7 @@ def content(core: Core, files: Files, ending: str) -> Steps[bytes]:
 
 
 def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEntry, ...]:
-    """Of an archive that is whole; of other files nothing more is known than their length."""
+    """Return the manifest of a complete archive; empty for other files."""
     if count is None:
         return ()
     file.seek(0)
@@ -168,7 +171,7 @@ def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEn
 
 
 def _saved(path: Path, reply: Reply, entries: tuple[ManifestEntry, ...]) -> Saved:
-    """What the headers say of a file; ValueError where they cannot be read."""
+    """Return the metadata from a response's headers; ValueError if they are invalid."""
     headers = reply.headers
     return Saved(
         path,
@@ -185,7 +188,7 @@ def _saved(path: Path, reply: Reply, entries: tuple[ManifestEntry, ...]) -> Save
 
 
 def _lines(joined: str, each: type[Line]) -> tuple[Line, ...]:
-    """What the lines of one header, each of them JSON, are joined to by commas."""
+    """Return the JSON values of a header with several comma-joined lines."""
     return msgspec.json.decode(f"[{joined}]", type=tuple[each, ...])  # type: ignore[valid-type]
 
 

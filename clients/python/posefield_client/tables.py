@@ -1,4 +1,4 @@
-"""Answers as Arrow tables, for those who have pyarrow."""
+"""Responses as Arrow tables, with the optional pyarrow."""
 
 from typing import Any
 
@@ -11,9 +11,9 @@ except ImportError:  # pragma: no cover
 
 
 def read(reply: Reply) -> Any:
-    """A pyarrow.Table of an answer; ImportError where pyarrow is not installed.
+    """Return the pyarrow.Table of a response.
 
-    ValueError where it is none.
+    Raises ImportError without pyarrow, and ValueError for an invalid response.
     """
     if pyarrow is None:
         raise ImportError("tables need pyarrow: pip install posefield-client[arrow]")

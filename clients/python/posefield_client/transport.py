@@ -1,4 +1,4 @@
-"""What both kinds of client share of HTTP: addresses, headers, and what httpx's errors mean."""
+"""HTTP parts shared by both clients: addresses, headers, and the meaning of httpx errors."""
 
 import gzip
 import zlib
@@ -31,20 +31,20 @@ AGENT = f"posefield-client/{version('posefield-client')}"
 
 @dataclass(frozen=True)
 class Place:
-    """A service's address, and what every request to it says."""
+    """Address of a service, with the headers and timeout of every request."""
 
     address: str
     headers: dict[str, str]
     timeout: httpx.Timeout
 
     def request(self, send: Send) -> httpx.Request:
-        """The request as httpx sends it; made here, for its client would merge what we know."""
+        """Return the request for httpx; the httpx client's own method would add default headers."""
         asked = send.request
         headers = self.headers
         if send.tag is not None:
             headers = {**headers, "If-None-Match": send.tag}
         if send.sink is not None:
-            # A file is taken as it comes, so that its length says whether it is whole.
+            # Without compression Content-Length gives the size of the file to check.
             headers = {**headers, "Accept-Encoding": "identity"}
         if asked.body is not None:
             headers = {**headers, "Content-Type": "application/json"}
@@ -58,7 +58,7 @@ class Place:
 
 
 def place(base_url: str, key: str | None, timeout: float | httpx.Timeout) -> Place:
-    """The service at an address; WrongQuestion where that is none."""
+    """Return the service at an address; WrongQuestion if the address is invalid."""
     headers = {"User-Agent": AGENT, "Accept-Encoding": "gzip"}
     if key is not None:
         headers["Authorization"] = f"Bearer {_printable(key)}"
@@ -79,21 +79,21 @@ def _address(base_url: str) -> str:
 
 
 def _printable(key: str) -> str:
-    """The key, of which a message says nothing."""
+    """Return the key; the error message does not contain it."""
     if not key.isascii() or not key.isprintable() or not key:
         raise WrongQuestion("the key is empty, or holds other than printable ASCII characters")
     return key
 
 
 def core(place: Place, retry: Retry, cache: Cache | Path | None) -> Core:
-    """What decides for a client; cache None: a Memory of its own."""
+    """Return the state of a client. cache: None for a new Memory."""
     scope = caches.scope(CONTRACT, place.address, place.headers.get("Authorization", ""))
     kept = Disk(cache) if isinstance(cache, Path) else cache
     return Core(Memory() if kept is None else kept, retry, scope)
 
 
 def begin(send: Send, response: httpx.Response) -> Callable[[bytes], None] | None:
-    """Where a good answer goes while it comes; None: where there is none, or it is to be held."""
+    """Return the function that consumes a response in chunks; None to read it at once."""
     if send.sink is None or response.status_code != 200:
         return None
     expect(send.request.operation, response.headers.get("content-type", ""))
@@ -111,7 +111,10 @@ def _coding(response: httpx.Response) -> str:
 
 
 def reply(send: Send, response: httpx.Response, raw: bytes) -> Reply:
-    """The answer, whose bytes (raw) have come whole; IncompleteAnswer where nobody can know."""
+    """Return the response with its complete body `raw`.
+
+    Raises IncompleteAnswer if the headers do not allow checking its length.
+    """
     headers = response.headers
     endless = "content-length" not in headers and "transfer-encoding" not in headers
     if endless and response.status_code == 200:
@@ -121,7 +124,7 @@ def reply(send: Send, response: httpx.Response, raw: bytes) -> Reply:
 
 
 def _decoded(send: Send, coding: str, raw: bytes) -> bytes:
-    """What was coded; httpx would take what breaks off within its coding for whole."""
+    """Return the decompressed body; httpx would accept truncated gzip as complete."""
     if not raw or coding == "identity":
         return raw
     asked = named(send.request.operation)
@@ -136,13 +139,13 @@ def _decoded(send: Send, coding: str, raw: bytes) -> bytes:
 
 
 def opened(http: httpx.Client | httpx.AsyncClient) -> None:
-    """WrongQuestion where the client was closed."""
+    """Raise WrongQuestion if the client was closed."""
     if http.is_closed:
         raise WrongQuestion("the client is closed")
 
 
 def fault(found: httpx.HTTPError, send: Send, began: bool) -> PosefieldError:
-    """What an error of httpx means. began: whether the answer had."""
+    """Return the exception for an httpx error. began: True if the response had begun."""
     asked = named(send.request.operation)
     told = str(found) or type(found).__name__
     if isinstance(found, httpx.TimeoutException):

@@ -1,4 +1,4 @@
-"""What passes between the part that decides and the part that sends: no I/O here."""
+"""Messages between the request logic and the HTTP clients, without I/O."""
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ R = TypeVar("R", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A question as it travels. target: path and query, below the service's address."""
+    """An HTTP request. target: path and query, relative to the service's address."""
 
     operation: Operation
     target: str
@@ -21,7 +21,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """An answer as it came; without content where that went into a sink."""
+    """An HTTP response. content: empty if it went to a sink."""
 
     status: int
     headers: Mapping[str, str]
@@ -30,25 +30,25 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Call(Generic[R]):
-    """A request, and how its answer is read: ValueError where it is no such answer."""
+    """A request and the decoder of its response, which raises ValueError for an invalid one."""
 
     request: Request
     read: Callable[[Reply], R]
 
 
 class Sink(Protocol):
-    """Where a large answer goes while it comes."""
+    """Consumer of a large response in chunks."""
 
     def begin(self, total: int | None) -> None:
-        """Forget what came before; total: bytes that will come, where that is known."""
+        """Discard earlier content. total: bytes to come; None if unknown."""
 
     def write(self, chunk: bytes) -> None:
-        """Take the next bytes."""
+        """Consume the next bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Wish that a request be sent. tag: of the answer that is at hand."""
+    """Step: send a request. tag: entity tag of the cached response."""
 
     request: Request
     tag: str | None = None
@@ -57,10 +57,10 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Sleep:
-    """Wish that some seconds pass."""
+    """Step: wait for some seconds."""
 
     seconds: float
 
 
 Steps = Generator[Send | Sleep, Reply | None, T]
-"""What is to be done for an answer: wishes go out, replies come in, the answer is returned."""
+"""Generator of a request: yields steps, receives responses, returns the result."""

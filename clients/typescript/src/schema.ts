@@ -73,7 +73,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/v1/models/{model}/pose.json": {
+    "/v1/models/{model}/pose.{format}": {
         parameters: {
             query?: never;
             header?: never;
@@ -83,86 +83,25 @@ export interface paths {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /** Get poses at given times as JSON */
-        get: operations["getPoseJson"];
-        put?: never;
-        /** Query poses at given times as JSON */
-        post: operations["queryPoseJson"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/pose.msgpack": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
                 /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
+                 * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+                 * @example json
                  */
-                model: components["parameters"]["model"];
+                format: components["parameters"]["tableFormat"];
             };
             cookie?: never;
         };
-        /** Get poses at given times as MessagePack */
-        get: operations["getPoseMsgpack"];
+        /**
+         * Get poses at given times in a format
+         * @description As `json`, `msgpack`, `npz` or `arrow`.
+         */
+        get: operations["getPoseInFormat"];
         put?: never;
-        /** Query poses at given times as MessagePack */
-        post: operations["queryPoseMsgpack"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/pose.npz": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /** Get poses at given times as NumPy arrays */
-        get: operations["getPoseNpz"];
-        put?: never;
-        /** Query poses at given times as NumPy arrays */
-        post: operations["queryPoseNpz"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/pose.arrow": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /** Get poses at given times as an Arrow stream */
-        get: operations["getPoseArrow"];
-        put?: never;
-        /** Query poses at given times as an Arrow stream */
-        post: operations["queryPoseArrow"];
+        /**
+         * Query poses at given times in a format
+         * @description As `json`, `msgpack`, `npz` or `arrow`.
+         */
+        post: operations["queryPoseInFormat"];
         delete?: never;
         options?: never;
         head?: never;
@@ -199,7 +138,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/v1/models/{model}/clip.usda": {
+    "/v1/models/{model}/clip.{format}": {
         parameters: {
             query?: never;
             header?: never;
@@ -209,260 +148,25 @@ export interface paths {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as USD text
-         * @description A UsdSkel skeleton with its animation, as USD text; in metres with Y up, if not asked otherwise.
-         */
-        get: operations["getClipUsda"];
-        put?: never;
-        /**
-         * Query a clip as USD text
-         * @description A UsdSkel skeleton with its animation, as USD text; in metres with Y up, if not asked otherwise.
-         */
-        post: operations["queryClipUsda"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.usdc": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
                 /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
+                 * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @example usda
                  */
-                model: components["parameters"]["model"];
+                format: components["parameters"]["clipFormat"];
             };
             cookie?: never;
         };
         /**
-         * Get a clip as binary USD
-         * @description A UsdSkel skeleton with its animation, as a binary USD crate; in metres with Y up, if not asked otherwise.
+         * Get a clip in a format
+         * @description As `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. In metres with Y up, if not asked otherwise; BVH usually in centimetres, and glTF in metres with Y up alone.
          */
-        get: operations["getClipUsdc"];
+        get: operations["getClipInFormat"];
         put?: never;
         /**
-         * Query a clip as binary USD
-         * @description A UsdSkel skeleton with its animation, as a binary USD crate; in metres with Y up, if not asked otherwise.
+         * Query a clip in a format
+         * @description As `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. In metres with Y up, if not asked otherwise; BVH usually in centimetres, and glTF in metres with Y up alone.
          */
-        post: operations["queryClipUsdc"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.usdz": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as a USDZ package
-         * @description The binary USD file in a USDZ package; in metres with Y up, if not asked otherwise.
-         */
-        get: operations["getClipUsdz"];
-        put?: never;
-        /**
-         * Query a clip as a USDZ package
-         * @description The binary USD file in a USDZ package; in metres with Y up, if not asked otherwise.
-         */
-        post: operations["queryClipUsdz"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.json": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as JSON
-         * @description The clip as JSON, for people and scripts; in metres with Y up, if not asked otherwise, seconds, and quaternions w x y z.
-         */
-        get: operations["getClipJson"];
-        put?: never;
-        /**
-         * Query a clip as JSON
-         * @description The clip as JSON, for people and scripts; in metres with Y up, if not asked otherwise, seconds, and quaternions w x y z.
-         */
-        post: operations["queryClipJson"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.bvh": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as BVH
-         * @description The clip in the Biovision hierarchy format, in degrees; usually in centimetres, which readers of BVH take its numbers to be in.
-         */
-        get: operations["getClipBvh"];
-        put?: never;
-        /**
-         * Query a clip as BVH
-         * @description The clip in the Biovision hierarchy format, in degrees; usually in centimetres, which readers of BVH take its numbers to be in.
-         */
-        post: operations["queryClipBvh"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.glb": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as glTF
-         * @description A skinned character with its animation as binary glTF 2.0; always in metres with Y up, which is the law of glTF.
-         */
-        get: operations["getClipGlb"];
-        put?: never;
-        /**
-         * Query a clip as glTF
-         * @description A skinned character with its animation as binary glTF 2.0; always in metres with Y up, which is the law of glTF.
-         */
-        post: operations["queryClipGlb"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.npz": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as NumPy arrays
-         * @description The clip as a NumPy archive of named arrays, which numpy.load opens without pickle; quaternions w x y z, and what is said of them as JSON texts (`units`, `trust`).
-         */
-        get: operations["getClipNpz"];
-        put?: never;
-        /**
-         * Query a clip as NumPy arrays
-         * @description The clip as a NumPy archive of named arrays, which numpy.load opens without pickle; quaternions w x y z, and what is said of them as JSON texts (`units`, `trust`).
-         */
-        post: operations["queryClipNpz"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.arrow": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as an Arrow stream
-         * @description The clip as an Arrow IPC stream of one record batch, one row a frame; quaternions w x y z, and what holds for all frames as JSON texts in the schema's metadata.
-         */
-        get: operations["getClipArrow"];
-        put?: never;
-        /**
-         * Query a clip as an Arrow stream
-         * @description The clip as an Arrow IPC stream of one record batch, one row a frame; quaternions w x y z, and what holds for all frames as JSON texts in the schema's metadata.
-         */
-        post: operations["queryClipArrow"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clip.msgpack": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a clip as MessagePack
-         * @description The clip as one MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest; quaternions w x y z.
-         */
-        get: operations["getClipMsgpack"];
-        put?: never;
-        /**
-         * Query a clip as MessagePack
-         * @description The clip as one MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest; quaternions w x y z.
-         */
-        post: operations["queryClipMsgpack"];
+        post: operations["queryClipInFormat"];
         delete?: never;
         options?: never;
         head?: never;
@@ -495,7 +199,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/v1/models/{model}/clips.zip": {
+    "/v1/models/{model}/clips.{format}": {
         parameters: {
             query?: never;
             header?: never;
@@ -505,42 +209,21 @@ export interface paths {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Query many clips as a zip archive
-         * @description The archive is sent while the clips are made: one file each, named after it, in the order of the question, the same as the path of its format answers with. The last is `manifest.jsonl`; an answer that ends without it broke off.
-         */
-        post: operations["queryClipsZip"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/clips.tar": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
                 /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
+                 * @description A zip or tar archive.
+                 * @example zip
                  */
-                model: components["parameters"]["model"];
+                format: components["parameters"]["archiveFormat"];
             };
             cookie?: never;
         };
         get?: never;
         put?: never;
         /**
-         * Query many clips as a tar archive
-         * @description The archive is sent while the clips are made: one file each, named after it, in the order of the question, the same as the path of its format answers with. The last is `manifest.jsonl`; an answer that ends without it broke off.
+         * Query many clips as an archive of a format
+         * @description As `zip` or `tar`. The archive is sent while the clips are made: one file each, named after it, in the order of the question, the same as the path of its format answers with. The last is `manifest.jsonl`; an answer that ends without it broke off.
          */
-        post: operations["queryClipsTar"];
+        post: operations["queryClipsInFormat"];
         delete?: never;
         options?: never;
         head?: never;
@@ -577,99 +260,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/v1/models/{model}/crowd.arrow": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Query poses of a crowd as an Arrow stream */
-        post: operations["queryCrowdArrow"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/crowd.npz": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Query poses of a crowd as an npz archive */
-        post: operations["queryCrowdNpz"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/crowd.msgpack": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Query poses of a crowd as MessagePack */
-        post: operations["queryCrowdMsgpack"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/crowd.json": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Query poses of a crowd as JSON */
-        post: operations["queryCrowdJson"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/crowd.usda": {
+    "/v1/models/{model}/crowd.{format}": {
         parameters: {
             query?: never;
             header?: never;
@@ -683,64 +274,16 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get a crowd that walks as USD text
-         * @description Each character goes its own way at its own changing speed, the same for the same seed. For models of a cycle that travels. USDZ is sent while it is made, a single layer once it is whole.
+         * Get a crowd that walks in a format
+         * @description As `usda`, `usdc` or `usdz`. Each character goes its own way at its own changing speed, the same for the same seed. For models of a cycle that travels. USDZ is sent while it is made, a single layer once it is whole.
          */
-        get: operations["getCrowdUsda"];
+        get: operations["getCrowdInFormat"];
         put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/crowd.usdc": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
         /**
-         * Get a crowd that walks as binary USD
-         * @description Each character goes its own way at its own changing speed, the same for the same seed. For models of a cycle that travels. USDZ is sent while it is made, a single layer once it is whole.
+         * Query poses of a crowd in a format
+         * @description As `arrow`, `npz`, `msgpack`, or `json` for at most 1,000 characters.
          */
-        get: operations["getCrowdUsdc"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/crowd.usdz": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a crowd that walks as a USDZ package
-         * @description Each character goes its own way at its own changing speed, the same for the same seed. For models of a cycle that travels. USDZ is sent while it is made, a single layer once it is whole.
-         */
-        get: operations["getCrowdUsdz"];
-        put?: never;
-        post?: never;
+        post: operations["queryCrowdInFormat"];
         delete?: never;
         options?: never;
         head?: never;
@@ -833,7 +376,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/v1/models/{model}/sigma.json": {
+    "/v1/models/{model}/sigma.{format}": {
         parameters: {
             query?: never;
             header?: never;
@@ -843,110 +386,25 @@ export interface paths {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get sigma over two controls as JSON
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
-         */
-        get: operations["getSigmaJson"];
-        put?: never;
-        /**
-         * Query sigma over two controls as JSON
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
-         */
-        post: operations["querySigmaJson"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/sigma.msgpack": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
                 /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
+                 * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+                 * @example json
                  */
-                model: components["parameters"]["model"];
+                format: components["parameters"]["tableFormat"];
             };
             cookie?: never;
         };
         /**
-         * Get sigma over two controls as MessagePack
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
+         * Get sigma over two controls in a format
+         * @description As `json`, `msgpack`, `npz` or `arrow`. How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
-        get: operations["getSigmaMsgpack"];
+        get: operations["getSigmaInFormat"];
         put?: never;
         /**
-         * Query sigma over two controls as MessagePack
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
+         * Query sigma over two controls in a format
+         * @description As `json`, `msgpack`, `npz` or `arrow`. How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
          */
-        post: operations["querySigmaMsgpack"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/sigma.npz": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get sigma over two controls as NumPy arrays
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
-         */
-        get: operations["getSigmaNpz"];
-        put?: never;
-        /**
-         * Query sigma over two controls as NumPy arrays
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
-         */
-        post: operations["querySigmaNpz"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v1/models/{model}/sigma.arrow": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get sigma over two controls as an Arrow stream
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
-         */
-        get: operations["getSigmaArrow"];
-        put?: never;
-        /**
-         * Query sigma over two controls as an Arrow stream
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
-         */
-        post: operations["querySigmaArrow"];
+        post: operations["querySigmaInFormat"];
         delete?: never;
         options?: never;
         head?: never;
@@ -962,216 +420,12 @@ export interface paths {
         };
         /**
          * Get what is counted
-         * @description For Prometheus: latencies by operation and status, open requests, poses answered together, answers
+         * @description For Prometheus: latencies by operation, format and status, open requests, poses answered together, answers
          *     that clients had already, versions of models.
          */
         get: operations["getMetrics"];
         put?: never;
         post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** Get what answers here */
-        get: operations["getInferenceServer"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/health/live": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** Whether the process answers, by the protocol */
-        get: operations["getInferenceLiveness"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/health/ready": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** Whether the models answer, by the protocol */
-        get: operations["getInferenceReadiness"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/models/{model}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /** Get the tensors of a model */
-        get: operations["getInferenceModel"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/models/{model}/ready": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /** Whether a model answers */
-        get: operations["getInferenceModelReadiness"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/models/{model}/infer": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Run the graph of a model */
-        post: operations["infer"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/models/{model}/versions/{version}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-                /**
-                 * @description The hash of the model's file.
-                 * @example 0123456789abcdef
-                 */
-                version: components["parameters"]["version"];
-            };
-            cookie?: never;
-        };
-        /** Get the tensors of a version of a model */
-        get: operations["getInferenceVersion"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/models/{model}/versions/{version}/ready": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-                /**
-                 * @description The hash of the model's file.
-                 * @example 0123456789abcdef
-                 */
-                version: components["parameters"]["version"];
-            };
-            cookie?: never;
-        };
-        /** Whether a version of a model answers */
-        get: operations["getInferenceVersionReadiness"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/v2/models/{model}/versions/{version}/infer": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-                /**
-                 * @description The hash of the model's file.
-                 * @example 0123456789abcdef
-                 */
-                version: components["parameters"]["version"];
-            };
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /** Run the graph of a version of a model */
-        post: operations["inferVersion"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1287,7 +541,7 @@ export interface paths {
         };
         /**
          * Read this document
-         * @description As a page for people. It loads nothing and runs no script.
+         * @description As a page on which each operation can be searched for and tried. It loads nothing from elsewhere.
          */
         get: operations["getDocs"];
         put?: never;
@@ -1351,7 +605,7 @@ export interface components {
          */
         Loop: boolean;
         /**
-         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. A model whose card does not say how far its joints err has no answer. Files that hold no trust (BVH) do not say it.
+         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. Files that hold no trust (BVH) do not say it.
          * @default false
          */
         JointSigma: boolean;
@@ -1565,8 +819,8 @@ export interface components {
             gain: number;
             /** @description As Backing has it, at the point itself, before. */
             variance: number;
-            /** @description Source of the captured clip nearest to it; null in models trained before this was kept. */
-            nearest: string | null;
+            /** @description Source of the captured clip nearest to it. */
+            nearest: string;
             lacking: components["schemas"]["ControlName"];
             /** @description By how much the nearest clip differs in that control, in which it differs most, as a share of its range. */
             gap: number;
@@ -1914,11 +1168,11 @@ export interface components {
             roles: {
                 [key: string]: string;
             };
-            /** @description File and frames of each captured clip; empty in models trained before this was kept. */
+            /** @description File and frames of each captured clip. */
             sources: string[];
-            /** @description How far each joint errs, as a share of sigma; empty in models trained before this was kept. */
+            /** @description How far each joint errs, as a share of sigma. */
             joint_sigma?: number[];
-            /** @description What the weights of the captured clips hang on; null in models trained before this was kept. */
+            /** @description Parameters of the kriging that weighs the captured clips. */
             kriging: {
                 /** @enum {string} */
                 covariance: "exponential" | "gaussian" | "spherical" | "matern32" | "matern52";
@@ -1930,10 +1184,10 @@ export interface components {
                 nugget: number;
                 /** @description Distance between two performers. */
                 label: number;
-            } | null;
-            /** @description How far each captured clip lies from what the others predict for it, as a root-mean-square over joints and frames, m; empty in models trained before this was kept. */
+            };
+            /** @description How far each captured clip lies from what the others predict for it, as a root-mean-square over joints and frames, m. */
             left_out?: number[];
-            /** @description What the motion is for; null where the recipe names nothing, and in models trained before this was kept. */
+            /** @description What the motion is for; null where the recipe names nothing. */
             event?: {
                 /** @description The joint that counts. */
                 joint: number;
@@ -2152,157 +1406,16 @@ export interface components {
                 detail: string;
             }[];
         };
-        InferenceServer: {
-            /** @constant */
-            name: "posefield";
-            version: string;
-            extensions: string[];
-        };
-        InferenceLiveness: {
-            /** @constant */
-            live: true;
-        };
-        InferenceReadiness: {
-            /** @constant */
-            ready: true;
-        };
-        InferenceModelReadiness: {
-            name: string;
-            /** @constant */
-            ready: true;
-        };
-        /**
-         * @description What the graph takes and gives. For B rows, each a point of d controls with S times of its own:
-         *     `controls` [B, d] in the card's order and `time` [B, S], s; `performer`, of a model that knows p
-         *     of them, [B, p] or [1, p], a one for who moves, and left out or all zeros for somebody who was
-         *     never seen; `level` [], left out for the finest.
-         */
-        InferenceModel: {
-            name: string;
-            versions: string[];
-            platform: string;
-            inputs: components["schemas"]["InferencePort"][];
-            outputs: components["schemas"]["InferencePort"][];
-        };
-        InferencePort: {
-            name: string;
-            datatype: components["schemas"]["InferenceDatatype"];
-            /** @description -1 where the question decides. */
-            shape: number[];
-        };
-        /** @enum {string} */
-        InferenceDatatype: "FP32" | "FP64" | "INT64";
-        /**
-         * @example {
-         *       "id": "1",
-         *       "inputs": [
-         *         {
-         *           "name": "controls",
-         *           "shape": [
-         *             1,
-         *             4
-         *           ],
-         *           "datatype": "FP32",
-         *           "data": [
-         *             1.72,
-         *             0.9,
-         *             20,
-         *             1.1
-         *           ]
-         *         },
-         *         {
-         *           "name": "time",
-         *           "shape": [
-         *             1,
-         *             2
-         *           ],
-         *           "datatype": "FP32",
-         *           "data": [
-         *             0,
-         *             0.5
-         *           ]
-         *         }
-         *       ],
-         *       "outputs": [
-         *         {
-         *           "name": "root_position"
-         *         }
-         *       ]
-         *     }
-         */
-        InferenceQuestion: {
-            /** @description Comes back in the answer. */
-            id?: string;
-            /** @description If given, the name in the path. */
-            model_name?: string;
-            /** @description If given, the hash of the model. */
-            model_version?: string;
-            inputs: components["schemas"]["InferenceInput"][];
-            /** @description Which outputs, in which order; all, if there are none. */
-            outputs?: components["schemas"]["InferenceOutputQuestion"][];
-            /** @description Others than these have no effect. */
-            parameters?: {
-                /**
-                 * @description Whether outputs are binary that do not say.
-                 * @default false
-                 */
-                binary_data_output?: boolean;
-            };
-        };
-        /** @description With `data`, or with `binary_data_size` and bytes after the JSON. */
-        InferenceInput: {
-            /** @description One of the model's inputs. */
-            name: string;
-            shape: number[];
-            datatype: components["schemas"]["InferenceDatatype"];
-            /** @description All numbers row by row, or a list for each row. */
-            data?: (number | number[])[];
-            /** @description Others than these have no effect. */
-            parameters?: {
-                binary_data_size?: number;
-            };
-        };
-        InferenceOutputQuestion: {
-            /** @description One of the model's outputs. */
-            name: string;
-            /** @description Others than these have no effect. */
-            parameters?: {
-                binary_data?: boolean;
-            };
-        };
-        InferenceAnswer: {
-            model_name: string;
-            model_version: string;
-            id?: string;
-            parameters?: {
-                /** @description A sentence for each control outside what was sampled; absent without any. */
-                warnings?: string;
-            };
-            outputs: {
-                /** @enum {string} */
-                name: "rotations" | "root_position" | "bone_offsets" | "duration" | "sigma" | "travel";
-                /** @constant */
-                datatype: "FP32";
-                shape: number[];
-                /** @description Row by row. */
-                data?: number[];
-                parameters?: {
-                    binary_data_size?: number;
-                };
-            }[];
-        };
         /** @description A problem as RFC 9457 describes it. Every error of this service has this shape. */
         Problem: {
             /** @enum {string} */
-            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:malformed-request" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:request-too-slow" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:no-connection-left" | "urn:posefield:problem:internal-error";
+            type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:unknown-host" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:internal-error";
             title: string;
             status: number;
             /** @description What was found and what was expected, for people. */
             detail: string;
             /** @description The request's id. */
             instance: string;
-            /** @description Under `/v2`: `detail` once more, where its clients look. */
-            error?: string;
             /** @description Where in the request the fault lies, as far as it lies in one place. */
             errors: ({
                 /** @description JSON pointer into the body (RFC 6901). */
@@ -2315,7 +1428,7 @@ export interface components {
     };
     responses: {
         /** @description The crowd that walks; as binary USD, if nothing else is preferred. */
-        CrowdAny: {
+        Crowd: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
                 "Cache-Control": components["headers"]["CacheControl"];
@@ -2333,7 +1446,7 @@ export interface components {
             };
         };
         /** @description The poses; as an Arrow stream, if nothing else is preferred. */
-        CrowdPosesAny: {
+        CrowdPoses: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
                 "Cache-Control": components["headers"]["CacheControl"];
@@ -2346,130 +1459,11 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
                 "application/x-npz": string;
                 "application/vnd.msgpack": string;
-                "application/json": components["schemas"]["CrowdPoses"];
-            };
-        };
-        /** @description The outputs; as `application/octet-stream` where some are binary: JSON, and after it their bytes in their order, little-endian, row by row. */
-        Inference: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Inference-Header-Content-Length": components["headers"]["InferenceHeaderLength"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/json": components["schemas"]["InferenceAnswer"];
-                "application/octet-stream": string;
-            };
-        };
-        /** @description An assembly of UsdSkel characters with their animations, in one layer of text; metres, Y up. */
-        CrowdUsda: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/vnd.usda": string;
-            };
-        };
-        /** @description The same in one binary layer. */
-        CrowdUsdc: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/vnd.usdc": string;
-            };
-        };
-        /** @description The same as a package, with a layer for each motion; readers that compose no layers want it flattened. */
-        CrowdUsdz: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/vnd.usdz+zip": string;
-            };
-        };
-        /** @description An Arrow IPC stream of one record batch, one row a character. `rotations`, `root_position` and `bone_offsets` are columns of `arrow.fixed_shape_tensor`; `levels` is int8, all else float32. The metadata of the schema hold JSON texts under `posefield.model`, `.names`, `.parents`, `.units` and `.warnings`. */
-        CrowdArrow: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.apache.arrow.stream": string;
-            };
-        };
-        /** @description A NumPy archive of stored arrays with one row a character, and of `model`, `names`, `parents`, `units` (a JSON text) and `warnings`. */
-        CrowdNpz: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/x-npz": string;
-            };
-        };
-        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest; `levels` is int8, all else float32. Otherwise as CrowdPoses. */
-        CrowdMsgpack: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.msgpack": string;
-            };
-        };
-        /** @description For at most 1,000 characters, for people and scripts. */
-        CrowdJson: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
                 "application/json": components["schemas"]["CrowdPoses"];
             };
         };
         /** @description The poses, and how far they may be trusted; as JSON, if nothing else is preferred. */
-        PosesAny: {
+        Poses: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
                 "Cache-Control": components["headers"]["CacheControl"];
@@ -2485,63 +1479,8 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
             };
         };
-        /** @description The poses, and how far they may be trusted. */
-        PosesJson: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/json": components["schemas"]["PoseAnswer"];
-            };
-        };
-        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest. Otherwise as PoseAnswer. */
-        PosesMsgpack: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.msgpack": string;
-            };
-        };
-        /** @description A NumPy archive of the arrays of PoseAnswer, and of `trust` as a JSON text. */
-        PosesNpz: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/x-npz": string;
-            };
-        };
-        /** @description An Arrow IPC stream of one record batch, one row a time. `rotations` and `root_position` are columns of `arrow.fixed_shape_tensor`, float32; `times` is float64. The metadata of the schema hold JSON texts under `posefield.trust` and `posefield.bone_offsets`. */
-        PosesArrow: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.apache.arrow.stream": string;
-            };
-        };
         /** @description The clip; as binary USD, if nothing else is preferred. */
-        ClipAny: {
+        Clip: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
                 "Cache-Control": components["headers"]["CacheControl"];
@@ -2596,7 +1535,7 @@ export interface components {
             };
         };
         /** @description The grid; as JSON, if nothing else is preferred. */
-        SigmaAny: {
+        SigmaGrid: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
                 "Cache-Control": components["headers"]["CacheControl"];
@@ -2610,255 +1549,10 @@ export interface components {
                 "application/vnd.msgpack": string;
                 "application/x-npz": string;
                 "application/vnd.apache.arrow.stream": string;
-            };
-        };
-        /** @description The grid. */
-        SigmaJson: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/json": components["schemas"]["SigmaGrid"];
-            };
-        };
-        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest. Otherwise as SigmaGrid. */
-        SigmaMsgpack: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.msgpack": string;
-            };
-        };
-        /** @description A NumPy archive of the arrays of SigmaGrid, of `model`, `across` and `along`, and of `controls`, `performer` and `units` as JSON texts. */
-        SigmaNpz: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/x-npz": string;
-            };
-        };
-        /** @description An Arrow IPC stream of one record batch, one row a point: `across_values` and `along_values` are float64, `sigma` is float32, `inside` and `supported` truths. The metadata of the schema hold JSON texts under `posefield.model`, `.across`, `.along`, `.controls`, `.performer` and `.units`. */
-        SigmaArrow: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.apache.arrow.stream": string;
-            };
-        };
-        /** @description A UsdSkel skeleton with its animation, as USD text; in metres with Y up, if not asked otherwise. */
-        ClipUsda: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/vnd.usda": string;
-            };
-        };
-        /** @description A UsdSkel skeleton with its animation, as a binary USD crate; in metres with Y up, if not asked otherwise. */
-        ClipUsdc: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/vnd.usdc": string;
-            };
-        };
-        /** @description The binary USD file in a USDZ package; in metres with Y up, if not asked otherwise. */
-        ClipUsdz: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/vnd.usdz+zip": string;
-            };
-        };
-        /** @description The clip as JSON, for people and scripts; in metres with Y up, if not asked otherwise, seconds, and quaternions w x y z. */
-        ClipJson: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/json": components["schemas"]["ClipDocument"];
-            };
-        };
-        /** @description The clip in the Biovision hierarchy format, in degrees; usually in centimetres, which readers of BVH take its numbers to be in. */
-        ClipBvh: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/x-bvh": string;
-            };
-        };
-        /** @description A skinned character with its animation as binary glTF 2.0; always in metres with Y up, which is the law of glTF. The trust is in `asset.extras.posefield`. */
-        ClipGlb: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "model/gltf-binary": string;
-            };
-        };
-        /** @description The clip as a NumPy archive of named arrays, which numpy.load opens without pickle; quaternions w x y z, and what is said of them as JSON texts (`units`, `trust`). */
-        ClipNpz: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/x-npz": string;
-            };
-        };
-        /** @description An Arrow IPC stream of one record batch, one row a frame. `rotations` and `root_position` are columns of `arrow.fixed_shape_tensor`, float32; `times` is float64. The metadata of the schema hold JSON texts under `posefield.names`, `.parents`, `.rate`, `.units`, `.trust` and `.bone_offsets`. */
-        ClipArrow: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.apache.arrow.stream": string;
-            };
-        };
-        /** @description One MessagePack map. An array is a map of `dtype`, `shape` and `data`, its little-endian bytes, the last axis fastest. Otherwise as ClipDocument, not rounded, and without `frames`: there are as many as `times`. */
-        ClipMsgpack: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Sigma": components["headers"]["Sigma"];
-                "Posefield-Duration": components["headers"]["Duration"];
-                "Posefield-Inferred": components["headers"]["Inferred"];
-                "Posefield-Supported": components["headers"]["Supported"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                "Posefield-Missed": components["headers"]["Missed"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/vnd.msgpack": string;
             };
         };
         /** @description The archive; as zip, if nothing else is preferred. */
-        ClipsAny: {
+        Clips: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
                 "Cache-Control": components["headers"]["CacheControl"];
@@ -2871,38 +1565,6 @@ export interface components {
             };
             content: {
                 "application/zip": string;
-                "application/x-tar": string;
-            };
-        };
-        /** @description A zip of stored files, beyond 65,534 of them or 4 GiB a Zip64. `manifest.jsonl`, its last file, is JSON Lines: a ManifestEntry for each clip. */
-        ClipsZip: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                [name: string]: unknown;
-            };
-            content: {
-                "application/zip": string;
-            };
-        };
-        /** @description A POSIX tar. `manifest.jsonl`, its last file, is JSON Lines: a ManifestEntry for each clip. */
-        ClipsTar: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["CacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                "Content-Disposition": components["headers"]["Disposition"];
-                "Posefield-Model": components["headers"]["Model"];
-                "Posefield-Warning": components["headers"]["Warning"];
-                [name: string]: unknown;
-            };
-            content: {
                 "application/x-tar": string;
             };
         };
@@ -3033,6 +1695,42 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
+        /** @description The URL is longer than the service reads, by default 8 KiB. */
+        UrlTooLong: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                Link: components["headers"]["Help"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["Problem"];
+            };
+        };
+        /** @description The header `Host` names neither an address nor a name that the operator has listed. */
+        UnknownHost: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                Link: components["headers"]["Help"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["Problem"];
+            };
+        };
+        /** @description All headers together are longer than the service reads, by default 16 KiB, or more than 100. */
+        HeadTooLarge: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                Link: components["headers"]["Help"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["Problem"];
+            };
+        };
         /** @description The body is larger than the service accepts, by default 64 KiB. The connection is closed. */
         BodyTooLarge: {
             headers: {
@@ -3125,6 +1823,31 @@ export interface components {
          */
         model: string;
         /**
+         * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+         * @example usda
+         */
+        clipFormat: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
+        /**
+         * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+         * @example json
+         */
+        tableFormat: "json" | "msgpack" | "npz" | "arrow";
+        /**
+         * @description An Arrow stream, NumPy arrays, MessagePack or JSON.
+         * @example json
+         */
+        crowdFormat: "arrow" | "npz" | "msgpack" | "json";
+        /**
+         * @description USD text, binary USD or a USDZ package.
+         * @example usdc
+         */
+        walkFormat: "usda" | "usdc" | "usdz";
+        /**
+         * @description A zip or tar archive.
+         * @example zip
+         */
+        archiveFormat: "zip" | "tar";
+        /**
          * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
          *     The model's card gives their names, units and sampled ranges; a value outside the range is
          *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
@@ -3142,13 +1865,6 @@ export interface components {
         controls: {
             [key: string]: number;
         };
-        /**
-         * @description The hash of the model's file.
-         * @example 0123456789abcdef
-         */
-        version: string;
-        /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
-        inferenceHeaderLength: number;
         /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
         ifNoneMatch: string;
         /**
@@ -3189,14 +1905,10 @@ export interface components {
         target: string[];
         /** @description Whether feet that stand stay where they stand. */
         pinFeet: components["schemas"]["PinFeet"];
-        /** @description The file's unit of length; the format's usual one, if left out. */
+        /** @description The file's unit of length; the format's usual one, if left out. glTF has no other than `m`. */
         unit: "m" | "cm";
-        /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
+        /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. In glTF no other than `y` is up. */
         up: "y" | "z";
-        /** @description glTF has no other unit of length. */
-        unitOfGltf: "m";
-        /** @description In glTF no other axis is up. */
-        upOfGltf: "y";
         /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Characters. */
@@ -3261,24 +1973,13 @@ export interface components {
         performer: string;
     };
     requestBodies: {
-        /**
-         * @description JSON, and after it the bytes of the inputs that have a `binary_data_size`, in their order:
-         *     little-endian, row by row. By default at most 32 MiB and 100,000 poses (rows by times), or
-         *     10,000 where an output is sent as JSON. A body without `Content-Type` is taken for one of these.
-         */
-        InferenceQuestion: {
-            content: {
-                "application/json": components["schemas"]["InferenceQuestion"];
-                "application/octet-stream": string;
-            };
-        };
         /** @description By default at most 32 MiB and 100,000 characters. */
         CrowdQuestion: {
             content: {
                 "application/json": components["schemas"]["CrowdQuestion"];
             };
         };
-        /** @description By default at most 8 MiB, 10,000 clips and 1,000,000 frames in all. */
+        /** @description By default at most 8 MiB, 10,000 clips, 1,000,000 frames in all, and targets of a cost of 2,000 in all: a target counts as one, as four where the clip leaves controls open, and pinned feet as four. */
         ClipsQuestion: {
             content: {
                 "application/json": components["schemas"]["ClipsQuestion"];
@@ -3342,8 +2043,6 @@ export interface components {
          *     put in brackets are a JSON array.
          */
         Missed: string;
-        /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
-        InferenceHeaderLength: number;
     };
     pathItems: never;
 }
@@ -3373,6 +2072,9 @@ export interface operations {
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -3414,6 +2116,9 @@ export interface operations {
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -3489,7 +2194,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["PosesAny"];
+            200: components["responses"]["Poses"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
@@ -3497,7 +2202,10 @@ export interface operations {
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -3521,7 +2229,7 @@ export interface operations {
             };
         };
         responses: {
-            200: components["responses"]["PosesAny"];
+            200: components["responses"]["Poses"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
@@ -3529,13 +2237,16 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    getPoseJson: {
+    getPoseInFormat: {
         parameters: {
             query: {
                 /**
@@ -3601,24 +2312,32 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+                 * @example json
+                 */
+                format: components["parameters"]["tableFormat"];
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["PosesJson"];
+            200: components["responses"]["Poses"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    queryPoseJson: {
+    queryPoseInFormat: {
         parameters: {
             query?: never;
             header?: never;
@@ -3628,6 +2347,11 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+                 * @example json
+                 */
+                format: components["parameters"]["tableFormat"];
             };
             cookie?: never;
         };
@@ -3637,360 +2361,18 @@ export interface operations {
             };
         };
         responses: {
-            200: components["responses"]["PosesJson"];
+            200: components["responses"]["Poses"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getPoseMsgpack: {
-        parameters: {
-            query: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /**
-                 * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
-                 * @example [
-                 *       0,
-                 *       0.5
-                 *     ]
-                 */
-                time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["PosesMsgpack"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryPoseMsgpack: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["PoseQuestion"];
-            };
-        };
-        responses: {
-            200: components["responses"]["PosesMsgpack"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getPoseNpz: {
-        parameters: {
-            query: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /**
-                 * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
-                 * @example [
-                 *       0,
-                 *       0.5
-                 *     ]
-                 */
-                time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["PosesNpz"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryPoseNpz: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["PoseQuestion"];
-            };
-        };
-        responses: {
-            200: components["responses"]["PosesNpz"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getPoseArrow: {
-        parameters: {
-            query: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /**
-                 * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
-                 * @example [
-                 *       0,
-                 *       0.5
-                 *     ]
-                 */
-                time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["PosesArrow"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryPoseArrow: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["PoseQuestion"];
-            };
-        };
-        responses: {
-            200: components["responses"]["PosesArrow"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -4054,9 +2436,9 @@ export interface operations {
                 target?: components["parameters"]["target"];
                 /** @description Whether feet that stand stay where they stand. */
                 pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
+                /** @description The file's unit of length; the format's usual one, if left out. glTF has no other than `m`. */
                 unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
+                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. In glTF no other than `y` is up. */
                 up?: components["parameters"]["up"];
             };
             header?: {
@@ -4074,7 +2456,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["ClipAny"];
+            200: components["responses"]["Clip"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
@@ -4082,7 +2464,10 @@ export interface operations {
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -4102,7 +2487,7 @@ export interface operations {
         };
         requestBody: components["requestBodies"]["ClipQuestion"];
         responses: {
-            200: components["responses"]["ClipAny"];
+            200: components["responses"]["Clip"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
@@ -4110,13 +2495,16 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    getClipUsda: {
+    getClipInFormat: {
         parameters: {
             query?: {
                 /**
@@ -4175,9 +2563,9 @@ export interface operations {
                 target?: components["parameters"]["target"];
                 /** @description Whether feet that stand stay where they stand. */
                 pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
+                /** @description The file's unit of length; the format's usual one, if left out. glTF has no other than `m`. */
                 unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
+                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. In glTF no other than `y` is up. */
                 up?: components["parameters"]["up"];
             };
             header?: {
@@ -4190,24 +2578,32 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @example usda
+                 */
+                format: components["parameters"]["clipFormat"];
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["ClipUsda"];
+            200: components["responses"]["Clip"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    queryClipUsda: {
+    queryClipInFormat: {
         parameters: {
             query?: never;
             header?: never;
@@ -4217,972 +2613,28 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @example usda
+                 */
+                format: components["parameters"]["clipFormat"];
             };
             cookie?: never;
         };
         requestBody: components["requestBodies"]["ClipQuestion"];
         responses: {
-            200: components["responses"]["ClipUsda"];
+            200: components["responses"]["Clip"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipUsdc: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipUsdc"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipUsdc: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipUsdc"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipUsdz: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipUsdz"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipUsdz: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipUsdz"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipJson: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipJson"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipJson: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipJson"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipBvh: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipBvh"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipBvh: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipBvh"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipGlb: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description glTF has no other unit of length. */
-                unit?: components["parameters"]["unitOfGltf"];
-                /** @description In glTF no other axis is up. */
-                up?: components["parameters"]["upOfGltf"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipGlb"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipGlb: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipGlb"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipNpz: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipNpz"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipNpz: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipNpz"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipArrow: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipArrow"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipArrow: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipArrow"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getClipMsgpack: {
-        parameters: {
-            query?: {
-                /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
-                 * @example {
-                 *       "stature": 1.72,
-                 *       "hip_height": 0.9,
-                 *       "turn": 20,
-                 *       "target_height": 1.1
-                 *     }
-                 */
-                controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
-                fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
-                start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
-                end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
-                extrapolate?: components["parameters"]["extrapolate"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
-                joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /** @description What joints are called. */
-                names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
-                root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
-                loop?: components["parameters"]["loop"];
-                /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
-                 * @example none
-                 */
-                exact?: components["parameters"]["exact"];
-                /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
-                 * @example [
-                 *       "RightHand@end:0.3,1.2,0.4"
-                 *     ]
-                 */
-                target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
-                pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. */
-                unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. */
-                up?: components["parameters"]["up"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ClipMsgpack"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipMsgpack: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipQuestion"];
-        responses: {
-            200: components["responses"]["ClipMsgpack"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5202,7 +2654,7 @@ export interface operations {
         };
         requestBody: components["requestBodies"]["ClipsQuestion"];
         responses: {
-            200: components["responses"]["ClipsAny"];
+            200: components["responses"]["Clips"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
@@ -5210,13 +2662,16 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    queryClipsZip: {
+    queryClipsInFormat: {
         parameters: {
             query?: never;
             header?: never;
@@ -5226,48 +2681,28 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["ClipsQuestion"];
-        responses: {
-            200: components["responses"]["ClipsZip"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryClipsTar: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
                 /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
+                 * @description A zip or tar archive.
+                 * @example zip
                  */
-                model: components["parameters"]["model"];
+                format: components["parameters"]["archiveFormat"];
             };
             cookie?: never;
         };
         requestBody: components["requestBodies"]["ClipsQuestion"];
         responses: {
-            200: components["responses"]["ClipsTar"];
+            200: components["responses"]["Clips"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5316,7 +2751,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["CrowdAny"];
+            200: components["responses"]["Crowd"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
@@ -5324,7 +2759,10 @@ export interface operations {
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5344,7 +2782,7 @@ export interface operations {
         };
         requestBody: components["requestBodies"]["CrowdQuestion"];
         responses: {
-            200: components["responses"]["CrowdPosesAny"];
+            200: components["responses"]["CrowdPoses"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
@@ -5352,125 +2790,16 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    queryCrowdArrow: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["CrowdQuestion"];
-        responses: {
-            200: components["responses"]["CrowdArrow"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryCrowdNpz: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["CrowdQuestion"];
-        responses: {
-            200: components["responses"]["CrowdNpz"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryCrowdMsgpack: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["CrowdQuestion"];
-        responses: {
-            200: components["responses"]["CrowdMsgpack"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    queryCrowdJson: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["CrowdQuestion"];
-        responses: {
-            200: components["responses"]["CrowdJson"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getCrowdUsda: {
+    getCrowdInFormat: {
         parameters: {
             query?: {
                 /** @description Characters. */
@@ -5509,131 +2838,63 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description USD text, binary USD or a USDZ package.
+                 * @example usdc
+                 */
+                format: components["parameters"]["walkFormat"];
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["CrowdUsda"];
+            200: components["responses"]["Crowd"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    getCrowdUsdc: {
+    queryCrowdInFormat: {
         parameters: {
-            query?: {
-                /** @description Characters. */
-                count?: components["parameters"]["count"];
-                /** @description How many different motions they share; left out, each character has its own. Not with a camera. */
-                motions?: components["parameters"]["motions"];
-                /** @description How long they walk. */
-                seconds?: components["parameters"]["seconds"];
-                /** @description Frames a second. */
-                fps?: components["parameters"]["crowdFps"];
-                /** @description Of all that is random. */
-                seed?: components["parameters"]["seed"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /**
-                 * @description Where one looks from, x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest, where none does; a switch takes a quarter of a second. It may stand in nobody.
-                 * @example 30,1.7,-60
-                 */
-                camera?: components["parameters"]["camera"];
-                /** @description With a camera, its vertical field of view, rad; 60 degrees, if left out. */
-                fov?: components["parameters"]["fov"];
-                /** @description With a camera, the height of the image, pixels; 1080, if left out. */
-                height?: components["parameters"]["height"];
-                /** @description With a camera, how many pixels the error of a level may cover; 1, if left out. */
-                pixels?: components["parameters"]["pixels"];
-                /** @description What characters share. `references` opens in everything that composes layers, `scenegraph` is least to draw but Blender imports it as one character at rest, `flatten` is one layer for readers that compose nothing, such as three.js. */
-                instancing?: components["parameters"]["instancing"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
+            query?: never;
+            header?: never;
             path: {
                 /**
                  * @description A model's name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description An Arrow stream, NumPy arrays, MessagePack or JSON.
+                 * @example json
+                 */
+                format: components["parameters"]["crowdFormat"];
             };
             cookie?: never;
         };
-        requestBody?: never;
+        requestBody: components["requestBodies"]["CrowdQuestion"];
         responses: {
-            200: components["responses"]["CrowdUsdc"];
-            304: components["responses"]["NotModified"];
+            200: components["responses"]["CrowdPoses"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
+            415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getCrowdUsdz: {
-        parameters: {
-            query?: {
-                /** @description Characters. */
-                count?: components["parameters"]["count"];
-                /** @description How many different motions they share; left out, each character has its own. Not with a camera. */
-                motions?: components["parameters"]["motions"];
-                /** @description How long they walk. */
-                seconds?: components["parameters"]["seconds"];
-                /** @description Frames a second. */
-                fps?: components["parameters"]["crowdFps"];
-                /** @description Of all that is random. */
-                seed?: components["parameters"]["seed"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
-                level?: components["parameters"]["level"];
-                /**
-                 * @description Where one looks from, x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest, where none does; a switch takes a quarter of a second. It may stand in nobody.
-                 * @example 30,1.7,-60
-                 */
-                camera?: components["parameters"]["camera"];
-                /** @description With a camera, its vertical field of view, rad; 60 degrees, if left out. */
-                fov?: components["parameters"]["fov"];
-                /** @description With a camera, the height of the image, pixels; 1080, if left out. */
-                height?: components["parameters"]["height"];
-                /** @description With a camera, how many pixels the error of a level may cover; 1, if left out. */
-                pixels?: components["parameters"]["pixels"];
-                /** @description What characters share. `references` opens in everything that composes layers, `scenegraph` is least to draw but Blender imports it as one character at rest, `flatten` is one layer for readers that compose nothing, such as three.js. */
-                instancing?: components["parameters"]["instancing"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["CrowdUsdz"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5690,7 +2951,10 @@ export interface operations {
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5721,8 +2985,11 @@ export interface operations {
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5760,7 +3027,10 @@ export interface operations {
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5808,7 +3078,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["SigmaAny"];
+            200: components["responses"]["SigmaGrid"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
@@ -5816,7 +3086,10 @@ export interface operations {
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -5840,7 +3113,7 @@ export interface operations {
             };
         };
         responses: {
-            200: components["responses"]["SigmaAny"];
+            200: components["responses"]["SigmaGrid"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
@@ -5848,13 +3121,16 @@ export interface operations {
             405: components["responses"]["MethodNotAllowed"];
             406: components["responses"]["NotAcceptable"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    getSigmaJson: {
+    getSigmaInFormat: {
         parameters: {
             query: {
                 /**
@@ -5892,24 +3168,32 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+                 * @example json
+                 */
+                format: components["parameters"]["tableFormat"];
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["SigmaJson"];
+            200: components["responses"]["SigmaGrid"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
     };
-    querySigmaJson: {
+    querySigmaInFormat: {
         parameters: {
             query?: never;
             header?: never;
@@ -5919,6 +3203,11 @@ export interface operations {
                  * @example reach
                  */
                 model: components["parameters"]["model"];
+                /**
+                 * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
+                 * @example json
+                 */
+                format: components["parameters"]["tableFormat"];
             };
             cookie?: never;
         };
@@ -5928,276 +3217,18 @@ export interface operations {
             };
         };
         responses: {
-            200: components["responses"]["SigmaJson"];
+            200: components["responses"]["SigmaGrid"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             404: components["responses"]["NotFound"];
             405: components["responses"]["MethodNotAllowed"];
             413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
             415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
             422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getSigmaMsgpack: {
-        parameters: {
-            query: {
-                /**
-                 * @description The control that changes from column to column.
-                 * @example turn
-                 */
-                across: components["parameters"]["across"];
-                /**
-                 * @description Another control, which changes from row to row.
-                 * @example target_height
-                 */
-                along: components["parameters"]["along"];
-                /** @description Values of `across`, evenly from the least that was sampled to the greatest. */
-                columns?: components["parameters"]["columns"];
-                /** @description Values of `along`. By default at most 65,536 points in all. */
-                rows?: components["parameters"]["rows"];
-                /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
-                margin?: components["parameters"]["margin"];
-                /** @description One parameter for each other control that is not at its default. */
-                controls?: components["parameters"]["fixedControls"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["SigmaMsgpack"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    querySigmaMsgpack: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["SigmaQuestion"];
-            };
-        };
-        responses: {
-            200: components["responses"]["SigmaMsgpack"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getSigmaNpz: {
-        parameters: {
-            query: {
-                /**
-                 * @description The control that changes from column to column.
-                 * @example turn
-                 */
-                across: components["parameters"]["across"];
-                /**
-                 * @description Another control, which changes from row to row.
-                 * @example target_height
-                 */
-                along: components["parameters"]["along"];
-                /** @description Values of `across`, evenly from the least that was sampled to the greatest. */
-                columns?: components["parameters"]["columns"];
-                /** @description Values of `along`. By default at most 65,536 points in all. */
-                rows?: components["parameters"]["rows"];
-                /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
-                margin?: components["parameters"]["margin"];
-                /** @description One parameter for each other control that is not at its default. */
-                controls?: components["parameters"]["fixedControls"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["SigmaNpz"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    querySigmaNpz: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["SigmaQuestion"];
-            };
-        };
-        responses: {
-            200: components["responses"]["SigmaNpz"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getSigmaArrow: {
-        parameters: {
-            query: {
-                /**
-                 * @description The control that changes from column to column.
-                 * @example turn
-                 */
-                across: components["parameters"]["across"];
-                /**
-                 * @description Another control, which changes from row to row.
-                 * @example target_height
-                 */
-                along: components["parameters"]["along"];
-                /** @description Values of `across`, evenly from the least that was sampled to the greatest. */
-                columns?: components["parameters"]["columns"];
-                /** @description Values of `along`. By default at most 65,536 points in all. */
-                rows?: components["parameters"]["rows"];
-                /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
-                margin?: components["parameters"]["margin"];
-                /** @description One parameter for each other control that is not at its default. */
-                controls?: components["parameters"]["fixedControls"];
-                /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
-                 * @example tall
-                 */
-                performer?: components["parameters"]["performer"];
-            };
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["SigmaArrow"];
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    querySigmaArrow: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["SigmaQuestion"];
-            };
-        };
-        responses: {
-            200: components["responses"]["SigmaArrow"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["Overloaded"];
         };
@@ -6226,320 +3257,10 @@ export interface operations {
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
-        };
-    };
-    getInferenceServer: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Name and version of the service and the protocol's extensions that it knows. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceServer"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-        };
-    };
-    getInferenceLiveness: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description It does. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceLiveness"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-        };
-    };
-    getInferenceReadiness: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description They do. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceReadiness"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["NotReady"];
-        };
-    };
-    getInferenceModel: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Its inputs and outputs. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    ETag: components["headers"]["ETag"];
-                    Vary: components["headers"]["Vary"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceModel"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getInferenceModelReadiness: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description It does. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    ETag: components["headers"]["ETag"];
-                    Vary: components["headers"]["Vary"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceModelReadiness"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    infer: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
-                "Inference-Header-Content-Length"?: components["parameters"]["inferenceHeaderLength"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["InferenceQuestion"];
-        responses: {
-            200: components["responses"]["Inference"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getInferenceVersion: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-                /**
-                 * @description The hash of the model's file.
-                 * @example 0123456789abcdef
-                 */
-                version: components["parameters"]["version"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Its inputs and outputs. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    ETag: components["headers"]["ETag"];
-                    Vary: components["headers"]["Vary"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceModel"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getInferenceVersionReadiness: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-                /**
-                 * @description The hash of the model's file.
-                 * @example 0123456789abcdef
-                 */
-                version: components["parameters"]["version"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description It does. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    ETag: components["headers"]["ETag"];
-                    Vary: components["headers"]["Vary"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["InferenceModelReadiness"];
-                };
-            };
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    inferVersion: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Bytes of the body that are JSON, where those of binary tensors follow. */
-                "Inference-Header-Content-Length"?: components["parameters"]["inferenceHeaderLength"];
-            };
-            path: {
-                /**
-                 * @description A model's name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-                /**
-                 * @description The hash of the model's file.
-                 * @example 0123456789abcdef
-                 */
-                version: components["parameters"]["version"];
-            };
-            cookie?: never;
-        };
-        requestBody: components["requestBodies"]["InferenceQuestion"];
-        responses: {
-            200: components["responses"]["Inference"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            413: components["responses"]["BodyTooLarge"];
-            415: components["responses"]["UnsupportedMediaType"];
-            422: components["responses"]["Unanswerable"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
         };
     };
     getLiveness: {
@@ -6564,6 +3285,9 @@ export interface operations {
             };
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
         };
     };
@@ -6589,6 +3313,9 @@ export interface operations {
             };
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
             503: components["responses"]["NotReady"];
         };
@@ -6609,6 +3336,9 @@ export interface operations {
             304: components["responses"]["PageNotModified"];
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
         };
     };
@@ -6628,6 +3358,9 @@ export interface operations {
             304: components["responses"]["PageNotModified"];
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
         };
     };
@@ -6647,6 +3380,9 @@ export interface operations {
             304: components["responses"]["PageNotModified"];
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
         };
     };
@@ -6666,6 +3402,9 @@ export interface operations {
             304: components["responses"]["PageNotModified"];
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
         };
     };
@@ -6685,12 +3424,15 @@ export interface operations {
             304: components["responses"]["PageNotModified"];
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
             500: components["responses"]["InternalError"];
         };
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "2.2.0";
+export const CONTRACT = "3.0.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -6847,7 +3589,6 @@ export const MEDIA_TYPES = {
 export const PROBLEM_TYPES = [
   "urn:posefield:problem:bad-parameter",
   "urn:posefield:problem:bad-body",
-  "urn:posefield:problem:malformed-request",
   "urn:posefield:problem:unauthenticated",
   "urn:posefield:problem:forbidden",
   "urn:posefield:problem:no-such-path",
@@ -6856,7 +3597,6 @@ export const PROBLEM_TYPES = [
   "urn:posefield:problem:method-not-allowed",
   "urn:posefield:problem:not-acceptable",
   "urn:posefield:problem:body-too-large",
-  "urn:posefield:problem:request-too-slow",
   "urn:posefield:problem:url-too-long",
   "urn:posefield:problem:unsupported-media-type",
   "urn:posefield:problem:invalid-field",
@@ -6865,7 +3605,7 @@ export const PROBLEM_TYPES = [
   "urn:posefield:problem:overloaded",
   "urn:posefield:problem:late",
   "urn:posefield:problem:not-ready",
+  "urn:posefield:problem:unknown-host",
   "urn:posefield:problem:head-too-large",
-  "urn:posefield:problem:no-connection-left",
   "urn:posefield:problem:internal-error"
 ] as const;

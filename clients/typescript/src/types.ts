@@ -30,14 +30,17 @@ export type WalkQuestion = Omit<Walk, "camera"> & {
   readonly camera?: readonly [x: number, y: number, z: number];
 };
 
-type Walk = NonNullable<operations["getCrowdUsdc"]["parameters"]["query"]>;
+type Walk = NonNullable<operations["getCrowdInFormat"]["parameters"]["query"]>;
 type Asked<Question, Needed extends keyof Question> = Pick<Question, Needed> & Partial<Question>;
 
 export type ClipFormat = Schemas["ClipsQuestion"]["format"];
-export type CrowdFormat = "usda" | "usdc" | "usdz";
+export type CrowdFormat = Format<"getCrowdInFormat">;
 
-/** What many clips are sent in. */
-export type ArchiveFormat = "zip" | "tar";
+/** Archives of many clips. */
+export type ArchiveFormat = Format<"queryClipsInFormat">;
+
+type Format<Id extends "getCrowdInFormat" | "queryClipsInFormat"> =
+  operations[Id]["parameters"]["path"]["format"];
 
 /** Poses of the joints that the model's card names, at S times: metres, seconds, Y up. */
 export interface Poses {

@@ -182,7 +182,7 @@ test("a refusal says what, where and under which id", async () => {
   assert.ok(problem instanceof Problem);
   assert.deepEqual([problem.status, problem.kind], [422, "invalid-field"]);
   assert.equal(problem.places[0]?.parameter, "time");
-  assert.match(problem.message, /times\/0: 1e\+06 s, expected 0 to/);
+  assert.match(problem.message, /times\/0: 1000000 s, expected 0 to/);
   assert.match(problem.requestId, /^[\w.-]+$/);
 });
 

@@ -18,6 +18,7 @@ import type {
   WalkQuestion,
   WhyQuestion,
 } from "../src/index.ts";
+import { MEDIA_TYPES } from "../src/schema.ts";
 import { observed } from "./service.ts";
 
 const EXAMPLES = new URL("../../../api/examples/", import.meta.url);
@@ -40,84 +41,51 @@ const pose: Ask = (client, model, question) => client.pose(model, question as Po
 const sigma: Ask = (client, model, question) => client.sigma(model, question as SigmaQuestion);
 const why: Ask = (client, model, question) => client.why(model, question as WhyQuestion);
 
-const REACHED: Record<string, Ask> = {
+const clip: Ask = (client, model, question) => client.clip(model, question as ClipQuestion);
+const crowd: Ask = (client, model, question) => client.crowd(model, question as CrowdQuestion);
+
+/** Call by format; a text says why the client does not ask for it. */
+type ByFormat = Readonly<Record<string, Ask | string>>;
+
+const FILES = ["usda", "usdc", "usdz", "glb", "bvh", "json", "npz", "arrow"] as const;
+const OTHER_TOOLS = "for readers of NumPy or Arrow; here the same numbers come as MessagePack";
+const FOR_PEOPLE = "the same numbers as text, for people";
+const SMALL = "a grid's JSON is small enough";
+const POSES: ByFormat = { msgpack: pose, json: FOR_PEOPLE, npz: OTHER_TOOLS, arrow: OTHER_TOOLS };
+const GRIDS: ByFormat = { json: sigma, msgpack: SMALL, npz: OTHER_TOOLS, arrow: OTHER_TOOLS };
+const CLIPS: ByFormat = {
+  ...Object.fromEntries(FILES.map((format) => [format, file(format)])),
+  msgpack: clip,
+};
+const NEGOTIATED = "this client always names the format in the path";
+const PAGE = "a page, for browsers";
+
+const ASKED: Record<string, Ask | string | ByFormat> = {
   listModels: async (client) => ({ models: await client.models() }),
   getModel: (client, model) => client.card(model),
-  getPoseMsgpack: pose,
-  queryPoseMsgpack: pose,
-  getClipUsda: file("usda"),
-  queryClipUsda: file("usda"),
-  getClipUsdc: file("usdc"),
-  queryClipUsdc: file("usdc"),
-  getClipUsdz: file("usdz"),
-  queryClipUsdz: file("usdz"),
-  getClipGlb: file("glb"),
-  queryClipGlb: file("glb"),
-  getClipBvh: file("bvh"),
-  queryClipBvh: file("bvh"),
-  getClipJson: file("json"),
-  queryClipJson: file("json"),
-  getClipNpz: file("npz"),
-  queryClipNpz: file("npz"),
-  getClipArrow: file("arrow"),
-  queryClipArrow: file("arrow"),
-  getClipMsgpack: (client, model, question) => client.clip(model, question as ClipQuestion),
-  queryClipMsgpack: (client, model, question) => client.clip(model, question as ClipQuestion),
-  queryClipsZip: clips("zip"),
-  queryClipsTar: clips("tar"),
-  queryCrowdMsgpack: (client, model, question) => client.crowd(model, question as CrowdQuestion),
-  getCrowdUsda: walk("usda"),
-  getCrowdUsdc: walk("usdc"),
-  getCrowdUsdz: walk("usdz"),
+  getPose: NEGOTIATED,
+  queryPose: NEGOTIATED,
+  getPoseInFormat: POSES,
+  queryPoseInFormat: POSES,
+  getClip: NEGOTIATED,
+  queryClip: NEGOTIATED,
+  getClipInFormat: CLIPS,
+  queryClipInFormat: CLIPS,
+  queryClips: NEGOTIATED,
+  queryClipsInFormat: { zip: clips("zip"), tar: clips("tar") },
+  getCrowd: NEGOTIATED,
+  queryCrowd: NEGOTIATED,
+  getCrowdInFormat: { usda: walk("usda"), usdc: walk("usdc"), usdz: walk("usdz") },
+  queryCrowdInFormat: { msgpack: crowd, json: FOR_PEOPLE, npz: OTHER_TOOLS, arrow: OTHER_TOOLS },
+  getSigma: NEGOTIATED,
+  querySigma: NEGOTIATED,
+  getSigmaInFormat: GRIDS,
+  querySigmaInFormat: GRIDS,
   getWhy: why,
   queryWhy: why,
   getSuggestions: (client, model, asked) => client.suggestions(model, asked as object),
-  getSigmaJson: sigma,
-  querySigmaJson: sigma,
   getReadiness: (client) => client.ready(),
   getLiveness: (client) => client.contract(),
-};
-
-const NEGOTIATED = "this client always names the format in the path";
-const OTHER_TOOLS = "for readers of NumPy or Arrow; here the same numbers come as MessagePack";
-const FOR_PEOPLE = "the same numbers as text, for people";
-const INFERENCE = "spoken by clients of the Open Inference Protocol";
-const PAGE = "a page, for browsers";
-
-const LEFT_OUT: Record<string, string> = {
-  getPose: NEGOTIATED,
-  queryPose: NEGOTIATED,
-  getClip: NEGOTIATED,
-  queryClip: NEGOTIATED,
-  queryClips: NEGOTIATED,
-  getCrowd: NEGOTIATED,
-  queryCrowd: NEGOTIATED,
-  getSigma: NEGOTIATED,
-  querySigma: NEGOTIATED,
-  getPoseJson: FOR_PEOPLE,
-  queryPoseJson: FOR_PEOPLE,
-  queryCrowdJson: FOR_PEOPLE,
-  getPoseNpz: OTHER_TOOLS,
-  queryPoseNpz: OTHER_TOOLS,
-  getPoseArrow: OTHER_TOOLS,
-  queryPoseArrow: OTHER_TOOLS,
-  queryCrowdNpz: OTHER_TOOLS,
-  queryCrowdArrow: OTHER_TOOLS,
-  getSigmaMsgpack: "a grid's JSON is small enough",
-  querySigmaMsgpack: "a grid's JSON is small enough",
-  getSigmaNpz: OTHER_TOOLS,
-  querySigmaNpz: OTHER_TOOLS,
-  getSigmaArrow: OTHER_TOOLS,
-  querySigmaArrow: OTHER_TOOLS,
-  getInferenceServer: INFERENCE,
-  getInferenceLiveness: INFERENCE,
-  getInferenceReadiness: INFERENCE,
-  getInferenceModel: INFERENCE,
-  getInferenceModelReadiness: INFERENCE,
-  getInferenceVersion: INFERENCE,
-  getInferenceVersionReadiness: INFERENCE,
-  infer: INFERENCE,
-  inferVersion: INFERENCE,
   getMetrics: "read by Prometheus",
   getContract: "the contract is in this client's types",
   getContractJson: "only asked of services whose /livez says no version: see faults.test.ts",
@@ -132,20 +100,36 @@ interface Example {
   readonly body?: unknown;
 }
 
-function read(operation: string, part: string): unknown {
-  return JSON.parse(readFileSync(new URL(`${operation}/${part}.json`, EXAMPLES), "utf8"));
+type Part = Readonly<Record<string, unknown>>;
+
+/** An example, as tests/contract_examples.py reads it: what differs for a format, and its name filled in. */
+function read(operation: string, part: string, format = ""): Part {
+  const text = readFileSync(new URL(`${operation}/${part}.json`, EXAMPLES), "utf8");
+  const { formats = {}, ...common } = JSON.parse(text.replaceAll("{format}", format)) as Part;
+  const found: Record<string, unknown> = { ...common };
+  for (const [names, own] of Object.entries(formats as Record<string, Part>))
+    if (names.split(" ").includes(format))
+      for (const [key, value] of Object.entries(own))
+        found[key] = typeof value === "object" ? { ...(found[key] ?? {}), ...value } : value;
+  return found;
 }
 
-test("every operation is reached or left out for a reason", () => {
-  const said = new Set([...Object.keys(REACHED), ...Object.keys(LEFT_OUT)]);
-  const unsaid = readdirSync(EXAMPLES).filter((operation) => !said.has(operation));
-  assert.deepEqual(unsaid, []);
-  assert.equal(said.size, Object.keys(REACHED).length + Object.keys(LEFT_OUT).length);
+test("every operation and format is asked for or left out for a reason", () => {
+  assert.deepEqual(Object.keys(ASKED).sort(), readdirSync(EXAMPLES).sort());
+  const formats = { ...POSES, ...CLIPS, zip: "", tar: "" };
+  assert.deepEqual(Object.keys(formats).sort(), Object.keys(MEDIA_TYPES).sort());
 });
 
-for (const [operation, ask] of Object.entries(REACHED)) {
-  test(`${operation}: the client asks as the example does, and reads the answer`, async () => {
-    const example = read(operation, "request") as Example;
+const CASES = Object.entries(ASKED).flatMap(([operation, ask]) =>
+  typeof ask === "object"
+    ? Object.entries(ask).map(([format, own]) => [operation, format, own] as const)
+    : [[operation, "", ask] as const],
+);
+
+for (const [operation, format, ask] of CASES) {
+  if (typeof ask === "string") continue;
+  test(`${operation} ${format}: the client asks as the example does, and reads the answer`, async () => {
+    const example = read(operation, "request", format) as unknown as Example;
     // Whether a question travels as a link or as a body is its length's choice: here, the example's.
     const { client, sent } = observed(undefined, {
       longestLink: example.method === "GET" ? 2000 : 0,
@@ -155,14 +139,14 @@ for (const [operation, ask] of Object.entries(REACHED)) {
     assert.deepEqual(parts(sent[0].path), parts(example.path));
     assert.deepEqual(sent[0].body, example.body ?? null);
     assert.deepEqual(new Set(sent.map((one) => one.status)), new Set([200]));
-    const { body } = read(operation, "response") as { body?: unknown };
+    const { body } = read(operation, "response", format);
     if (isSame(operation)) assertContains(answer, body);
   });
 }
 
 /** Whether the client's answer is the service's document. */
 function isSame(operation: string): boolean {
-  return /Why|SigmaJson|listModels|getModel|getReadiness/.test(operation);
+  return /Why|Sigma|listModels|getModel|getReadiness/.test(operation);
 }
 
 function modelOf(path: string): string {

@@ -1,4 +1,4 @@
-"""What the add-on does without Blender: questions over HTTP, what comes back, and bones as numbers.
+"""Parts of the add-on without bpy: HTTP requests, decoding, and bones as arrays.
 
-Nothing here imports bpy, so that it is tested by the ordinary interpreter.
+They are tested by an ordinary interpreter.
 """

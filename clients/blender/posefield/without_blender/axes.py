@@ -1,5 +1,7 @@
-"""From the service's axes, Y up and facing +Z, to Blender's, Z up and facing -Y: here and nowhere
-else. And the quaternions, w x y z over arrays (..., 4), that bones need."""
+"""Conversion from the service's axes (Y up, facing +Z) to Blender's (Z up, facing -Y).
+
+Also quaternions, w x y z in arrays (..., 4). No other module converts axes.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -8,31 +10,31 @@ Floats = npt.NDArray[np.float64]
 
 
 def z_up(points: Floats) -> Floats:
-    """Points (..., 3): x, y, z becomes x, -z, y."""
+    """Return points (..., 3) with Z up: x, y, z becomes x, -z, y."""
     return np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1)
 
 
 def z_up_turns(turns: Floats) -> Floats:
-    """Rotations (..., 4): the axis is turned as points are, the angle stays."""
+    """Return rotations (..., 4) with Z up: the axis is converted as points are, the angle stays."""
     return np.concatenate([turns[..., :1], z_up(turns[..., 1:])], axis=-1)
 
 
 def mul(a: Floats, b: Floats) -> Floats:
-    """Product a b: the rotation b followed by a."""
+    """Return the product a b: the rotation b followed by a."""
     v, w = a[..., 1:], b[..., 1:]
     scalar = a[..., :1] * b[..., :1] - (v * w).sum(axis=-1, keepdims=True)
     return np.concatenate([scalar, a[..., :1] * w + b[..., :1] * v + np.cross(v, w)], axis=-1)
 
 
 def conj(turns: Floats) -> Floats:
-    """The inverse of unit quaternions."""
+    """Return the inverse of unit quaternions."""
     return turns * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def of_matrices(matrices: Floats) -> Floats:
-    """Unit quaternions of rotation matrices (..., 3, 3), the eigenvector that fits them best.
+    """Return unit quaternions of rotation matrices (..., 3, 3), by the best-fitting eigenvector.
 
-    Bones keep theirs in float32, which are rotations to seven digits only (Bar-Itzhack 2000).
+    Bones store float32 matrices, which are orthogonal to seven digits only (Bar-Itzhack 2000).
     """
     m = np.swapaxes(matrices, -1, -2)
     k = np.zeros((*m.shape[:-2], 4, 4))
@@ -48,12 +50,12 @@ def of_matrices(matrices: Floats) -> Floats:
 
 
 def unrolled(turns: Floats) -> Floats:
-    """The same rotations (frames, ..., 4) with signs chosen so that neighbours lie close."""
+    """Return the same rotations (frames, ..., 4) with signs such that neighbours are close."""
     dots = (turns[1:] * turns[:-1]).sum(axis=-1)
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
     return np.concatenate([turns[:1], turns[1:] * signs[..., None]])
 
 
 def angle(turns: Floats) -> Floats:
-    """How far each of (..., 4) turns, rad, the shorter way."""
+    """Return the rotation angle of each of (..., 4), rad, at most π."""
     return 2.0 * np.arctan2(np.linalg.norm(turns[..., 1:], axis=-1), np.abs(turns[..., 0]))

@@ -1,8 +1,8 @@
-"""Bones as numbers: where a new armature's lie, and what poses any armature as a clip says.
+"""Bones as arrays: rest pose of a new armature, and channels that pose any armature.
 
-A bone's own axes are its armature's choice: Y points along it. With the bone's rest matrix A, the
-joint's rotation q (in the axes of the armature, local to the parent) is the channel A^-1 q A: then
-the joint turns as the service says, whatever the bone's axes are.
+The axes of a bone depend on its armature: Y points along it. With the bone's rest matrix A, the
+joint's rotation q (in the axes of the armature, local to the parent) is the channel A^-1 q A, which
+rotates the joint as the service intends, whatever the bone's axes.
 """
 
 from dataclasses import dataclass
@@ -16,20 +16,21 @@ from .clips import Clip
 Floats = npt.NDArray[np.float64]
 
 SHORTEST = 0.01
-"""Length of a bone that leads nowhere, m; Blender drops bones without length."""
+"""Least length of a bone, m; Blender removes bones of zero length."""
 
 LISTED = 4
-"""Joints that a message names."""
+"""Largest number of joints named in a message."""
 
 LONGEST_NAME = 63
-"""Bytes of a bone's name."""
+"""Limit of a bone's name, bytes."""
 
 
 @dataclass(frozen=True)
 class Rest:
-    """An armature at rest: matrices (J, 4, 4) of its bones in its own space, in the clip's order.
+    """Rest pose of an armature.
 
-    scale: metres of the scene that one of its units is.
+    matrices: of its bones in its own space (J, 4, 4), in the clip's order. scale: metres of the
+    scene per unit of the armature.
     """
 
     matrices: Floats
@@ -37,16 +38,16 @@ class Rest:
 
     @property
     def heads(self) -> Floats:
-        """Where the bones begin (J, 3), in the armature's units."""
+        """Return the heads of the bones (J, 3), in the armature's units."""
         return self.matrices[:, :3, 3]
 
     @property
     def turns(self) -> Floats:
-        """Unit quaternions (J, 4) of the bones' own axes."""
+        """Return unit quaternions (J, 4) of the bones' own axes."""
         return axes.of_matrices(self.matrices[:, :3, :3])
 
     def offsets(self, parents: list[int]) -> Floats:
-        """From the parents' heads (J, 3); the root's is its head."""
+        """Return the offsets from the parents' heads (J, 3); the root's is its head."""
         found = self.heads.copy()
         found[1:] -= self.heads[parents[1:]]
         return found
@@ -54,8 +55,11 @@ class Rest:
 
 @dataclass(frozen=True)
 class Channels:
-    """What is keyed: turns (F, J, 4) and places (F, 3) of the root, and shifts (J, 3) of the other
-    bones, which hold for all frames."""
+    """Values to key.
+
+    turns: rotations (F, J, 4). path: locations of the root (F, 3). shifts: constant locations of
+    the other bones (J, 3).
+    """
 
     turns: Floats
     path: Floats
@@ -63,9 +67,10 @@ class Channels:
 
 
 def channels(clip: Clip, rest: Rest, keep_lengths: bool) -> Channels:
-    """Channels that pose an armature as the clip says.
+    """Return the channels that pose an armature as the clip.
 
-    Where the armature keeps its lengths nothing shifts; else its joints lie where the clip's do.
+    keep_lengths: True to keep the armature's joints at their bone lengths; False to move them to
+    the clip's positions.
     """
     own = rest.turns
     parents = parent_indices(clip)
@@ -79,7 +84,7 @@ def channels(clip: Clip, rest: Rest, keep_lengths: bool) -> Channels:
 
 
 def at_rest(clip: Clip) -> Floats:
-    """Heads (J, 3) of a new armature, which stands on the ground over the origin, m."""
+    """Return heads (J, 3), m, of a new armature that stands on the ground over the origin."""
     heads = clip.offsets.copy()
     heads[0] = 0.0
     for joint, parent in list(enumerate(parent_indices(clip)))[1:]:
@@ -89,7 +94,7 @@ def at_rest(clip: Clip) -> Floats:
 
 
 def tails(clip: Clip, heads: Floats, tips: dict[str, tuple[float, float, float]]) -> Floats:
-    """Where the bones of a new armature end (J, 3): among their children, else at their tips."""
+    """Return the tails of a new armature's bones (J, 3): their children's mean, else their tips."""
     parents = np.array(parent_indices(clip))
     ends = np.empty_like(heads)
     for joint, name in enumerate(clip.names):
@@ -105,7 +110,10 @@ def tails(clip: Clip, heads: Floats, tips: dict[str, tuple[float, float, float]]
 
 
 def check(clip: Clip, found: dict[str, str | None]) -> None:
-    """Refuse an armature, given as its bones' parents, whose joints are not the clip's."""
+    """Raise Mismatch for an armature with other joints than the clip's.
+
+    found: parent of each of its bones.
+    """
     missing = [name for name in clip.names if name not in found]
     superfluous = [name for name in found if name not in clip.parents]
     elsewhere = [
@@ -130,7 +138,7 @@ def check(clip: Clip, found: dict[str, str | None]) -> None:
 
 
 def check_names(clip: Clip) -> None:
-    """Refuse names that Blender would cut."""
+    """Raise Mismatch for names that Blender would truncate."""
     longest = max(clip.names, key=lambda name: len(name.encode()))
     if len(longest.encode()) > LONGEST_NAME:
         raise faults.Mismatch(
@@ -140,7 +148,7 @@ def check_names(clip: Clip) -> None:
 
 
 def differences(clip: Clip, rest: Rest) -> list[str]:
-    """What an armature that keeps its lengths does not take over, in words."""
+    """Return notes on differences in rest pose and bone lengths that are not transferred."""
     own = rest.offsets(parent_indices(clip)) * rest.scale
     lengths = np.linalg.norm(own, axis=-1), np.linalg.norm(clip.offsets, axis=-1)
     apart = np.abs(lengths[0] - lengths[1])
@@ -164,13 +172,13 @@ def differences(clip: Clip, rest: Rest) -> list[str]:
 
 
 def heading_left(clip: Clip) -> float:
-    """How far the root has turned from the first frame to the last, rad."""
+    """Return the rotation of the root from the first frame to the last, rad."""
     first, last = clip.rotations[0, 0], clip.rotations[-1, 0]
     return float(axes.angle(axes.mul(last, axes.conj(first))))
 
 
 def parent_indices(clip: Clip) -> list[int]:
-    """Index of each joint's parent, -1 for the root."""
+    """Return the index of each joint's parent, -1 for the root."""
     places = {name: index for index, name in enumerate(clip.names)}
     return [-1 if parent is None else places[parent] for parent in clip.parents.values()]
 
@@ -181,7 +189,7 @@ def _turned(turns: Floats, vectors: Floats) -> Floats:
 
 
 def _onward(joint: int, parent: int, heads: Floats) -> Floats:
-    """A short bone in the direction in which its parent leads to it; upward, if in none."""
+    """Return a short bone in the direction from its parent; upward if that has no length."""
     way = heads[joint] - heads[parent] if parent >= 0 else np.zeros(3)
     length = float(np.linalg.norm(way))
     if length < SHORTEST:

@@ -1,4 +1,4 @@
-"""What a model says of itself, as far as a panel needs it."""
+"""Model card, with the entries that the panel needs."""
 
 import json
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from . import faults
 from .service import Service, fetch, path_of
 
 WIDTHS = 100.0
-"""How many widths of its sampled range a control may lie beyond it: the service answers no more."""
+"""Widths of its sampled range by which a control may exceed it; the service refuses more."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """One control parameter and what of it was sampled.
+    """One control parameter and its sampled range.
 
-    values: the distinct sampled values where they are few, else empty.
+    values: the distinct sampled values if they are few, else empty.
     """
 
     name: str
@@ -30,21 +30,21 @@ class Control:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Between what a value must lie for an answer."""
+        """Return the range of values that the service accepts."""
         room = WIDTHS * (self.maximum - self.minimum)
         return self.minimum - room, self.maximum + room
 
     @property
     def sampled(self) -> str:
-        """What was sampled, in words."""
+        """Return the sampled range or values in words."""
         if self.values:
             return ", ".join(f"{value:g}" for value in self.values) + f" {self.unit}"
         return f"{self.minimum:g} to {self.maximum:g} {self.unit}"
 
     def exact(self, value: float) -> float:
-        """The number that a slider means.
+        """Return the number that a slider shows.
 
-        Sliders hold float32: 1.72 comes out as 1.7200000286, and a bound as a value beyond it.
+        Sliders hold float32: 1.72 becomes 1.7200000286, and a limit becomes a value beyond it.
         """
         short = np.float32(value)
         for known in (self.minimum, self.maximum, self.default, *self.values):
@@ -53,16 +53,17 @@ class Control:
         return float(str(short))
 
     def holds(self, value: float) -> bool:
-        """Whether the value lies within what was sampled."""
+        """Return True for a value within the sampled range."""
         return self.minimum <= value <= self.maximum
 
 
 @dataclass(frozen=True)
 class Card:
-    """A model: its controls, its joints and what else may be chosen.
+    """A model: its controls, joints and other settings.
 
-    identity: name@hash, under which answers never change. tips: for some joints a point (3,) that
-    they reach out to, m, Y up. errors: of each level of detail, as a root mean square, m.
+    identity: name@hash, for which responses never change. parents: of each joint by name. tips: end
+    point (3,) of some joints, m, Y up. rate: frames per second. errors: of each level of detail,
+    root mean square, m.
     """
 
     identity: str
@@ -78,11 +79,11 @@ class Card:
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Of each control by name."""
+        """Return the default of each control by name."""
         return {control.name: control.default for control in self.controls}
 
     def warnings(self, values: dict[str, float]) -> list[str]:
-        """A sentence for each control outside what was sampled."""
+        """Return one sentence per control outside the sampled range."""
         return [
             f"{control.name} is {values[control.name]:g}, sampled: {control.sampled}"
             for control in self.controls
@@ -91,12 +92,12 @@ class Card:
 
 
 def get(service: Service, name: str) -> Card:
-    """The card of a model; Unintelligible says what it lacks."""
+    """Return the card of a model; Unintelligible names a missing entry."""
     return decode(fetch(service, path_of(name)))
 
 
 def decode(content: bytes) -> Card:
-    """Card of its JSON text."""
+    """Return the card of its JSON text; Unintelligible names a missing entry."""
     try:
         return _card(json.loads(content))
     except (ValueError, KeyError, TypeError, IndexError) as fault:
@@ -125,7 +126,7 @@ def _card(plain: dict[str, Any]) -> Card:
 
 
 def parents_by_name(names: list[str], parents: list[int]) -> dict[str, str | None]:
-    """Each joint's parent, None for the root; parents come first."""
+    """Return each joint's parent, None for the root; parents come first."""
     return {
         name: names[parent] if parent >= 0 else None
         for name, parent in zip(names, parents, strict=True)

@@ -1,4 +1,4 @@
-"""The question for a clip, and the clip that comes back, already with Z up."""
+"""Requests for clips, and their results with Z up."""
 
 import io
 import json
@@ -17,15 +17,15 @@ from .service import Service, fetch, path_of
 Floats = npt.NDArray[np.float64]
 
 UNIT = 1e-3
-"""How far the length of a quaternion may be from one."""
+"""Largest deviation of a quaternion's length from one."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a model.
+    """Request for a clip of a model.
 
-    model: name, or name@hash. controls: in the units of its card. fps: frames a second. performer:
-    None for somebody who was never seen. level: of detail, 0 the finest.
+    model: name, or name@hash. controls: in the units of its card. fps: frames per second.
+    performer: None for an unseen performer. level: of detail, 0 is the finest.
     """
 
     model: str
@@ -37,7 +37,7 @@ class Question:
     loop: bool = False
 
     def body(self) -> dict[str, Any]:
-        """The same as the service reads it."""
+        """Return the request as the service's JSON."""
         return {
             "controls": self.controls,
             "fps": self.fps,
@@ -54,9 +54,10 @@ class Question:
 class Clip:
     """A motion with Z up, in metres.
 
-    parents: of each joint by name, None for the root. rotations (F, J, 4): unit quaternions w x y z
-    local to the parent, neighbours close. path (F, 3): of the root. offsets (J, 3): from the
-    parents; the root's is zero. rate: frames a second. trust: what the service says of it.
+    parents: of each joint by name, None for the root. rotations: (F, J, 4), unit quaternions w x y
+    z local to the parent, with continuous signs. path: of the root (F, 3). offsets: from the
+    parents (J, 3), zero for the root. rate: frames per second. trust: the service's trust
+    information.
     """
 
     parents: dict[str, str | None]
@@ -68,16 +69,16 @@ class Clip:
 
     @property
     def names(self) -> list[str]:
-        """Joints, parents first."""
+        """Return the joints, parents first."""
         return list(self.parents)
 
     @property
     def sigma(self) -> float:
-        """How far a captured clip would lie from this one, m."""
+        """Return the standard deviation of a captured clip from this one, m."""
         return float(self.trust["sigma"])
 
     def answers(self, model: str, controls: dict[str, float], performer: str | None) -> bool:
-        """Whether it is what that model answers there."""
+        """Return True if the clip is the result for these arguments."""
         said = self.trust["model"], self.trust["controls"], self.trust.get("performer")
         return said == (model, controls, performer)
 
@@ -86,13 +87,13 @@ class Clip:
 
 
 def ask(service: Service, question: Question) -> Clip:
-    """The clip; faults of the service and of what it sends."""
+    """Return the clip; raise Fault for an error of the request or an invalid result."""
     content = fetch(service, path_of(question.model) + "/clip.npz", question.body())
     return decode(content)
 
 
 def decode(content: bytes) -> Clip:
-    """Clip of an npz file with Y up, in metres; Unintelligible says what is wrong with it."""
+    """Return the clip of an npz file with Y up, in metres; Unintelligible describes an error."""
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as found:
             return _clip(found)
@@ -140,7 +141,7 @@ def _check_said(rate: float, trust: dict[str, Any]) -> None:
     known = isinstance(trust["model"], str) and isinstance(trust["controls"], dict)
     if not (known and math.isfinite(trust["sigma"])):
         raise ValueError(f"trust is {trust}, expected a model, its controls and a finite sigma")
-    # Services older than 2.2.0 say neither.
+    # Services older than 2.2.0 report neither flag.
     for flag in ("supported", "performer_seen"):
         if trust.get(flag) not in (None, True, False):
             raise ValueError(f"{flag} is {trust[flag]!r}, expected true or false")

@@ -1,55 +1,55 @@
-"""Why there is no clip.
+"""Errors of requests and imports.
 
 Fault
-├── Offline         Blender may not ask other machines
-├── BadAddress      no address of a service
-├── Unreachable     nobody listens there
-├── TimedOut        too slow
-├── CutOff          the answer ended before its end
-├── Unintelligible  no posefield, or of another version
-├── Refused         the service says why, as RFC 9457 has it
-└── Mismatch        the clip has no place on this armature
+├── Offline         Blender's online access is off
+├── BadAddress      invalid address of a service
+├── Unreachable     no service responds at the address
+├── TimedOut        the timeout was exceeded
+├── CutOff          the response is incomplete
+├── Unintelligible  not a posefield service, or of another version
+├── Refused         problem document of the service (RFC 9457)
+└── Mismatch        the clip does not fit the armature
 """
 
 import json
 
 
 class Fault(Exception):
-    """A question without an answer; the text says what was found and what was expected."""
+    """Base of all errors of the add-on; the text names the found and the expected value."""
 
 
 class Offline(Fault):
-    """Blender may not ask other machines."""
+    """Blender's online access is off, and the service is on another machine."""
 
 
 class BadAddress(Fault):
-    """No address of a service."""
+    """The address is not that of a service."""
 
 
 class Unreachable(Fault):
-    """Nobody listens there."""
+    """No service responds at the address."""
 
 
 class TimedOut(Fault):
-    """The answer takes too long."""
+    """The response exceeded the timeout."""
 
 
 class CutOff(Fault):
-    """The answer ended before its end."""
+    """The response is incomplete."""
 
 
 class Unintelligible(Fault):
-    """What answered is no posefield, or of another version."""
+    """The response is not from a posefield service, or from one of another version."""
 
 
 class Mismatch(Fault):
-    """The clip has no place on this armature."""
+    """The clip does not fit the armature."""
 
 
 class Refused(Fault):
-    """The service says why not.
+    """The service refused the request.
 
-    status: of HTTP. kind: what programs tell the problem by, such as `outside-samples`.
+    status: of HTTP. kind: type of the problem, such as `outside-samples`.
     """
 
     def __init__(self, status: int, kind: str, title: str, detail: str) -> None:
@@ -59,7 +59,7 @@ class Refused(Fault):
 
 
 def of_problem(status: int, content: bytes) -> Refused:
-    """What a service said, or the status alone where it said nothing that can be read."""
+    """Return the error of a problem document, or of the status alone if the document is invalid."""
     try:
         document = json.loads(content)
         kind = str(document["type"]).rpartition(":")[2].rpartition("/")[2]

@@ -1,4 +1,4 @@
-"""A thread that answers the newest question only: whoever drags a slider cares for no other."""
+"""Thread that processes only the newest question, as a moving slider makes others obsolete."""
 
 import threading
 from collections.abc import Callable
@@ -6,9 +6,9 @@ from typing import Any
 
 
 class Latest:
-    """Asks one question at a time, and next the newest of those that came meanwhile.
+    """Thread that processes one question at a time, and next the newest one received meanwhile.
 
-    answer: called in the thread; what it gives or raises is kept until `take`.
+    answer: called in the thread; its result or exception is stored until `take`.
     """
 
     def __init__(self, answer: Callable[[Any], Any]) -> None:
@@ -21,32 +21,32 @@ class Latest:
         self._thread.start()
 
     def ask(self, question: Any) -> None:
-        """Put a question in the place of the one that waits."""
+        """Replace the waiting question."""
         with self._change:
             self._waiting = [question]
             self._change.notify_all()
 
     def take(self) -> list[Any]:
-        """The newest answer, or exception, that nobody has taken; empty where there is none."""
+        """Return the newest result or exception that was not taken yet; empty if there is none."""
         with self._change:
             done, self._done = self._done, []
             return done
 
     @property
     def busy(self) -> bool:
-        """Whether an answer is still to come or to be taken."""
+        """Return True while a result is pending or not taken."""
         with self._change:
             return bool(self._waiting or self._asking or self._done)
 
     def close(self) -> None:
-        """End; a question on its way is still asked, and its answer dropped."""
+        """End the thread; the result of a running question is dropped."""
         with self._change:
             self._ended = True
             self._waiting, self._done = [], []
             self._change.notify_all()
 
     def join(self, seconds: float) -> bool:
-        """Whether the thread has ended in time."""
+        """Return True if the thread ended within some seconds."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
 

@@ -1,4 +1,4 @@
-"""What a clip's trust says was captured, in words; nothing where an older service does not say."""
+"""Support and performer of a clip's trust in words; None from services that do not report them."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,14 +6,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Mark:
-    """A sentence, and whether it is the good one of two."""
+    """A sentence. held: True for the favourable case."""
 
     held: bool
     words: str
 
 
 def support(trust: dict[str, Any]) -> Mark | None:
-    """Whether anything like the clip was captured."""
+    """Return the mark of clips captured near the controls; None if not reported."""
     found = trust.get("supported")
     if found is None:
         return None
@@ -21,7 +21,10 @@ def support(trust: dict[str, Any]) -> Mark | None:
 
 
 def performer(trust: dict[str, Any]) -> Mark | None:
-    """Whether who moves was captured; None too where a model tells nobody apart."""
+    """Return the mark of a captured performer; None if not reported.
+
+    Models without performers do not report one.
+    """
     found = trust.get("performer_seen")
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Questions to a service over HTTP: whole answers, in time, or a fault."""
+"""HTTP requests to a service: complete responses within a time limit, or a Fault."""
 
 import http.client
 import ipaddress
@@ -14,22 +14,22 @@ from typing import Any
 
 from . import faults, timely
 
-CONTRACT = "2"
-"""Major version of the interface that this add-on speaks."""
+CONTRACT = "3"
+"""Major version of the contract that this add-on supports."""
 
 LARGEST = 512 * 1024 * 1024
-"""Bytes of an answer; ten thousand frames of a hundred joints take 16 million."""
+"""Limit of a response, bytes; ten thousand frames of a hundred joints take 16 million."""
 
 PIECE = 1 << 16
 
 
 @dataclass(frozen=True)
 class Service:
-    """Where a service is and who asks it.
+    """Address and credentials of a service.
 
-    address: http or https, without a path or with the one that it is mounted at. key: sent as
-    bearer, where there is one. seconds: that an answer may take. until: the moment of
-    time.monotonic() by which every answer must be there. Raises BadAddress.
+    address: http or https, optionally with the path that it is mounted at. key: bearer token, or
+    "". seconds: time limit of a response. until: time.monotonic() at which all responses must be
+    complete. Raises BadAddress.
     """
 
     address: str
@@ -49,7 +49,7 @@ class Service:
 
     @property
     def is_here(self) -> bool:
-        """Whether it runs on this machine."""
+        """Return True for a service on this machine."""
         host = str(_parts(self.address).hostname)
         if host == "localhost":
             return True
@@ -60,16 +60,16 @@ class Service:
 
     @property
     def is_secret(self) -> bool:
-        """Whether nobody on the way can read what is asked, the key for one."""
+        """Return True if requests are encrypted or stay on this machine."""
         return self.is_here or _parts(self.address).scheme == "https"
 
     def in_all(self) -> "Service":
-        """The same, from now on: all answers together may take what one may."""
+        """Return the service with one time limit for all further responses together."""
         return replace(self, until=time.monotonic() + self.seconds)
 
 
 def check_version(service: Service) -> None:
-    """Refuse what speaks another version of the interface; Unintelligible says which."""
+    """Raise Unintelligible for another service, or another major version of the contract."""
     said = _object(fetch(service, "/livez"), service)
     if said.get("status") != "live":
         raise faults.Unintelligible(f"what answers at {service.address} is no posefield service")
@@ -81,7 +81,7 @@ def check_version(service: Service) -> None:
 
 
 def models(service: Service) -> tuple[tuple[str, str], ...]:
-    """Name and description of each model."""
+    """Return name and description of each model."""
     check_version(service)
     listed = _object(fetch(service, "/v1/models"), service)
     try:
@@ -91,14 +91,14 @@ def models(service: Service) -> tuple[tuple[str, str], ...]:
 
 
 def path_of(model: str) -> str:
-    """Where a model is asked, whatever letters its name has."""
+    """Return the path of a model, with its name quoted."""
     return "/v1/models/" + urllib.parse.quote(model, safe="@")
 
 
 def fetch(service: Service, path: str, body: Mapping[str, Any] | None = None) -> bytes:
-    """A whole answer to a GET, or where there is a body to a POST of it as JSON.
+    """Return the complete response to a GET, or with a body to a POST of it as JSON.
 
-    Raises BadAddress, Unreachable, TimedOut, CutOff, or Refused as the service says.
+    Raises BadAddress, Unreachable, TimedOut, CutOff, Unintelligible, or Refused.
     """
     request, begun = _request(service, path, body), time.monotonic()
     until = min(service.until, begun + service.seconds)
@@ -117,19 +117,19 @@ def fetch(service: Service, path: str, body: Mapping[str, Any] | None = None) ->
     except (OSError, http.client.HTTPException) as fault:
         raise _unreachable(service, fault) from fault
     except ValueError as fault:
-        # Names that no machine can have, such as labels of more than 63 letters.
+        # Invalid host names, such as labels of more than 63 characters.
         raise faults.BadAddress(f"the address is {service.address!r}: {fault}") from fault
 
 
 class _Stay(urllib.request.HTTPRedirectHandler):
-    """Follows nobody: urllib would take the key along to another machine."""
+    """Redirect handler that refuses redirects; urllib would send the key to the other host."""
 
     def redirect_request(self, *_: Any, **__: Any) -> None:
         return None
 
 
 def _opener(service: Service, until: float) -> urllib.request.OpenerDirector:
-    """Whoever is told of a proxy by the environment need not except this machine from it."""
+    """Return an opener that uses the environment's proxy except for this machine."""
     proxies = urllib.request.ProxyHandler({} if service.is_here else None)
     return timely.opener(until, _Stay, proxies)
 
@@ -147,7 +147,7 @@ def _request(service: Service, path: str, body: Mapping[str, Any] | None) -> url
 
 
 def _whole(answer: http.client.HTTPResponse, service: Service) -> bytes:
-    """All bytes of an answer; http.client does not tell by itself when some are missing."""
+    """Return all bytes of a response; http.client does not report missing ones with read1."""
     expected = answer.length
     if expected is None and not answer.chunked:
         raise faults.CutOff(f"the answer of {service.address} does not say where it ends")
@@ -199,7 +199,7 @@ def _object(content: bytes, service: Service) -> dict[str, Any]:
 def _parts(address: str) -> urllib.parse.SplitResult:
     try:
         parts = urllib.parse.urlsplit(address.strip())
-        _ = parts.port  # Looked at for what it raises.
+        _ = parts.port  # Raises ValueError for an invalid port.
         return parts
     except ValueError as fault:
         raise faults.BadAddress(f"the address is {address!r}: {fault}") from fault

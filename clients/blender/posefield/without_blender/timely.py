@@ -1,7 +1,7 @@
-"""An opener of urllib whose answers are whole by a moment, or end with TimeoutError.
+"""urllib opener with a deadline for the whole response, after which it raises TimeoutError.
 
-A socket's own timeout begins anew with each piece: who sends a byte now and then is never too slow
-for it, be it in the head, the body or a refusal.
+A socket's own timeout restarts with each piece, so a server that sends single bytes slowly never
+exceeds it, in the head, the body or an error response.
 """
 
 import http.client
@@ -14,7 +14,7 @@ from typing import Any
 
 
 def opener(until: float, *handlers: Any) -> urllib.request.OpenerDirector:
-    """Opens as urllib does; until: the moment, of time.monotonic()."""
+    """Return an opener of urllib. until: deadline, as time.monotonic()."""
     return urllib.request.build_opener(_Http(until), _Https(until), *handlers)
 
 
@@ -52,7 +52,7 @@ class _Answer(http.client.HTTPResponse):
 
 
 class _Timely(io.RawIOBase):
-    """What a socket receives, each piece in what is left of the time."""
+    """Received bytes of a socket, each read limited to the time left."""
 
     def __init__(self, sock: Any, received: Any, until: float) -> None:
         self._sock, self._received, self._until = sock, received, until
