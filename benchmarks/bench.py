@@ -20,17 +20,15 @@ import export
 import export_cluster
 import export_formats
 import export_usd
+import family
 import newcomer
-import paper
-import precompute
 import runtime
 import serve
 import serve_growth
 import serve_models
 import serve_rivals
+from paper import bench_rows, markdown, measurement
 from rows import Row, table, write
-
-from model_export.evaluate import table1_family, table1_measure, table1_text
 
 ROOT = Path(__file__).parents[1]
 
@@ -38,13 +36,13 @@ ROOT = Path(__file__).parents[1]
 def main() -> None:
     """Measure, print, write."""
     shutil.rmtree(ROOT / "build/bench", ignore_errors=True)
-    made = table1_family.make(ROOT / "build/bench/reaching")
-    table1 = table1_measure.of(made, table1_measure.POINTS, rounds=7)
-    print(table1_text.text(table1), end="\n\n")
+    made = family.make(ROOT / "build/bench/reaching")
+    table1 = measurement.of(made, measurement.POINTS, rounds=7)
+    print(markdown.text(table1), end="\n\n")
     model = ROOT / "build/bench/reaching.onnx"
     model.write_bytes(made.exported.content)
     rows: list[Row] = [
-        *precompute.rows(made),
+        *bench_rows.library_rows(made),
         *runtime.rows(made),
         *exact.rows(made),
         *export_formats.rows(made),
@@ -62,7 +60,7 @@ def main() -> None:
         *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
     ]
     print(table(rows))
-    write([*paper.rows(table1), *rows], ROOT / "build/bench.json")
+    write([*bench_rows.rows(table1), *rows], ROOT / "build/bench.json")
 
 
 if __name__ == "__main__":

@@ -14,14 +14,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import crowd_models
+import family
 import httpx
 import numpy as np
 import orjson
+from family import Family
 from rows import Row, table
+from timing import in_turn
 
-from model_export.evaluate import table1_family
-from model_export.evaluate.table1_family import Family
-from model_export.evaluate.table1_timing import in_turn
 from service.encode import ENCODERS, packs
 from service.export import pack
 from service.synthesis.synthesizer import Synthesizer
@@ -121,4 +121,4 @@ def _most_memory(process: subprocess.Popen[bytes]) -> int:
 
 if __name__ == "__main__":
     with TemporaryDirectory() as folder:
-        print(table(rows(table1_family.make(Path(folder, "family")))))
+        print(table(rows(family.make(Path(folder, "family")))))

@@ -11,10 +11,9 @@ import crowd_models
 import crowd_poses
 import crowd_rivals
 import crowd_walk
+import family
+from family import Family
 from rows import Row, table
-
-from model_export.evaluate import table1_family
-from model_export.evaluate.table1_family import Family
 
 
 def rows(made: Family) -> list[Row]:
@@ -30,4 +29,4 @@ def rows(made: Family) -> list[Row]:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        print(table(rows(table1_family.make(Path(folder) / "reaching"))))
+        print(table(rows(family.make(Path(folder) / "reaching"))))

@@ -7,10 +7,10 @@ import crowd_profile
 import crowd_scene
 from crowd_machine import Machine
 from crowd_profile import Part
+from family import Family
 from rows import Row
+from timing import in_turn
 
-from model_export.evaluate.table1_family import Family
-from model_export.evaluate.table1_timing import in_turn
 from service.synthesis.crowd import BATCH
 from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from family import Family
+from paper import poses
 from scipy import linalg
 
 from model_export import naive
 from model_export.covariance import COVARIANCES
-from model_export.evaluate import table1_pose
-from model_export.evaluate.table1_family import Family
 from model_export.kriging import Kriging
 from service.motion.conventions import Indices, Singles
 
@@ -30,7 +30,7 @@ class Questions:
 
 def solved(made: Family, field: naive.Naive, questions: Questions) -> Answer:
     """Poses by LU factors of each frame's system, made beforehand, and averages of the samples."""
-    factors = [linalg.lu_factor(table1_pose.system(one).astype(np.float32)) for one in field.fields]
+    factors = [linalg.lu_factor(poses.system(one).astype(np.float32)) for one in field.fields]
     values = field.values.astype(np.float32)
     n = values.shape[0]
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import onnxruntime
 from rows import Row
+from timing import in_turn
 
-from model_export.evaluate.table1_timing import in_turn
 from model_export.net import Net
 
 # A product whose three matrices lie in a core's own cache; copies within and far beyond it.

@@ -4,10 +4,10 @@ import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from family import Family
 from threadpoolctl import threadpool_limits
 
 from model_export import export, ingest, recipe, train
-from model_export.evaluate.table1_family import Family
 from model_export.recipe import Recipe
 from model_export.sample import stroll
 from service.synthesis import session

@@ -7,8 +7,8 @@ import crowd_scene
 import numpy as np
 from crowd_scene import AUTO, SEEN, Scene
 from rows import Row
+from timing import in_turn
 
-from model_export.evaluate.table1_timing import in_turn
 from service.synthesis.crowd import BATCH
 from service.synthesis.ports import OUTPUTS
 from service.synthesis.synthesizer import Synthesizer

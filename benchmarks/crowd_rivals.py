@@ -15,12 +15,12 @@ import numpy as np
 import onnxruntime
 from crowd_frames import Answer, Questions
 from crowd_scene import AUTO, Scene
+from family import Family
 from rows import Row
 from scipy.interpolate import RBFInterpolator
+from timing import in_turn
 
 from model_export import naive, variogram
-from model_export.evaluate.table1_family import Family
-from model_export.evaluate.table1_timing import in_turn
 from service.motion.conventions import Indices, Singles
 from service.synthesis.crowd import BATCH
 from service.synthesis.ports import OUTPUTS

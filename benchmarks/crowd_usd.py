@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, table
+from timing import in_turn
 
-from model_export.evaluate.table1_timing import in_turn
-from service.encode import crowd, names
+from service.encode import names
+from service.encode.crowd import writer
 from service.motion import quat
 from service.motion.conventions import Indices
 from service.motion.crowd import CrowdClip, Motions, Placement
@@ -64,7 +65,7 @@ def _against(words: str, theirs: float, ours: float) -> Row:
 
 def _ours(person: Skeleton, made: Motions, path: Path) -> Callable[[], None]:
     played = np.arange(CHARACTERS) % len(made)
-    return lambda: crowd.write(_crowd(person, made, played), path)
+    return lambda: writer.write(_crowd(person, made, played), path)
 
 
 def _crowd(person: Skeleton, made: Motions, played: Indices) -> CrowdClip:

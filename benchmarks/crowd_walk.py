@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import crowd_scene
 import numpy as np
 from rows import Row
+from timing import in_turn
 
-from model_export.evaluate.table1_timing import in_turn
 from service.motion import skeleton
 from service.motion.conventions import Floats, Indices, Singles
 from service.synthesis import view

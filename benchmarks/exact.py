@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from itertools import cycle
 
 import numpy as np
+from family import Family
 from rows import Row
+from timing import in_turn
 
-from model_export.evaluate.table1_family import Family
-from model_export.evaluate.table1_timing import in_turn
 from service.motion.measure import Measure
 from service.synthesis import session
 from service.synthesis.exact import holding

@@ -23,10 +23,10 @@ from pathlib import Path
 from rows import Row, table
 
 from service.encode import ENCODERS
-from service.export import chunks, crew, layouts, manifest, queries, run
-from service.export.crew import Crew
+from service.export import chunks, layouts, manifest, pool, queries, run
+from service.export.checkpoint import Part
 from service.export.job import Job, Work
-from service.export.ledger import Part
+from service.export.pool import Runner
 from service.export.queries import Asked
 from service.export.query import Source
 from service.export.reading import Defaults
@@ -60,43 +60,47 @@ class Bench:
         job = Job(opened.identity, digest, source.digest, "folder", 1)
         return cls(Work(job, content, ""), source)
 
-    def seconds(self, layout: str, by: Crew) -> float:
+    def seconds(self, layout: str, runner: Runner) -> float:
         """Of a whole export."""
         with tempfile.TemporaryDirectory() as target:
             start = time.perf_counter()
-            self.export(layout, by, target)
+            self.export(layout, runner, target)
             return time.perf_counter() - start
 
-    def export(self, layout: str, by: Crew, target: str) -> list[float]:
+    def export(self, layout: str, runner: Runner, target: str) -> list[float]:
         """Export; the peak memory of this process after each chunk, MB."""
         job = replace(self.work.job, layout=layout, chunk=layouts.find(layout).chunk)
-        watch = Watch([])
-        run.run(replace(self.work, job=job, target=target), self.source, watch, by)
-        return watch.peaks
+        monitor = PeakMemory([])
+        run.run(replace(self.work, job=job, target=target), self.source, monitor, runner)
+        return monitor.peaks
 
 
 @dataclass(frozen=True)
-class Watch:
-    """Notes the peak memory of this process after each chunk, MB."""
+class PeakMemory:
+    """Monitor that records the peak memory of this process after each chunk, MB."""
 
     peaks: list[float]
 
     def begin(self, total: int, done: int) -> None:
-        """Nothing is shown."""
+        """Show nothing."""
 
     def advance(self, part: Part) -> None:
-        """Note it."""
+        """Record the peak memory."""
         self.peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
+    def note(self, message: str) -> None:
+        """Print a message."""
+        print(message)
+
     def stopped(self) -> bool:
-        """Never."""
+        """Return False: the export runs to its end."""
         return False
 
 
 def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     """Rates, ratios and shares, with what one process takes of memory."""
     bench = Bench.of(model, clips, form)
-    taken = in_turn({name: partial(bench.seconds, name, crew.alone) for name in layouts.LAYOUTS})
+    taken = in_turn({name: partial(bench.seconds, name, pool.run_here) for name in layouts.LAYOUTS})
     return [
         *_rates(clips, form, taken),
         *_shares(bench, form, taken["folder"] / clips),
@@ -130,8 +134,8 @@ def _rates(clips: int, form: str, taken: dict[str, float]) -> list[Row]:
 def _processes(bench: Bench, clips: int, form: str) -> Row:
     taken = in_turn(
         {
-            "one": partial(bench.seconds, "folder", crew.alone),
-            "two": partial(bench.seconds, "folder", crew.of(2)),
+            "one": partial(bench.seconds, "folder", pool.run_here),
+            "two": partial(bench.seconds, "folder", pool.runner(2)),
         }
     )
     name = f"export of {clips} clips as {form} by two processes, their beginning included"
@@ -178,7 +182,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
         }
         taken = {name: _median(stage) / STAGED for name, stage in stages.items()}
     reading = _median(lambda: (bench.source.survey(), sum(1 for _ in bench.source.rows())))
-    return {"queries, looked at and read": reading / (bench.source.count or 1), **taken}
+    return {"queries, looked at and read": reading / bench.source.survey().total, **taken}
 
 
 def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:
@@ -210,7 +214,7 @@ def _memory(model: Path, clips: int, form: str) -> Row:
 
 def _peaks(model: Path, clips: int, form: str) -> list[float]:
     with tempfile.TemporaryDirectory() as target:
-        return Bench.of(model, clips, form).export("folder", crew.alone, target)
+        return Bench.of(model, clips, form).export("folder", pool.run_here, target)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""How an export scales over Dask workers, and what Dask costs against processes of our own.
+"""How an export scales over Dask workers, and what Dask costs against a pool of processes.
 
     python benchmarks/export_cluster.py MODEL [--clips 8192] [--format usdc]
 
@@ -17,8 +17,8 @@ from distributed import LocalCluster
 from export import Bench
 from rows import Row, table
 
-from service.export import cluster, crew
-from service.export.crew import Crew
+from service.export import cluster, pool
+from service.export.pool import Runner
 
 CLIPS, FORM, LAYOUT = export.LONGER * export.CLIPS, "usdc", "folder"
 GOAL = 1.6
@@ -28,14 +28,14 @@ def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     """Two workers against one, and each number of them against as many processes."""
     bench = Bench.of(model, clips, form)
     with ExitStack() as stack:
-        crews = {
-            "one process": crew.alone,
-            "two processes": crew.of(2),
+        runners = {
+            "one process": pool.run_here,
+            "two processes": pool.runner(2),
             "one worker": stack.enter_context(_workers(1)),
             "two workers": stack.enter_context(_workers(2)),
         }
         taken = export.in_turn(
-            {name: partial(bench.seconds, LAYOUT, by) for name, by in crews.items()}
+            {name: partial(bench.seconds, LAYOUT, runner) for name, runner in runners.items()}
         )
     what = f"export of {clips} clips as {form} by"
 
@@ -51,11 +51,11 @@ def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
 
 
 @contextmanager
-def _workers(count: int) -> Iterator[Crew]:
-    """Crew of so many workers of one thread."""
+def _workers(count: int) -> Iterator[Runner]:
+    """Yield the runner of `count` Dask workers with one thread each."""
     own = LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=":0")
-    with own, cluster.crew(own.scheduler_address) as by:
-        yield by
+    with own, cluster.runner(own.scheduler_address) as runner:
+        yield runner
 
 
 def main() -> None:

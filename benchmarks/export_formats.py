@@ -6,15 +6,15 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import family
+from family import Family
 from rows import Row, table
+from timing import in_turn
 
-from model_export.evaluate import table1_family
-from model_export.evaluate.table1_family import Family
-from model_export.evaluate.table1_timing import in_turn
 from service.encode import ENCODERS
 from service.motion.answer import ClipAnswer
+from service.question.motion_question import ClipQuestion, PoseQuestion
 from service.synthesis import clips, poses, session
-from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 FRAMES, BATCH = 100, 16
@@ -39,8 +39,10 @@ def rows(made: Family) -> list[Row]:
 def _question(model: Synthesizer) -> ClipQuestion:
     """A clip in the middle of the controls, at the rate at which it has so many frames."""
     middle = {control.name: control.default for control in model.session.card.controls}
-    duration = poses.pose(model, PoseQuestion(middle, [0.0], "refuse")).trust.duration
-    return ClipQuestion(middle, (FRAMES - 1) / duration)
+    duration = poses.pose(
+        model, PoseQuestion(controls=middle, times=[0.0], extrapolate="refuse")
+    ).trust.duration
+    return ClipQuestion(controls=middle, fps=(FRAMES - 1) / duration)
 
 
 def _synthesised(model: Synthesizer, question: ClipQuestion) -> list[ClipAnswer]:
@@ -61,4 +63,4 @@ def _row(name: str, seconds: float, joints: int, answer: ClipAnswer) -> Row:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        sys.stdout.write(table(rows(table1_family.make(Path(folder) / "reaching"))) + "\n")
+        sys.stdout.write(table(rows(family.make(Path(folder) / "reaching"))) + "\n")

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, table
+from timing import in_turn
 
-from model_export.evaluate.table1_timing import in_turn
 from service.encode import (
     METRES,
     animation,
@@ -29,7 +29,6 @@ from service.encode import (
     press,
     text,
     usd,
-    usdz,
 )
 from service.encode.character import Rig
 from service.encode.content import Content
@@ -69,7 +68,7 @@ def rows() -> list[Row]:
 
 
 def _form(answers: list[ClipAnswer], form: Form) -> list[Row]:
-    one, made = answers[0], list(usd._authored(answers, METRES))
+    one, made = answers[0], list(usd.authored(answers, METRES))
     expected = [form.ordinary(*each) for each in made]
     if any(form.write(answers, METRES) != expected for _ in range(2)):
         raise AssertionError(f"{form.name} differs from what usd-core writes")
@@ -114,8 +113,8 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
     one = answers[0]
     taken = in_turn(
         {
-            "usdz": lambda: usdz.usdz(answers, METRES),
-            "sdf": lambda: usdz.package(crate.ordinary(*_first([one]))),
+            "usdz": lambda: usd.usdz(answers, METRES),
+            "sdf": lambda: usd.package(crate.ordinary(*_first([one]))),
         },
         rounds=15,
         repeats=2,
@@ -164,10 +163,9 @@ SERIAL = itertools.count()
 
 
 def _new(answers: list[ClipAnswer]) -> None:
-    before = press.CRATES._kept.copy()
-    press.CRATES._kept.clear()
-    usd.usdc(answers, METRES)
-    press.CRATES._kept.update(before)
+    fresh = press.Press(crate, press.CRATES.limit)
+    for each in usd.authored(answers, METRES):
+        fresh.write(*each)
 
 
 def _stage(answer: ClipAnswer, entries: list[library.Entry]) -> bytes:
@@ -175,7 +173,7 @@ def _stage(answer: ClipAnswer, entries: list[library.Entry]) -> bytes:
 
 
 def _first(answers: list[ClipAnswer]) -> tuple[usd.Clips, Content]:
-    return next(usd._authored(answers, METRES))
+    return next(usd.authored(answers, METRES))
 
 
 def _answers(count: int) -> list[ClipAnswer]:

@@ -8,7 +8,7 @@ from time import monotonic
 from faults_known import Answer, Known
 from faults_wire import Wire
 
-UNAVAILABLE = ("overloaded", "late", "not-ready", "no-connection-left", "unsaid")
+UNAVAILABLE = ("overloaded", "late", "not-ready", "unsaid")
 """Problems that may be answered with 503, as the contract says; an answer to HEAD has no body."""
 
 GONE = (OSError, EOFError, TimeoutError)
@@ -63,7 +63,8 @@ class Book:
         """Note an answer to a request that breaks the rules."""
         self.faulty[f"{what} {answer.status}"] += 1
         if answer.status in statuses or self.is_refusal(answer):
-            if answer.status < 400 or answer.problem:
+            # What is not HTTP is answered by the server itself, in plain text.
+            if answer.status <= 400 or answer.problem:
                 return
         self.fault(f"{what}: {answer.status} {answer.body[:200]!r}, expected {statuses}")
 

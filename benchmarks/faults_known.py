@@ -12,9 +12,9 @@ import onnx
 import orjson
 from onnx import numpy_helper
 
-from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
-from service.encode.grids import GRID_ENCODERS
+from service.encode import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
 from service.encode.packs import PACKS
+from service.motion import checksum
 from service.motion.card import Control
 from service.synthesis import session
 from service.synthesis.library import Library
@@ -63,7 +63,11 @@ class Question:
 
     def content(self, model: str) -> bytes:
         """As it travels."""
-        lines = [f"{self.method} /v1/models/{model}{self.rest} HTTP/1.1", "Host: x", *self.headers]
+        lines = [
+            f"{self.method} /v1/models/{model}{self.rest} HTTP/1.1",
+            "Host: localhost",
+            *self.headers,
+        ]
         if self.body:
             lines.append(f"Content-Length: {len(self.body)}")
         return "\r\n".join([*lines, "", ""]).encode() + self.body
@@ -90,7 +94,9 @@ def other_version(content: bytes) -> bytes:
         if tensor.name == "core":
             values = numpy_helper.to_array(tensor) * np.float32(1.01)
             tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
-    return bytes(model.SerializeToString())
+    # The checksum is the last entry.
+    del model.metadata_props[-1]
+    return checksum.sealed(bytes(model.SerializeToString()))
 
 
 def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:
@@ -117,7 +123,7 @@ def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:
 async def answered(app: App, question: Question, model: str) -> Answer:
     """Answer of an application in this process."""
     url = urlsplit(f"/v1/models/{model}{question.rest}")
-    pairs = [line.split(": ", 1) for line in ("Host: x", *question.headers)]
+    pairs = [line.split(": ", 1) for line in ("Host: localhost", *question.headers)]
     scope = {
         "type": "http",
         "http_version": "1.1",

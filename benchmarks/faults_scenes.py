@@ -13,15 +13,14 @@ from time import monotonic
 
 import httpx
 from faults_book import Book
-from faults_clients import BODY_TIME, HEAD_TIME
-from serve_process import POSEFIELD, children, resident
+from serve_process import POSEFIELD, accepts, children, command, resident
 
 WORKERS = 2
 SETTINGS = {
     "POSEFIELD_WORKERS": str(WORKERS),
     "POSEFIELD_RELOAD": "1",
-    "POSEFIELD_HEAD_TIME": str(HEAD_TIME),
-    "POSEFIELD_BODY_TIME": str(BODY_TIME),
+    # Longer than the longest pause of a client that keeps its connection.
+    "POSEFIELD_DRAIN": "5",
     # Few, so that the refusal is seen too.
     "POSEFIELD_CONCURRENCY": "12",
 }
@@ -64,6 +63,7 @@ class Stage:
         if not await self.child.stdout.readline():
             sys.exit(f"the service does not start:\n{self.log.read_text()[-3000:]}")
         self.book.listening = True
+        await _until(self, self.complete, "not all workers started")
 
     async def end(self) -> None:
         """Tell the service to end; it does so by itself, and says that all went well."""
@@ -81,8 +81,15 @@ class Stage:
             self.book.fault(f"SIGTERM: exit code {code}")
 
     def workers(self) -> list[int]:
-        """Process ids of the workers."""
-        return children(self.child.pid) if self.child and self.child.returncode is None else []
+        """Process ids of the workers; multiprocessing's tracker of resources is a child, too."""
+        if self.child is None or self.child.returncode is not None:
+            return []
+        return [pid for pid in children(self.child.pid) if b"spawn_main" in command(pid)]
+
+    def complete(self) -> bool:
+        """Return whether all workers answer; one that starts cannot open a file that is broken."""
+        own = self.workers()
+        return len(own) == WORKERS and all(accepts(pid, self.port) for pid in own)
 
     async def watch(self) -> None:
         """Look at the workers' memory every second."""
@@ -158,7 +165,11 @@ async def killing(stage: Stage, rng: random.Random) -> None:
     worker = rng.choice(stage.workers())
     stage.book.killed.append(monotonic())
     os.kill(worker, signal.SIGKILL)
-    await _until(stage, lambda: len(stage.workers()) == WORKERS and worker not in stage.workers())
+
+    def replaced() -> bool:
+        return worker not in stage.workers() and stage.complete()
+
+    await _until(stage, replaced, "a killed worker was not replaced")
 
 
 async def restarting(stage: Stage, rng: random.Random) -> None:
@@ -196,10 +207,10 @@ async def _settled(stage: Stage, is_so: Callable[[dict], object]) -> None:
             await asyncio.sleep(0.1)
 
 
-async def _until(stage: Stage, is_so: Callable[[], bool]) -> None:
+async def _until(stage: Stage, is_so: Callable[[], bool], fault: str) -> None:
     end = monotonic() + 30
     while not is_so():
         if monotonic() > end:
-            stage.book.fault("a killed worker was not replaced within 30 s")
+            stage.book.fault(f"{fault} within 30 s")
             return
         await asyncio.sleep(0.1)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from family import Family
 
 from model_export import align, decoder, field_graph
 from model_export.covariance import COVARIANCES
-from model_export.evaluate.table1_family import Family
 from model_export.ladder import Ladder
 from model_export.naive import Naive
 from model_export.net import Net

@@ -10,11 +10,11 @@ from typing import Any
 import naive_graphs
 import numpy as np
 import onnxruntime
+from family import Family
 from rows import Row
+from timing import in_turn
 
 from model_export import naive, variogram
-from model_export.evaluate.table1_family import Family
-from model_export.evaluate.table1_timing import in_turn
 from service.synthesis import freeze
 
 FRAMES, POSES = 100, 256

@@ -20,6 +20,9 @@ from tempfile import TemporaryDirectory
 import httpx
 from rows import Row, table
 
+from service.motion import checksum
+from service.synthesis import protobuf
+
 POSEFIELD = Path(sys.executable).with_name("posefield")
 MODEL = Path("build/models/reaching.onnx")
 STARTS, RELOADS = 5, 20
@@ -38,8 +41,14 @@ def rows(model: Path) -> list[Row]:
 
 
 def content(model: Path, number: int) -> bytes:
-    """The model in other bytes, which answer the same: a doc_string of its own."""
-    return model.read_bytes() + b"\x32\x04" + b"%04d" % number
+    """The model in other bytes, which answer the same: a number in its metadata."""
+    return numbered(model.read_bytes(), number)
+
+
+def numbered(sealed: bytes, number: int) -> bytes:
+    """A model file with a number in its metadata, and the checksum of that."""
+    entry = protobuf.nested(1, b"number") + protobuf.nested(2, b"%04d" % number)
+    return checksum.sealed(sealed[: -checksum.SIZE] + protobuf.nested(14, entry))
 
 
 def _models(model: Path, folder: Path, count: int) -> None:
@@ -162,7 +171,7 @@ def _asked(client: httpx.Client, question: dict[str, float], seconds: float) -> 
 def _replace(folder: Path, number: int) -> None:
     path = folder / "model0.onnx"
     aside = folder / "aside"
-    aside.write_bytes(path.read_bytes()[:-6] + b"\x32\x04" + b"%04d" % (1000 + number))
+    aside.write_bytes(numbered(path.read_bytes(), 1000 + number))
     aside.rename(path)
 
 

@@ -1,6 +1,7 @@
 """Servers as processes of their own on the first core, and what they take of the machine."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -15,6 +16,8 @@ import httpx
 HERE = Path(__file__).parent
 POSEFIELD = Path(sys.executable).with_name("posefield")
 PATIENCE = 60.0
+LISTENING = "0A"
+"""State of a socket in /proc/net/tcp."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,14 @@ def resident(process: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def command(process: int) -> bytes:
+    """Return the command line of a process, its words apart by null bytes; empty if it has gone."""
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
 def children(process: int) -> list[int]:
     """Processes that a process has started, from any of its threads."""
     found = []
@@ -106,6 +117,23 @@ def children(process: int) -> list[int]:
         except (FileNotFoundError, ProcessLookupError):
             continue
     return found
+
+
+def accepts(process: int, port: int) -> bool:
+    """Return whether the event loop of a process waits for connections at an IPv4 port."""
+    sockets = {
+        f"socket:[{fields[9]}]"
+        for fields in map(str.split, Path("/proc/net/tcp").read_text().splitlines()[1:])
+        if fields[1].endswith(f":{port:04X}") and fields[3] == LISTENING
+    }
+    try:
+        own = Path(f"/proc/{process}/fd").iterdir()
+        listening = {fd.name for fd in own if str(fd.readlink()) in sockets}
+        watched = "".join(fd.read_text() for fd in Path(f"/proc/{process}/fdinfo").iterdir())
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    # Files that an epoll instance watches.
+    return bool(listening & set(re.findall(r"^tfd:\s+(\d+)", watched, re.MULTILINE)))
 
 
 def _family(process: int) -> Iterator[int]:

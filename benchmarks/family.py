@@ -1,0 +1,72 @@
+"""The procedural reaching family at the paper's size, trained once for several benchmarks."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from model_export import export, ingest, recipe, train
+from model_export.export import Exported
+from model_export.ingest import Example
+from model_export.sample import write
+from model_export.train import Trained
+from service.motion.conventions import Floats
+
+
+@dataclass(frozen=True)
+class Family:
+    """A trained family of N clips on J joints.
+
+    vectors (N, T, 3 + 3 J): pose vectors of the aligned clips. varies (3 + 3 J,): mask of the
+    degrees of freedom that vary. offsets (N, J, 3): bone offsets, m. seconds: training time.
+    """
+
+    examples: tuple[Example, ...]
+    trained: Trained
+    exported: Exported
+    vectors: Floats
+    varies: Floats
+    offsets: Floats
+    seconds: float
+
+    @property
+    def parents(self) -> tuple[int, ...]:
+        """Parent index of each joint."""
+        return self.trained.skeleton.parents
+
+    @property
+    def samples(self) -> Floats:
+        """Controls (N, d) in half-ranges."""
+        return self.trained.laid.half_ranges
+
+    @property
+    def numbers(self) -> Floats:
+        """Pose vectors (N, T, D) of the degrees of freedom that vary."""
+        return self.vectors[..., self.varies]
+
+
+def make(folder: Path) -> Family:
+    """Write and train the family of 92 clips, 100 frames and 94 degrees of freedom.
+
+    Training is limited to one thread: the matrices are small, and on a busy machine threads that
+    wait for each other take ten times as long.
+    """
+    path = write.family(folder)
+    start = time.perf_counter()
+    with threadpool_limits(limits=1):
+        own = recipe.read(path)
+        examples, notes = ingest.ingest(own, path.parent)
+        trained = train.train(own, examples, lambda _: None)
+        exported = export.export(own, trained, notes)
+    return of(trained, exported, time.perf_counter() - start)
+
+
+def of(trained: Trained, exported: Exported, seconds: float) -> Family:
+    """Return the family of a trained and exported model."""
+    aligned = trained.aligned
+    vectors = trained.tensor.chart.numbers(aligned.rotations, aligned.root_path)
+    varies = np.any(trained.tensor.unwhiten != 0.0, axis=1)
+    offsets = np.stack([example.offsets for example in trained.examples])
+    return Family(trained.examples, trained, exported, vectors, varies, offsets, seconds)

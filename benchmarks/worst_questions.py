@@ -1,0 +1,202 @@
+"""Candidates for the worst legal request of each operation, as far as its limits let it grow."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from service.encode import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from service.motion.errors import InvalidField
+from service.question import words
+from service.question.walk_question import WalkQuestion
+from service.synthesis import library
+from service.synthesis.course import MOST_POSES
+from service.synthesis.exact.goals import MOST_TARGETS
+from service.synthesis.synthesizer import Synthesizer
+from service.web import crowd_query, walk_query
+from service.web.settings import Settings
+
+SETTINGS = Settings()
+GRID = 256
+JOINT = "RightHand"
+
+
+@dataclass(frozen=True)
+class Question:
+    """A request of a model's file: GET, or POST where there is a body."""
+
+    operation: str
+    said: str
+    model: Path
+    path: str
+    body: bytes = b""
+
+
+def of(reaching: Path, walk: Path) -> Iterator[Question]:
+    """Yield the candidates of all operations that make something."""
+    ((name, model),) = library.load([reaching]).models.items()
+    one = _Asked(reaching, f"/v1/models/{name}", model)
+    yield from _poses(one)
+    yield from _clips(one)
+    yield from _archives(one)
+    yield from _crowds(one)
+    yield from _grids(one)
+    yield Question("why", "all clips", reaching, f"{one.path}/why?nearest=10000")
+    yield Question("suggestions", "count=200", reaching, f"{one.path}/suggestions?count=200")
+    for path in ("/v1/models", one.path, "/", "/docs", "/problems", "/openapi.json", "/metrics"):
+        yield Question(f"GET {path}", "", reaching, path)
+    ((name, model),) = library.load([walk]).models.items()
+    yield from _walks(_Asked(walk, f"/v1/models/{name}", model))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The model that is asked, and the path of its operations."""
+
+    file: Path
+    path: str
+    model: Synthesizer
+
+    @property
+    def controls(self) -> dict[str, float]:
+        return {control.name: control.default for control in self.model.session.card.controls}
+
+    def targets(self, count: int) -> list[dict[str, Any]]:
+        """Targets that contradict each other."""
+        end = self.model.session.card.durations[0]
+        return [
+            {"joint": JOINT, "time": end * i / count, "position": [(-1) ** i, 1.0, 1.0]}
+            for i in range(count)
+        ]
+
+    def post(self, operation: str, said: str, rest: str, body: Mapping[str, Any]) -> Question:
+        content = json.dumps(body, separators=(",", ":")).encode()
+        return Question(operation, said, self.file, f"{self.path}/{rest}", content)
+
+    def get(self, operation: str, said: str, rest: str) -> Question:
+        return Question(operation, said, self.file, f"{self.path}/{rest}")
+
+
+def _poses(one: _Asked) -> Iterator[Question]:
+    end = one.model.session.card.durations[0]
+    # Of few digits: the body is bounded, too.
+    times = [round(end * i / MOST_POSES, 3) for i in range(MOST_POSES)]
+    for ending in POSE_ENCODERS:
+        asked = {"controls": one.controls, "times": times}
+        yield one.post("pose", f"{MOST_POSES} times, {ending}", f"pose.{ending}", asked)
+    held = {"controls": {}, "targets": one.targets(MOST_TARGETS), "times": times}
+    yield one.post("pose", f"{MOST_TARGETS} targets, open controls, all times, json", "pose", held)
+
+
+def _clips(one: _Asked) -> Iterator[Question]:
+    for ending in ENCODERS:
+        asked = {"controls": one.controls, "fps": 1000}
+        yield one.post("clip", f"fps=1000, {ending}", f"clip.{ending}", asked)
+    targets = {"controls": {}, "targets": one.targets(MOST_TARGETS), "fps": 1000}
+    said = f"{MOST_TARGETS} targets, fps=1000, json"
+    yield one.post("clip", said, "clip.json", targets | {"controls": one.controls})
+    yield one.post("clip", f"{said}, open controls", "clip.json", targets)
+
+
+def _archives(one: _Asked) -> Iterator[Question]:
+    count = SETTINGS.clips_limit
+    # As many frames as all may have, in clips of the mean length.
+    rate = int(SETTINGS.clips_poses / count / one.model.session.card.durations[1]) - 1
+    for ending in ENCODERS:
+        clips = [{"controls": one.controls, "fps": rate}] * count
+        said = f"{count} clips of {rate} frames a second, {ending}"
+        yield one.post("clips", said, "clips.zip", {"format": ending, "clips": clips})
+    cost = SETTINGS.clips_targets
+    given = {"controls": one.controls, "targets": one.targets(MOST_TARGETS)}
+    clips = [given] * (cost // MOST_TARGETS)
+    said = f"{len(clips)} clips of {MOST_TARGETS} targets, json"
+    yield one.post("clips", said, "clips.tar", {"format": "json", "clips": clips})
+    clips = [{"controls": {}, "targets": one.targets(1)}] * (cost // 4)
+    said = f"{len(clips)} clips of a target, open controls, json"
+    yield one.post("clips", said, "clips.tar", {"format": "json", "clips": clips})
+
+
+def _crowds(one: _Asked) -> Iterator[Question]:
+    for ending, encoder in CROWD_ENCODERS.items():
+        count = int(min(SETTINGS.crowd_limit, encoder.most))
+        asked = {"controls": one.controls, "time": [0.1] * count}
+        yield one.post("crowd of poses", f"{count} characters, {ending}", f"crowd.{ending}", asked)
+        said = f"{count} characters, all columns, blended, {ending}"
+        yield one.post("crowd of poses", said, f"crowd.{ending}", _columns(one, count))
+    # As many numbers as are decoded, to be refused then.
+    count = crowd_query.VALUES * SETTINGS.crowd_limit - 1000
+    asked = {"controls": one.controls, "time": [0] * count}
+    yield one.post("crowd of poses", f"{count} numbers", "crowd.arrow", asked)
+
+
+def _columns(one: _Asked, count: int) -> dict[str, Any]:
+    """Question for a crowd in which each character has a number of its own for everything."""
+    own = [1.0 + i / 7 / count for i in range(count)]
+    controls = {name: [value * share for share in own] for name, value in one.controls.items()}
+    return {
+        "controls": controls,
+        "time": [share / 9 for share in own],
+        "position": [[share * 7, 0.0, share * 3] for share in own],
+        "heading": own,
+        "level": [0] * count,
+        "from_level": [1] * count,
+        "blend": [share / 2 for share in own],
+    }
+
+
+def _grids(one: _Asked) -> Iterator[Question]:
+    across, along = list(one.controls)[:2]
+    for ending in GRID_ENCODERS:
+        rest = f"sigma.{ending}?across={across}&along={along}&columns={GRID}&rows={GRID}"
+        yield one.get("sigma", f"{GRID} x {GRID}, {ending}", rest)
+
+
+def _walks(one: _Asked) -> Iterator[Question]:
+    """One motion as long as may be, and most characters, motions and frames, in all forms."""
+    longest = (SETTINGS.crowd_frames - 1) / 30
+    shapes: dict[str, Callable[[int], str]] = {
+        "one character": lambda n: f"count=1&seconds={min(n / 30, longest):.3f}",
+        "characters of one motion": lambda n: f"count={n}&motions=1&seconds=0.1",
+        "characters of 100 motions of 10 s": lambda n: f"count={n}&motions=100&seconds=10",
+        "motions of 0.1 s": lambda n: f"count={n}&seconds=0.1",
+        "motions of 10 s": lambda n: f"count={n}&seconds=10",
+        "motions of 1000 s": lambda n: f"count={n}&seconds=1000",
+        "motions of 10 s, seen by a camera": lambda n: f"count={n}&seconds=10&camera=0,2,0",
+    }
+    for ending in ("usdz", "usdc", "usda"):
+        for said, shape in shapes.items():
+            yield _largest(one, ending, "references", said, shape)
+        for said in ("characters of one motion", "motions of 10 s"):
+            yield _largest(one, ending, "flatten", said, shapes[said])
+
+
+def _largest(
+    one: _Asked, ending: str, instancing: str, said: str, shape: Callable[[int], str]
+) -> Question:
+    def query(number: int) -> str:
+        return f"{shape(number)}&instancing={instancing}"
+
+    number = most(lambda n: _legal(one, ending, query(n)))
+    rest = f"crowd.{ending}?{query(number)}"
+    return one.get("walking crowd", f"{number} {said}: {rest}", rest)
+
+
+def _legal(one: _Asked, ending: str, query: str) -> bool:
+    pairs = [tuple(pair.split("=")) for pair in query.split("&")]
+    try:
+        asked = words.question(WalkQuestion, pairs)
+        joints = len(one.model.session.card.skeleton)
+        walk_query.order(asked, ending, joints, SETTINGS)
+    except InvalidField:
+        return False
+    return True
+
+
+def most(legal: Callable[[int], bool]) -> int:
+    """Return the largest number up to 100,000 that is legal, as all smaller ones are."""
+    low, high = 0, 100_001
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if legal(middle) else (low, middle)
+    return low
