@@ -1,5 +1,6 @@
-# Everything a fresh machine needs is Python 3.11 and make.
-PYTHON ?= python3.11
+# Everything a fresh machine needs is make and one of these; 3.11 goes first, as the image runs on it
+# and Blender's own module needs it.
+PYTHON ?= python3.11 python3.12 python3.13 python3
 VENV := .venv
 BIN := $(VENV)/bin
 UV_VERSION := 0.13.8
@@ -7,15 +8,18 @@ SAMPLE := build/sample/reaching
 MODEL := build/models/reaching.onnx
 ENV := $(VENV)/.installed
 
+# Without bytecode each of the processes that tests start compiles three thousand modules anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 
 .PHONY: help
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 # The lock file decides every version; the stamp makes the install happen once.
 $(ENV): pyproject.toml uv.lock
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	test -x $(BIN)/python || { python=$$(.ci/find-python $(PYTHON)) && "$$python" -m venv $(VENV); }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
 	UV_PROJECT_ENVIRONMENT=$(VENV) $(BIN)/uv sync --frozen --inexact --all-extras --quiet
 	@touch $@
@@ -25,21 +29,26 @@ install: $(ENV) ## install into .venv what the lock file names
 
 # Node comes with the environment; packages are those of the lock file.
 NODE := clients/node_modules/.installed
-$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json | $(ENV)
+$(NODE): clients/package.json clients/package-lock.json clients/docs/package.json clients/typescript/package.json clients/viewer/package.json | $(ENV)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --prefix clients --silent --no-audit --no-fund
 	@touch $@
 
 .PHONY: node
 node: $(NODE) ## install into clients/node_modules what its lock file names
 
-# What the service answers `/` with: one file, made of the page's sources and of nothing else; and what
+# The service's answer to `/`: one file, made of the page's sources and of nothing else; and the files that
 # `posefield page` lays beside it for hosts without a service.
 PAGE := service/web/viewer/index.html
 $(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.offline.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
+# The service's answer to `/docs`: one file with Swagger UI in it, which reads the contract from the service.
+DOCS := service/web/docs/index.html
+$(DOCS): $(NODE) $(shell find clients/docs/src -type f) clients/docs/index.html clients/docs/vite.config.ts clients/tsconfig.base.json clients/docs/tsconfig.json
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/docs --silent
+
 .PHONY: page
-page: $(PAGE) ## build the page that the service shows at /
+page: $(PAGE) $(DOCS) ## build the pages that the service shows at / and /docs
 
 $(SAMPLE)/recipe.toml: | $(ENV)
 	$(BIN)/posefield sample reaching --output $(SAMPLE)
@@ -52,26 +61,39 @@ demo: $(MODEL) ## sample, train, serve, ask over HTTP: clips in build/demo
 	$(BIN)/python clients/demo.py $(MODEL) build/demo
 
 .PHONY: run
-run: $(MODEL) $(PAGE) ## the same, but the service stays up on port 8000
+run: $(MODEL) $(PAGE) $(DOCS) ## the same, but the service stays up on port 8000
 	$(BIN)/posefield serve build/models
 
 .PHONY: addon
 addon: $(ENV) ## the Blender add-on as an archive to install, in build
 	$(BIN)/python clients/blender/archive.py build
 
+# Types are checked beside the tests: neither alone keeps two processors busy.
 .PHONY: test
-test: $(PAGE) ## lint, types, layers and all tests (no Blender, no browser)
+test: $(PAGE) $(DOCS) ## lint, types, layers, unit tests, the contract in process: some minutes
+	$(MAKE) --no-print-directory -j2 lint types unit
+
+.PHONY: lint
+lint: $(ENV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/lint-imports
 
-.PHONY: interop
-interop: $(PAGE) ## other readers of our files, other engines of a model, the image really built
+.PHONY: types
+types: $(ENV)
+	$(BIN)/mypy
+
+.PHONY: unit
+unit: $(PAGE) $(DOCS)
+	$(BIN)/python -m pytest -n auto -m "not system"
+
+.PHONY: test-system
+test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, stores, clusters, browsers, Blender, the image
+	$(BIN)/python -m pytest -n auto -m system
 	$(BIN)/python tests/interop/run.py
 
 .PHONY: audit
-audit: $(ENV) ## ask OSV for known vulnerabilities of what the lock file names
+audit: $(ENV) ## ask OSV for known vulnerabilities of what the lock file names; fails where it cannot ask
 	.ci/audit
 
 .PHONY: bench
@@ -84,4 +106,4 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist service/web/viewer service/web/offline clients/node_modules .venv .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist service/web/docs service/web/viewer service/web/offline clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,4 +1,4 @@
-"""Requests to an app in this process or a service in its own, and archives that it answers with."""
+"""Helpers for requests to an app in this process or to a service, and for archives in responses."""
 
 import asyncio
 import io
@@ -25,7 +25,7 @@ Ask = Callable[..., httpx.Response]
 def asker(app: ASGIApp) -> Ask:
     async def send(method: str, url: str, **content: Any) -> httpx.Response:
         transport = httpx.ASGITransport(app)
-        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.request(method, url, **content)
 
     return lambda *args, **kwargs: asyncio.run(send(*args, **kwargs))

@@ -1,4 +1,4 @@
-"""A Dask scheduler and its workers as processes of their own, as on a cluster."""
+"""Dask scheduler and workers as separate processes, as on a cluster."""
 
 import json
 import os

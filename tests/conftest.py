@@ -1,149 +1,178 @@
-"""What many tests need: random numbers from one seed, and a small model really trained."""
+"""Shared fixtures: random numbers with a fixed seed, and small trained models.
+
+Heavy modules are imported in the fixtures that need them, so that other tests start fast.
+"""
+
+from __future__ import annotations
 
 import os
 import shutil
 import sys
-import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
-import stores
 
-from model_export import export, ingest, recipe, train
-from model_export.export import Exported
-from model_export.ingest import Example
-from model_export.recipe import Recipe
-from model_export.sample import stroll, write
-from model_export.train import Trained
-from service import cli
+if TYPE_CHECKING:
+    import numpy as np
+
+    from model_export.export import Exported
+    from model_export.ingest import Example
+    from model_export.recipe import Recipe
+    from model_export.train import Trained
+
+
+# Coverage measures pytest-xdist's workers, but not their child processes: some of these are killed
+# while they would write their data.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.pop("COVERAGE_PROCESS_CONFIG", None)
+
+SLOW = {"address", "full_family", "real_data", "store"}
+"""Fixtures whose tests belong to the system ring: a service, the training of the whole family as a
+command, real motion capture, and an object store."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of the slow fixtures as `system`, before pytest selects by mark."""
+    for item in items:
+        if SLOW.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.system)
 
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory) -> Iterator[str]:
-    """Address of an object store's server."""
+    """Yield the address of an object store's server."""
+    import stores
+
     with stores.serving(tmp_path_factory.mktemp("store") / "said") as address:
         yield address
 
 
 @pytest.fixture
 def store_environment(store, monkeypatch) -> None:
-    """The environment that says where the store is and who asks."""
+    """Set the environment variables of the store's address and credentials."""
+    import stores
+
     for name, value in stores.told(store).items():
         monkeypatch.setenv(name, value)
 
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """Random numbers from a fixed seed."""
+    """Return a random number generator with a fixed seed."""
+    import numpy as np
+
     return np.random.Generator(np.random.PCG64(0))
 
 
 @pytest.fixture(scope="session")
-def reaching_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The whole procedural family on disk; its recipe is recipe.toml."""
-    folder = tmp_path_factory.mktemp("reaching") / "family"
-    write.family(folder)
-    return folder
+def models_trained():
+    """Return the module `fixture_models`, which imports the training packages."""
+    import fixture_models
+
+    return fixture_models
 
 
 @pytest.fixture(scope="session")
-def small_recipe(reaching_folder: Path) -> Recipe:
-    """A recipe of every clip of the family at few frames, which trains in a few seconds."""
-    whole = recipe.read(reaching_folder / "recipe.toml")
-    motion = whole.motion.model_copy(update={"frames": 40})
-    return whole.model_copy(update={"motion": motion})
+def reaching_folder(models_trained) -> Path:
+    """Return the folder of the whole procedural family; its recipe is recipe.toml."""
+    return models_trained.family()
 
 
 @pytest.fixture(scope="session")
-def examples(small_recipe: Recipe, reaching_folder: Path) -> list[Example]:
-    """The family's clips, every second one."""
-    return ingest.ingest(small_recipe, reaching_folder)[0][::2]
+def small_recipe(models_trained) -> Recipe:
+    """Return a recipe of all clips of the family with few frames; it trains in seconds."""
+    return models_trained.small_recipe()
 
 
 @pytest.fixture(scope="session")
-def trained(small_recipe: Recipe, examples: list[Example]) -> Trained:
-    """A small model of the procedural family."""
-    return train.train(small_recipe, examples, lambda _: None)
+def examples(models_trained) -> list[Example]:
+    """Return every second clip of the family."""
+    return models_trained.examples("reaching")
 
 
 @pytest.fixture(scope="session")
-def exported(small_recipe: Recipe, trained: Trained) -> Exported:
-    """The small model with its levels of detail and its file's content."""
-    return export.export(small_recipe, trained, [])
+def trained(models_trained) -> Trained:
+    """Return a small model of the procedural family."""
+    return models_trained.trained("reaching")
 
 
 @pytest.fixture(scope="session")
-def model_path(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The small model as a file, reaching.onnx."""
-    path = tmp_path_factory.mktemp("models") / "reaching.onnx"
-    path.write_bytes(exported.content)
-    return path
+def exported(models_trained) -> Exported:
+    """Return the small model with its levels of detail and the content of its file."""
+    return models_trained.exported("reaching")
 
 
 @pytest.fixture(scope="session")
-def labelled_recipe(small_recipe: Recipe) -> Recipe:
-    """The small recipe with its three performers told apart, and little to choose from."""
-    told = {"label": "performer", "covariance": "matern52", "drift": 1}
-    kriging = small_recipe.kriging.model_copy(update=told)
-    return small_recipe.model_copy(update={"kriging": kriging})
+def model_file(tmp_path_factory) -> Callable[[str], Path]:
+    """Return a function from the name of a trained model to a copy of its file."""
+
+    def copied(name: str) -> Path:
+        import fixture_cache
+
+        path = tmp_path_factory.mktemp("models") / f"{name}.onnx"
+        shutil.copy(fixture_cache.model(name), path)
+        return path
+
+    return copied
 
 
 @pytest.fixture(scope="session")
-def labelled(labelled_recipe: Recipe, examples: list[Example]) -> Trained:
-    """A small model of the procedural family that knows its performers."""
-    return train.train(labelled_recipe, examples, lambda _: None)
+def model_path(model_file) -> Path:
+    """Return the path of the small model's file, reaching.onnx."""
+    return model_file("reaching")
 
 
 @pytest.fixture(scope="session")
-def labelled_exported(labelled_recipe: Recipe, labelled: Trained) -> Exported:
-    """The model that knows its performers with its levels of detail and its file's content."""
-    return export.export(labelled_recipe, labelled, [])
+def labelled_recipe(models_trained) -> Recipe:
+    """Return the small recipe with its three performers as labels, and one kernel to fit."""
+    return models_trained.labelled_recipe()
 
 
 @pytest.fixture(scope="session")
-def labelled_path(labelled_exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The model that knows its performers as a file, labelled.onnx."""
-    path = tmp_path_factory.mktemp("models") / "labelled.onnx"
-    path.write_bytes(labelled_exported.content)
-    return path
+def labelled(models_trained) -> Trained:
+    """Return a small model of the procedural family with performers."""
+    return models_trained.trained("labelled")
 
 
 @pytest.fixture(scope="session")
-def strides(tmp_path_factory: pytest.TempPathFactory) -> list[Example]:
-    """Strides of the procedural walk."""
-    folder = stroll.write(tmp_path_factory.mktemp("strides"))
-    return ingest.ingest(stroll.recipe(), folder)[0]
+def labelled_exported(models_trained) -> Exported:
+    """Return the model with performers, its levels of detail and the content of its file."""
+    return models_trained.exported("labelled")
 
 
 @pytest.fixture(scope="session")
-def walk_path(strides: list[Example], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small model of the procedural walk as a file, stroll.onnx."""
-    trained = train.train(stroll.recipe(), strides, lambda _: None)
-    path = tmp_path_factory.mktemp("walk") / "stroll.onnx"
-    path.write_bytes(export.export(stroll.recipe(), trained, []).content)
-    return path
+def labelled_path(model_file) -> Path:
+    """Return the path of the file of the model with performers, labelled.onnx."""
+    return model_file("labelled")
 
 
 @pytest.fixture(scope="session")
-def measured_walk_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The procedural walk with its speed and turn measured as a file, measured.onnx."""
-    asked = [
-        {"name": name, "auto": {"quantity": name}, "description": name}
-        for name in ("speed", "turn")
-    ]
-    own = Recipe.model_validate({**tomllib.loads(stroll.TOML), "controls": asked})
-    found, _ = ingest.ingest(own, stroll.write(tmp_path_factory.mktemp("measured")))
-    trained = train.train(own, found, lambda _: None)
-    path = tmp_path_factory.mktemp("models") / "measured.onnx"
-    path.write_bytes(export.export(own, trained, []).content)
-    return path
+def strides(models_trained) -> list[Example]:
+    """Return strides of the procedural walk."""
+    return models_trained.examples("stroll")
+
+
+@pytest.fixture(scope="session")
+def walk_path(model_file) -> Path:
+    """Return the path of a small model of the procedural walk, stroll.onnx."""
+    return model_file("stroll")
+
+
+@pytest.fixture(scope="session")
+def measured_walk_path(model_file) -> Path:
+    """Return the path of a model of the walk with measured speed and turn, measured.onnx."""
+    return model_file("measured")
 
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
-    """Folder of the real motion capture: POSEFIELD_DATA, or shared/data beside the checkout."""
+    """Return the folder of real motion capture: POSEFIELD_DATA, or shared/data beside the checkout.
+
+    Skips the test if the folder has no data.
+    """
     beside = Path(__file__).parents[2] / "shared" / "data"
     folder = Path(os.environ.get("POSEFIELD_DATA", beside))
     if not (folder / "hdm05_reach.zip").exists() and not (folder / "hdm05_reach").exists():
@@ -153,9 +182,11 @@ def real_data() -> Path:
 
 @pytest.fixture
 def posefield(monkeypatch, capsys):
-    """Function that runs the command in this process; gives exit code, output and errors."""
+    """Return a function that runs `posefield` here, and returns exit code, output and errors."""
 
     def run(*words):
+        from service import cli
+
         monkeypatch.setattr(sys, "argv", ["posefield", *map(str, words)])
         capsys.readouterr()
         try:
@@ -171,8 +202,7 @@ def posefield(monkeypatch, capsys):
 
 @pytest.fixture(scope="session")
 def models(labelled_path, walk_path, tmp_path_factory) -> Path:
-    """Folder with models under the names that the examples use: one that knows performers, and one
-    of a gait."""
+    """Return a folder with the models of the examples: reach, with performers, and walk, a gait."""
     folder = tmp_path_factory.mktemp("models")
     shutil.copy(labelled_path, folder / "reach.onnx")
     shutil.copy(walk_path, folder / "walk.onnx")

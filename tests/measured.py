@@ -1,4 +1,4 @@
-"""Models whose controls can be measured on a motion, which no procedural recipe asks for."""
+"""Models with controls that are measured on the motion; the procedural recipes have none."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The service as a process of its own, and clients that notice whatever is lost."""
+"""The service as a separate process, and clients that detect lost responses."""
 
 import contextlib
 import os
@@ -62,40 +62,57 @@ def within(seconds, is_so):
     return found
 
 
-class Crowd:
-    """Clients at raw sockets, each in a thread, that ask on until they are refused.
+class Clients:
+    """Clients at raw sockets, each in a thread, and a balancer that asks whether the service is
+    ready: those that open a connection for each request stop when it is not, those that keep one
+    stop when they are told to close it.
 
     answered: how many answers there were, and how many of them asked to close the connection;
-    lost: what became of requests that were sent on a connection that stood and not answered.
+    lost: what became of requests that were not answered. heed: whether they listen to the balancer.
     """
 
-    def __init__(self, url):
+    def __init__(self, url, heed=True):
         self.where = host_and_port(url)
         self.answered = Counter()
         self.lost = []
-        self._ended = False
+        self._heed = heed
+        self._ready = self._going = True
         kinds = [(True, 0.0)] * 4 + [(True, 0.05)] * 4 + [(True, 0.3)] * 2 + [(False, 0.0)] * 6
         self._threads = [threading.Thread(target=self._ask_on, args=kind) for kind in kinds]
+        self._threads.append(threading.Thread(target=self._balance))
         for thread in self._threads:
             thread.start()
 
     def wait(self):
-        """Until all have been refused."""
+        """Until all have stopped."""
         for thread in self._threads:
             thread.join(20)
-        self._ended = True
+        self._going = False
+
+    def _balance(self):
+        while self._going and self._ready:
+            try:
+                with socket.create_connection(self.where, timeout=10) as wire:
+                    wire.sendall(b"GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    self._ready = received(wire).startswith(b"HTTP/1.1 200 ")
+            except OSError:
+                self._ready = False
+            time.sleep(0.05)
 
     def _ask_on(self, keeps, pause):
-        while not self._ended:
+        while self._going and (self._ready or not self._heed):
             try:
                 wire = socket.create_connection(self.where, timeout=10)
-            except (ConnectionRefusedError, ConnectionResetError):
+            except ConnectionRefusedError:
+                return
+            except OSError as fault:
+                self.lost.append(repr(fault))
                 return
             with wire:
                 self._ask_over(wire, keeps, pause)
 
     def _ask_over(self, wire, keeps, pause):
-        while True:
+        while self._going:
             try:
                 closes = exchange(wire)
             except OSError as fault:
@@ -109,7 +126,7 @@ class Crowd:
 
 def exchange(wire, path="/v1/models"):
     """Ask over a socket; whether the answer says that it closes. OSError if there is none."""
-    wire.sendall(f"GET {path} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+    wire.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
     head, body = b"", b""
     while b"\r\n\r\n" not in head:
         head += received(wire)

@@ -1,4 +1,4 @@
-"""An object store as a process of its own: a real server that speaks S3."""
+"""S3 object store as a separate process."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""The command line: what it writes, what it says, and the code it ends with."""
+"""Tests of the command line: files, output and exit codes."""
 
 import json
 import re
@@ -9,15 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from pxr import Usd, UsdSkel
+from rich.text import Text
 
+from model_export import bvh
+from model_export.cli import commands
 from model_export.sample import truth
-from service import __version__
+from service import __version__, cli
 from service.encode import ENCODERS
 from service.encode.convention import Convention
-from service.motion import bvh
+from service.question.motion_question import ClipQuestion, PoseQuestion
 from service.synthesis import clips, library, poses
-from service.synthesis.question import ClipQuestion, PoseQuestion
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
@@ -39,13 +42,13 @@ def refused(posefield):
 
 
 @pytest.fixture(scope="module")
-def quick(reaching_folder):
-    """Path of a recipe of few clips and frames, beside the family's files."""
+def quick(reaching_folder, tmp_path_factory):
+    """Path of a recipe of few clips and frames."""
     text = (reaching_folder / "recipe.toml").read_text()
     text = re.sub(r'(?s)\[\[controls\]\]\nname = "stature".*?\n\n', "", text)
     text = text.replace("frames = 100", "frames = 8").replace("0.5", "3.0")
     condition = '[clips.where]\nperformer = { among = ["tall"] }\n\n[alignment]\nrounds = 0\n\n'
-    path = reaching_folder.parent / "quick_cli.toml"
+    path = tmp_path_factory.mktemp("quick") / "quick.toml"
     path.write_text(text.replace("[size]", f"{condition}[size]"))
     return path
 
@@ -54,6 +57,7 @@ def test_it_says_its_version(posefield):
     assert posefield("--version") == (0, f"posefield {__version__}\n", "")
 
 
+@pytest.mark.system
 def test_it_is_a_command_of_its_own():
     command = str(Path(sys.executable).parent / "posefield")
     done = subprocess.run([command, "--help"], capture_output=True, text=True, check=False)
@@ -62,6 +66,17 @@ def test_it_is_a_command_of_its_own():
         assert re.search(rf"\b{name}\b", done.stdout)
 
 
+def test_help_is_shown_as_it_is_written():
+    """Help texts are rich's markup, in which brackets around a word are not shown."""
+    assert Text.from_markup("pairs [x, z]").plain == "pairs "
+    commands(cli.app)
+    found = typer.main.get_command(cli.app).commands
+    assert {"crowd", "train"} <= found.keys()
+    texts = [each.help or "" for command in found.values() for each in (command, *command.params)]
+    assert [text for text in texts if Text.from_markup(text).plain != text] == []
+
+
+@pytest.mark.system
 def test_a_process_ends_with_the_code_of_its_fault(tmp_path):
     command = str(Path(sys.executable).parent / "posefield")
     words = [command, "inspect", str(tmp_path / "none.onnx")]
@@ -285,6 +300,7 @@ def test_train_writes_a_report_where_one_is_asked_for(posefield, train_words, tm
     assert page.read_text().startswith("<!DOCTYPE html>")
 
 
+@pytest.mark.system
 def test_a_report_changes_nothing_in_the_model(posefield, train_words, tmp_path):
     told, quiet = tmp_path / "told.onnx", tmp_path / "quiet.onnx"
     assert posefield(*train_words, "-o", told, "--report", tmp_path / "told.html")[0] == 0
@@ -298,6 +314,7 @@ def test_a_report_is_a_html_file(refused, train_words, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.system
 def test_a_report_that_cannot_be_written_leaves_no_half_of_it(posefield, train_words, tmp_path):
     page = tmp_path / "told" / "quick.html"
     page.mkdir(parents=True)
@@ -340,7 +357,7 @@ def test_a_corrupt_model_is_refused_with_code_3(refused, model_path, tmp_path):
     path = tmp_path / "half.onnx"
     path.write_bytes(model_path.read_bytes()[:5000])
     for words in (("inspect", path), ("pose", path, *CONTROLS)):
-        assert refused(3, *words).startswith(f"{path}: onnxruntime cannot load it: ")
+        assert refused(3, *words).startswith(f"{path}: does not end with its checksum: ")
 
 
 # --- pose -----------------------------------------------------------------------------------------
@@ -356,7 +373,7 @@ def test_pose_answers_as_json(posefield, model_path):
     assert np.shape(said["bone_offsets"]) == (33, 3)
     assert said["trust"]["controls"] == POINT and said["trust"]["warnings"] == []
     model = library.load([model_path]).models["reaching"]
-    expected = poses.pose(model, PoseQuestion(POINT, [0.25, 0.5]))
+    expected = poses.pose(model, PoseQuestion(controls=POINT, times=[0.25, 0.5]))
     assert np.abs(said["rotations"] - expected.rotations).max() < 1e-6
 
 
@@ -463,7 +480,7 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
     code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
     assert (code, err) == (0, "")
     model = library.load([model_path]).models["reaching"]
-    answer = clips.clip(model, ClipQuestion(POINT, 30.0, "warn"))
+    answer = clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn"))
     said = json.loads(out)
     assert said == {
         "file": str(path),
@@ -505,7 +522,7 @@ def test_clip_names_joints_and_measures_as_asked_for(posefield, model_path, tmp_
     # What the model calls LowerBack, Spine and Spine1.
     assert found["names"][9:12] == ["Spine", "Spine1", "Spine2"]
     assert (found["units"]["length"], found["units"]["up"]) == ("centimetre", "Z")
-    asked = ClipQuestion(POINT, names="humanik", root="in_place")
+    asked = ClipQuestion(controls=POINT, names="humanik", root="in_place")
     answer = clips.clip(library.load([model_path]).models["reaching"], asked)
     assert path.read_bytes() == ENCODERS["json"].encode(answer, Convention(0.01, "z"))
 
@@ -610,7 +627,7 @@ def test_check_of_what_is_no_usd_ends_with_code_3(refused, tmp_path, content):
 def test_serve_refuses_a_file_that_it_cannot_serve(refused, tmp_path):
     path = tmp_path / "broken.onnx"
     path.write_bytes(b"nothing")
-    assert refused(3, "serve", path).startswith(f"{path}: onnxruntime cannot load it: ")
+    assert refused(3, "serve", path).startswith(f"{path}: does not end with its checksum: ")
 
 
 def test_serve_refuses_a_port_that_is_none(refused, model_path):
@@ -643,6 +660,7 @@ def without_packages(*words):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.system
 def test_what_ships_answers_without_the_training_jobs_packages(model_path, tmp_path):
     path = tmp_path / "clip.usda"
     done = without_packages("clip", model_path, *CONTROLS, "-o", path)
@@ -650,6 +668,7 @@ def test_what_ships_answers_without_the_training_jobs_packages(model_path, tmp_p
     assert path.exists()
 
 
+@pytest.mark.system
 def test_train_without_its_packages_says_what_to_install(quick, reaching_folder, tmp_path):
     path = tmp_path / "x.onnx"
     done = without_packages("train", quick, "--data", reaching_folder, "-o", path)

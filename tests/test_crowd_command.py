@@ -1,4 +1,4 @@
-"""`posefield crowd`: what it writes and says, and what it refuses."""
+"""Tests of `posefield crowd`: files, output and errors."""
 
 import json
 
@@ -8,7 +8,7 @@ from pxr import Usd, UsdSkel
 from typer.testing import CliRunner
 
 from service import cli, crowds
-from service.motion.errors import FileError, InvalidField, MotionError
+from service.motion.errors import FileError, FormError, InvalidField, MotionError
 
 
 def run(*words):
@@ -63,9 +63,8 @@ def test_routes_are_followed(walk_path, tmp_path):
     ("words", "kind", "said"),
     [
         (("-o", "crowd.fbx"), InvalidField, "output: 'crowd.fbx' ends in none of usd, usda, usdc"),
-        (("-o", "c.usd", "--instancing", "clones"), InvalidField, "instancing: 'clones', expected"),
-        (("-o", "c.usd", "--camera", "1,2"), InvalidField, "camera/position: [1.0, 2.0], expected"),
-        (("-o", "c.usd", "--camera", "here"), InvalidField, "camera: 'here', expected X,Y,Z"),
+        (("-o", "c.usd", "--camera", "1,2"), FormError, "camera: '1,2', expected x,y,z"),
+        (("-o", "c.usd", "--camera", "here"), FormError, "camera: 'here', expected x,y,z"),
         (("-o", "c.usd", "--camera", "90,2,0", "--fov", 4), InvalidField, "camera/fov: 4 rad"),
         (("-o", "c.usd", "--level", 4), InvalidField, "level: 4, expected 0 to 3"),
         (
@@ -168,3 +167,9 @@ def test_a_model_that_does_not_walk_is_refused(model_path, tmp_path):
     done = run(model_path, "-o", tmp_path / "c.npz")
     assert isinstance(done.exception, InvalidField)
     assert not (tmp_path / "c.npz").exists()
+
+
+def test_a_word_that_is_no_choice_is_refused(walk_path, tmp_path):
+    done = run(walk_path, "-o", tmp_path / "c.usd", "--instancing", "clones")
+    assert done.exit_code == 2 and "'clones' is not one of" in done.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""What the documents point to is there."""
+"""Tests of the documents: targets of links exist."""
 
 import re
 from pathlib import Path
@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[1]
 DOCUMENTS = [
     *ROOT.glob("*.md"),
     *(ROOT / "clients").glob("*/README.md"),
+    ROOT / "tests/README.md",
 ]
 
 

@@ -1,4 +1,4 @@
-"""The shipped recipes hold for the motion capture that they were written for."""
+"""Tests of the shipped recipes with the motion capture that they were written for."""
 
 import csv
 import io
@@ -10,10 +10,12 @@ import pytest
 from model_export import align, data, export, ingest, recipe, samples, train
 from service.motion import ground, quat
 from service.motion.conventions import UP
+from service.question.motion_question import ClipQuestion, PoseQuestion
 from service.synthesis import clips, poses, session
-from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import company, detail, gait, march, skating
+
+pytestmark = pytest.mark.system
 
 RECIPES = Path(recipe.__file__).parent / "recipes"
 CLIPS = {"hdm05_grab_high": 29, "hdm05_deposit_floor": 32, "cmu_walk": 78}
@@ -70,9 +72,9 @@ WRITTEN = 0.00051
 def table(made, real_data):
     """What others measured of the clips, by column."""
     own, examples, *_ = made
-    text = data.find(real_data, own.clips.table).read_bytes().decode("utf-8-sig")
-    # The heading is line one.
-    records = list(csv.DictReader(io.StringIO(text)))
+    with data.find(real_data, own.clips.table).open("rb") as file:
+        # The heading is line one.
+        records = list(csv.DictReader(io.TextIOWrapper(file, "utf-8-sig")))
 
     def column(name):
         return np.array([float(records[example.row.line - 2][name]) for example in examples])
@@ -147,7 +149,7 @@ def test_performers_are_told_apart(made):
 
 
 def test_a_clip_at_the_middle_begins_at_the_origin_and_faces_ahead(made, model):
-    answer = clips.clip(model, ClipQuestion(middle(model), 30.0, "refuse"))
+    answer = clips.clip(model, ClipQuestion(controls=middle(model), fps=30.0, extrapolate="refuse"))
     first = answer.clip.root_path[0]
     assert np.abs(first * (1.0 - UP)).max() < 0.02
     assert 0.7 < first[1] < 1.1
@@ -160,7 +162,9 @@ def test_a_clip_at_the_middle_begins_at_the_origin_and_faces_ahead(made, model):
 
 
 def test_a_clip_moves_as_a_body_does(model):
-    clip = clips.clip(model, ClipQuestion(middle(model), 120.0, "refuse")).clip
+    clip = clips.clip(
+        model, ClipQuestion(controls=middle(model), fps=120.0, extrapolate="refuse")
+    ).clip
     places = clip.positions()
     # Nothing is faster than 8 m/s, below the floor or farther than two metres from the hips.
     assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() * 120.0 < 8.0
@@ -215,8 +219,10 @@ def test_known_flips_are_found_cleaned_and_told(made):
 @pytest.mark.parametrize("made", ["cmu_walk"], indirect=True)
 def test_a_walk_closes_its_loop(made, model):
     assert made[0].motion.cyclic
-    duration = poses.pose(model, PoseQuestion(middle(model), [0.0])).trust.duration
-    clip = clips.clip(model, ClipQuestion(middle(model), 100 / duration, "warn")).clip
+    duration = poses.pose(model, PoseQuestion(controls=middle(model), times=[0.0])).trust.duration
+    clip = clips.clip(
+        model, ClipQuestion(controls=middle(model), fps=100 / duration, extrapolate="warn")
+    ).clip
     facing = quat.about(UP, -ingest.heading(clip))[:, None]
     body = quat.rotate(facing, clip.positions() - clip.root_path[:, None])
     away = np.linalg.norm(body - body[0], axis=-1).max(axis=1)

@@ -1,4 +1,4 @@
-"""A cluster that cannot do the work is refused in words, before any work."""
+"""Tests of the checks on a cluster before work starts, and of their messages."""
 
 import shutil
 import subprocess
@@ -12,6 +12,8 @@ from clusters import started
 import service
 from service import scheduler
 from service.motion.errors import ClusterError
+
+pytestmark = pytest.mark.system
 
 KIT = scheduler.Kit(("service",), ("numpy", "onnxruntime"))
 
@@ -74,8 +76,9 @@ def test_a_worker_with_another_source_is_named(cluster, tmp_path):
 
 @pytest.mark.parametrize("address", ["nonsense", "nope://127.0.0.1:8786", ""])
 def test_what_is_no_address_is_said_at_once(address):
-    with pytest.raises(ClusterError, match="expected one such as tcp://host:8786"):
-        next(scheduler.connect(address, KIT).gen)
+    expected = pytest.raises(ClusterError, match="expected one such as tcp://host:8786")
+    with expected, scheduler.connect(address, KIT):
+        pass
 
 
 def test_nobody_there():

@@ -1,4 +1,4 @@
-"""A real service for the clients to ask, and Node as the project's own environment has it."""
+"""Fixtures of the clients' tests: a service process, and Node from the project's environment."""
 
 import os
 import subprocess
@@ -30,7 +30,7 @@ def in_package():
     That fails with what the command prints, where it does not succeed.
     """
 
-    def run(package, *words, **environ):
+    def assert_runs(package, *words, **environ):
         path = f"{BIN}{os.pathsep}{os.environ['PATH']}"
         given = {**os.environ, "PATH": path, **environ}
         folder = CLIENTS / package
@@ -40,4 +40,4 @@ def in_package():
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 
-    return lambda package: partial(run, package)
+    return lambda package: partial(assert_runs, package)

@@ -1,7 +1,7 @@
-"""What of a contract would break those who keep an older one: a line for each change.
+"""Breaking changes between two versions of a contract, one line for each.
 
-Of a request, all that was right has to stay right. Of an answer, all that comes has to be what was
-promised; that it may have more fields, and words more values, every client has to bear.
+Every request that was valid must stay valid. Responses must keep their promised fields; new fields
+and new values of enumerations are allowed, which clients must tolerate.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +18,23 @@ MOST = ("maximum", "exclusiveMaximum", "maxItems", "maxLength", "maxProperties")
 
 def changes(old: Node, new: Node) -> list[str]:
     """Breaking changes from one contract to the next, each once."""
-    return sorted(set(_paths(old, new)))
+    return sorted(set(_paths(_expanded(old), _expanded(new))))
+
+
+def _expanded(document: Node) -> Node:
+    """The contract with a path for each format in place of a path that ends in `{format}`."""
+    paths: dict[str, dict[str, Any]] = {}
+    for path, item in document["paths"].items():
+        if not path.endswith("{format}"):
+            paths[path] = item
+            continue
+        for method in (m for m in contract.METHODS if m in item):
+            given = _given(document, path, method)
+            rest = [each for key, each in given.items() if key != ("path", "format")]
+            operation = {**item[method], "parameters": rest}
+            for form in given["path", "format"]["schema"]["enum"]:
+                paths.setdefault(path.replace("{format}", form), {})[method] = operation
+    return {**document, "paths": paths}
 
 
 def _paths(old: Node, new: Node) -> Iterator[str]:
@@ -78,7 +94,7 @@ class _Pair:
         old, new = contract.resolve(self.old, before), contract.resolve(self.new, after)
         if new.get("required") and not old.get("required"):
             yield f"{self.where}: body is needed"
-        yield from self.at("body")._contents(old, new, asked=True)
+        yield from self.at("body").contents(old, new, asked=True)
 
     def _responses(self, before: Node, after: Node) -> Iterator[str]:
         for status, node in before.items():
@@ -88,9 +104,9 @@ class _Pair:
             old, new = contract.resolve(self.old, node), contract.resolve(self.new, after[status])
             for name in old.get("headers", {}).keys() - new.get("headers", {}).keys():
                 yield f"{self.where} {status}: header {name} is gone"
-            yield from self.at(status)._contents(old, new, asked=False)
+            yield from self.at(status).contents(old, new, asked=False)
 
-    def _contents(self, old: Node, new: Node, asked: bool) -> Iterator[str]:
+    def contents(self, old: Node, new: Node, asked: bool) -> Iterator[str]:
         there = new.get("content", {})
         for name, content in old.get("content", {}).items():
             if name not in there:
@@ -123,11 +139,11 @@ class _Values:
         old, new = _alternatives(self.old, before), _alternatives(self.new, after)
         given, taken = (old, new) if self.asked else (new, old)
         for each in given:
-            tried = [list(inner._one(*((each, t) if self.asked else (t, each)))) for t in taken]
+            tried = [list(inner.one(*((each, t) if self.asked else (t, each)))) for t in taken]
             # The alternative that fits best says what is wrong.
             yield from min(tried, key=len)
 
-    def _one(self, before: Node, after: Node) -> Iterator[str]:
+    def one(self, before: Node, after: Node) -> Iterator[str]:
         given, taken = (before, after) if self.asked else (after, before)
         word = "no longer" if self.asked else "now may be"
         for kind in _types(given) - _types(taken):

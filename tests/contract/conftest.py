@@ -1,4 +1,4 @@
-"""The service under test: one small model named `reach`, and ways to ask it."""
+"""Fixtures of the contract's tests: a service with the small model `reach`, and clients."""
 
 from pathlib import Path
 from typing import Any

@@ -1,11 +1,10 @@
-"""Paths without a format answer as those with one do, in the format that is accepted."""
+"""Tests of content negotiation: paths without a format equal those with the accepted format."""
 
 from urllib.parse import urlencode
 
 import pytest
 
-from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
-from service.encode.grids import GRID_ENCODERS
+from service.encode import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
 from service.encode.packs import PACKS
 
 REACH = "/v1/models/reach"

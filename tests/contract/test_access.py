@@ -1,4 +1,4 @@
-"""Who may ask: what each key sees, what it does not, and what is said of those refused."""
+"""Tests of access control: scopes of keys and tokens, visible models, refusals and audit log."""
 
 import json
 import logging
@@ -53,9 +53,9 @@ def signed(tmp_path_factory):
     path.write_text(json.dumps({"keys": [{**entry, "kid": "one"}]}))
     trusted = {"jwt_keys": str(path), "jwt_issuer": "https://issuer", "jwt_audience": "posefield"}
 
-    def token(scope, seconds=60):
+    def token(scope, seconds=60, **changes):
         claims = {"iss": "https://issuer", "aud": "posefield", "exp": time.time() + seconds}
-        return jwt.encode({**claims, "scope": scope}, private, "RS256", {"kid": "one"})
+        return jwt.encode({**claims, "scope": scope, **changes}, private, "RS256", {"kid": "one"})
 
     return trusted, token
 
@@ -141,7 +141,8 @@ def test_every_operation_with_a_scope_refuses_who_is_unknown_and_who_lacks_it(gu
     """401 and 403 are what the contract says of each, and of no other."""
     ask, tried = asker(guarded), 0
     for operation in contract.load().operations:
-        path = operation.path.replace("{model}", "reach")
+        form = next(iter(operation.formats), "")
+        path = operation.path.replace("{model}", "reach").replace("{format}", form)
         unknown = ask(operation.method, path).status_code
         if operation.scope is None:
             assert unknown == 200
@@ -191,6 +192,17 @@ def test_a_token_reads_what_its_scopes_say(loaded, signed):
     assert seen("openid profile").status_code == 403
     late = seen("read:*", seconds=-100)
     assert late.status_code == 401 and "expired" in late.json()["detail"]
+
+
+@pytest.mark.parametrize("end", [10**400, 1e999, "9" * 20], ids=["whole", "float", "text"])
+def test_a_signed_token_with_an_absurd_end_is_refused(end, loaded, signed):
+    trusted, token = signed
+    ask = asker(create_app(loaded, Settings(**trusted)))
+    answer = ask(
+        "GET", "/v1/models", headers={"Authorization": f"Bearer {token('read:*', exp=end)}"}
+    )
+    assert (answer.status_code, answer.json()["status"]) == (401, 401)
+    assert answer.headers["www-authenticate"].endswith('error="invalid_token"')
 
 
 def test_keys_and_tokens_go_together(loaded, signed, lines, issued):
@@ -269,6 +281,7 @@ def test_an_algorithm_of_shared_secrets_is_refused(signed):
             create_app(Library({}), Settings(**signed[0], jwt_algorithm=algorithm))
 
 
+@pytest.mark.system
 def test_the_command_refuses_with_code_2(models):
     posefield = Path(sys.executable).with_name("posefield")
     command = [posefield, "serve", models, "--host", "0.0.0.0", "--port", "0"]
@@ -277,6 +290,7 @@ def test_the_command_refuses_with_code_2(models):
     assert len(done.stderr.splitlines()) == 1 and "POSEFIELD_OPEN=1" in done.stderr
 
 
+@pytest.mark.system
 def test_the_command_makes_a_key_whose_line_lets_it_in(loaded, tmp_path):
     posefield = Path(sys.executable).with_name("posefield")
     command = [posefield, "key", "blender", "--model", "walk", "--metrics"]
@@ -292,6 +306,7 @@ def test_the_command_makes_a_key_whose_line_lets_it_in(loaded, tmp_path):
     assert keys.read(made["line"], "KEYS").find(made["key"]).name == "blender"
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(("name", "model"), [("a b", "walk"), ("a", "Walk"), ("a", "../walk")])
 def test_a_key_of_no_name_or_model_is_not_made(name, model):
     posefield = Path(sys.executable).with_name("posefield")

@@ -1,4 +1,4 @@
-"""What surrounds an answer: trust, warnings, request ids, and a failure that tells nothing."""
+"""Tests of responses: trust, warnings, request ids and internal errors."""
 
 import json
 import logging
@@ -10,9 +10,9 @@ from asking import asker
 from pxr import Usd
 
 from service.motion import card as cards
+from service.question.motion_question import PoseQuestion
 from service.synthesis import poses
 from service.synthesis.library import Library
-from service.synthesis.question import PoseQuestion
 from service.web import contract
 from service.web.app import build
 from service.web.operations import OPERATIONS
@@ -35,7 +35,7 @@ def test_the_card_is_the_whole_card(ask, loaded):
 @pytest.mark.parametrize("extension", FORMATS)
 def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded):
     model = loaded.find("reach")
-    trust = poses.pose(model, PoseQuestion(controls, [0.0])).trust
+    trust = poses.pose(model, PoseQuestion(controls=controls, times=[0.0])).trust
     answer = ask("GET", url(f"{CLIP}.{extension}", controls))
     assert answer.headers["posefield-model"] == model.identity
     assert float(answer.headers["posefield-sigma"]) == trust.sigma

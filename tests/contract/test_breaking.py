@@ -1,4 +1,4 @@
-"""The contract keeps what the last released one promised, but for what is listed."""
+"""Tests of compatibility: the contract has no breaking changes except the listed ones."""
 
 import copy
 from pathlib import Path
@@ -63,6 +63,14 @@ BREAKING = {
         lambda s: without(s["paths"][POSE], "post"),
         f"POST {POSE}: gone",
     ),
+    "format": (
+        lambda s: s["components"]["parameters"]["tableFormat"]["schema"]["enum"].remove("npz"),
+        f"POST {POSE}.npz: gone",
+    ),
+    "operationId of a format": (
+        lambda s: s["paths"][f"{POSE}.{{format}}"]["get"].update(operationId="poses"),
+        f"GET {POSE}.arrow: operationId changed",
+    ),
     "operationId": (
         lambda s: pose(s).update(operationId="poses"),
         f"GET {POSE}: operationId changed",
@@ -80,19 +88,18 @@ BREAKING = {
         f"GET {POSE}: status 406 is gone",
     ),
     "header": (
-        lambda s: without(s["components"]["responses"]["PosesJson"]["headers"], "ETag"),
+        lambda s: without(s["components"]["responses"]["Poses"]["headers"], "ETag"),
         f"GET {POSE}.json 200: header ETag is gone",
     ),
     "media type": (
-        lambda s: without(s["components"]["responses"]["PosesAny"]["content"], "application/x-npz"),
+        lambda s: without(s["components"]["responses"]["Poses"]["content"], "application/x-npz"),
         f"GET {POSE} 200: media type application/x-npz is gone",
     ),
     "body's media type": (
         lambda s: without(
-            s["components"]["requestBodies"]["InferenceQuestion"]["content"],
-            "application/octet-stream",
+            s["components"]["requestBodies"]["CrowdQuestion"]["content"], "application/json"
         ),
-        "POST /v2/models/{model}/infer body: media type application/octet-stream is gone",
+        "POST /v1/models/{model}/crowd body: media type application/json is gone",
     ),
     "body": (
         lambda s: without(s["paths"][POSE]["post"], "requestBody"),
@@ -191,6 +198,7 @@ def test_what_breaks_is_found_and_named(name, spec):
 HARMLESS = {
     "path": lambda s: s["paths"].update({"/more": s["paths"]["/livez"]}),
     "status": lambda s: pose(s)["responses"].update({"429": {"description": "too many"}}),
+    "format": lambda s: s["components"]["parameters"]["walkFormat"]["schema"]["enum"].append("usd"),
     "parameter": lambda s: pose(s)["parameters"].append(
         {"name": "more", "in": "query", "schema": {"type": "number"}}
     ),

@@ -1,4 +1,4 @@
-"""What browsers are told with every answer, and which pages may read it."""
+"""Tests of the headers for browsers: security headers and CORS."""
 
 import pytest
 from asking import asker
@@ -37,7 +37,7 @@ def test_every_answer_is_data_and_nothing_to_run(method, path, status, ask):
 
 
 def test_a_page_of_our_own_says_what_it_loads():
-    policy = browser.page()["Content-Security-Policy"]
+    policy = browser.page("'self'", "'self'")["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "http" not in policy and "*" not in policy
     assert b"content-security-policy" not in dict(browser.of("text/html"))
     assert b"content-security-policy" in dict(browser.of("application/json"))

@@ -1,4 +1,4 @@
-"""An archive over HTTP holds what `posefield export` writes for the same questions."""
+"""Comparison of archives over HTTP with `posefield export` for the same clips."""
 
 import json
 

@@ -1,5 +1,4 @@
-"""Archives on a real socket: made as they are taken, in memory that does not grow, cut where made
-no further."""
+"""Tests of streamed archives on a real socket: back-pressure, memory and truncation on errors."""
 
 import dataclasses
 import io
@@ -20,6 +19,7 @@ from service.export.pack import CLIPS
 from service.web import contract
 from service.web.app import build
 from service.web.operations import OPERATIONS, query_clips
+from service.web.service import Formatted
 from service.web.settings import Settings
 
 PATH = "/v1/models/reach/clips"
@@ -41,10 +41,7 @@ def counting(most=MANY):
 
 def served(loaded, encoder):
     """The application with one encoder in place of the others for many clips."""
-    handlers = {
-        f"queryClips{name.capitalize()}": partial(query_clips, {"usdc": encoder}, pack)
-        for name, pack in PACKS.items()
-    }
+    handlers = {"queryClipsInFormat": Formatted(PACKS, partial(query_clips, {"usdc": encoder}))}
     return build(contract.load(), {**OPERATIONS, **handlers}, loaded, Settings())
 
 
@@ -113,6 +110,7 @@ def highest(child):
     return 1024 * int(status.partition("VmHWM:")[2].split()[0])
 
 
+@pytest.mark.system
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no /proc here")
 def test_memory_does_not_grow_with_the_number_of_clips(models, controls):
     with process(models) as child:

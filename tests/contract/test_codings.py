@@ -1,4 +1,4 @@
-"""Text is sent in zstd or gzip where a client takes it; the bytes inside are the same."""
+"""Tests of content codings: zstd or gzip by Accept-Encoding, with equal decoded bytes."""
 
 import asyncio
 import gzip
@@ -92,8 +92,10 @@ def sent(app, url, accepted):
         "type": "http",
         "method": "GET",
         "path": path,
+        "raw_path": path.encode(),
         "query_string": query.encode(),
-        "headers": [(b"accept-encoding", accepted.encode())],
+        "http_version": "1.1",
+        "headers": [(b"host", b"localhost"), (b"accept-encoding", accepted.encode())],
         "asgi": {"spec_version": "2.4"},
     }
     asyncio.run(app(scope, receive, send))

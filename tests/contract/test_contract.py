@@ -1,18 +1,19 @@
-"""The contract is sound, and the service has its operations: all of them and no others."""
+"""Tests of the contract: it is valid, and its operations are those of the service."""
 
+import copy
 import dataclasses
 
 import openapi_spec_validator
 import pytest
+import yaml
 from asking import asker
 
-from service.encode import CROWD_ENCODERS, ENCODERS, POSE_ENCODERS
-from service.encode.grids import GRID_ENCODERS
-from service.encode.packs import PACKS
+from service.encode import ENCODERS
 from service.synthesis.library import Library
 from service.web import contract, problems
 from service.web.app import build, create_app
 from service.web.operations import OPERATIONS
+from service.web.service import Formatted
 from service.web.settings import Settings
 
 
@@ -22,11 +23,11 @@ def test_the_contract_is_valid_openapi(spec):
 
 def test_routes_and_operations_are_the_same_set(spec, app):
     agreed = {
-        (method.upper(), path)
-        for path, item in spec["paths"].items()
-        for method in item
-        if method in contract.METHODS
+        (operation.method, operation.path.replace("{format}", form))
+        for operation in contract.load().operations
+        for form in operation.formats or [""]
     }
+    assert len({path.partition(".{")[0] for path in spec["paths"]}) > 10
     # HEAD is answered wherever GET is, and the contract says so in its introduction.
     places = app.site.places.places
     served = {(m, place.template) for place in places for m in place.routes if m != "HEAD"}
@@ -47,39 +48,77 @@ def test_a_handler_without_an_operation_stops_the_start():
         build(dataclasses.replace(agreed, operations=fewer), OPERATIONS, Library({}), Settings())
 
 
-@pytest.mark.parametrize("extension", ENCODERS)
-def test_each_format_has_the_media_type_of_its_encoder(spec, extension):
-    answer = spec["components"]["responses"][f"Clip{extension.capitalize()}"]
-    assert list(answer["content"]) == [ENCODERS[extension].media_type]
+@pytest.mark.parametrize("name", [n for n, h in OPERATIONS.items() if isinstance(h, Formatted)])
+def test_formats_and_media_types_are_those_of_the_encoders(name):
+    (operation,) = (o for o in contract.load().operations if o.id == name)
+    encoders = {form: each.media_type for form, each in OPERATIONS[name].formats.items()}
+    assert all(form == each.extension for form, each in OPERATIONS[name].formats.items())
+    assert sorted(operation.media_types) == sorted(encoders.values())
+    assert operation.formats == (encoders if "{format}" in operation.path else {})
+
+
+def test_descriptions_name_all_formats(spec):
+    """The search of `/docs` finds an operation by the words of its description."""
+    for operation in (o for o in contract.load().operations if o.formats):
+        said = spec["paths"][operation.path][operation.method.lower()]["description"]
+        assert all(f"`{form}`" in said for form in operation.formats), operation.id
+
+
+def test_many_clips_have_the_formats_of_one(spec):
+    schemas = spec["components"]["schemas"]
+    assert schemas["ClipsQuestion"]["properties"]["format"]["enum"] == [*ENCODERS]
+
+
+def changed(spec, change):
+    """The contract after a change, as the service reads it."""
+    other = copy.deepcopy(spec)
+    change(other["components"]["parameters"]["clipFormat"], other["components"]["responses"])
+    return contract.parse(yaml.safe_dump(other, sort_keys=False).encode())
+
+
+def without_a_format(format_, _):
+    format_["schema"]["enum"].remove("glb")
+    del format_["x-media-types"]["glb"]
+
+
+def with_a_format(format_, _):
+    format_["schema"]["enum"].append("fbx")
+    format_["x-media-types"]["fbx"] = "model/fbx"
+
+
+def of_another_media_type(format_, _):
+    format_["x-media-types"]["glb"] = "model/gltf+json"
+
+
+def answered_with_less(_, responses):
+    del responses["Clip"]["content"]["model/gltf-binary"]
 
 
 @pytest.mark.parametrize(
-    ("method", "path", "formats"),
-    [
-        ("get", "pose", POSE_ENCODERS),
-        ("post", "pose", POSE_ENCODERS),
-        ("get", "clip", ENCODERS),
-        ("post", "clip", ENCODERS),
-        ("post", "clips", PACKS),
-        ("get", "crowd", {name: ENCODERS[name] for name in ("usda", "usdc", "usdz")}),
-        ("post", "crowd", CROWD_ENCODERS),
-        ("get", "sigma", GRID_ENCODERS),
-        ("post", "sigma", GRID_ENCODERS),
-    ],
+    "change", [without_a_format, with_a_format, of_another_media_type, answered_with_less]
 )
-def test_each_format_has_a_path_and_stands_on_that_of_all(method, path, formats, spec):
-    every = spec["paths"][f"/v1/models/{{model}}/{path}"][method]["responses"]["200"]["$ref"]
-    contents = spec["components"]["responses"][every.rpartition("/")[2]]["content"]
-    assert set(contents) == {found.media_type for found in formats.values()}
-    assert len(contents) == len(formats)
-    for name, found in formats.items():
-        own = spec["paths"][f"/v1/models/{{model}}/{path}.{name}"][method]["responses"]["200"]
-        answer = spec["components"]["responses"][own["$ref"].rpartition("/")[2]]
-        assert answer["content"] == {found.media_type: contents[found.media_type]}
+def test_formats_other_than_the_encoders_stop_the_start(change, spec):
+    agreed = changed(spec, change)
+    with pytest.raises(ValueError, match=r"getClip.*: the contract has .*, its handler "):
+        build(agreed, OPERATIONS, Library({}), Settings())
+
+
+def test_a_format_that_no_handler_makes_stops_the_start():
+    async def answer(service, request):
+        raise AssertionError("never asked")
+
+    handlers = {**OPERATIONS, "getClipInFormat": answer}
+    with pytest.raises(ValueError, match=r"getClipInFormat: the contract has .*, its handler "):
+        build(contract.load(), handlers, Library({}), Settings())
+
+
+def test_a_format_without_a_media_type_is_refused(spec):
+    with pytest.raises(ValueError, match="x-media-types"):
+        changed(spec, lambda format_, _: format_["schema"]["enum"].append("fbx"))
 
 
 PAGES = {"/openapi.yaml", "/openapi.json", "/docs", "/problems", "/"}
-OPEN = {"/livez", "/readyz", "/v2", "/v2/health/live", "/v2/health/ready", *PAGES}
+OPEN = {"/livez", "/readyz", *PAGES}
 
 
 def test_only_these_operations_never_ask_for_a_key():
@@ -93,24 +132,21 @@ def test_every_operation_documents_the_errors_it_can_give(spec):
 
 
 def expected_statuses(path, method):
-    statuses = {"200", "400", "405", "500"}
+    statuses = {"200", "400", "405", "414", "421", "431", "500"}
     if path not in OPEN:
         statuses |= {"401", "403"}
     if "{model}" in path:
         statuses.add("404")
-        # What answers now, and with which versions, follows from no model.
-        if method == "get" and path.startswith("/v1"):
-            statuses.add("304")
-    if method == "get" and path in PAGES:
+    if method == "get" and ("{model}" in path or path in PAGES):
         statuses.add("304")
-    if path.startswith(("/v1", "/v2/models")) or path.endswith(("/readyz", "/health/ready")):
+    if path.startswith("/v1") or path == "/readyz":
         statuses.add("503")
-    if path.endswith("/infer"):
-        statuses.add("422")
     if path.startswith("/v1") and path.count("/") > 3:
         statuses.add("422")
         # A path that names no format asks which is accepted.
-        statuses |= set() if "." in path or path.endswith(("/why", "/suggestions")) else {"406"}
+        statuses |= (
+            set() if "{format}" in path or path.endswith(("/why", "/suggestions")) else {"406"}
+        )
     return statuses | ({"413", "415"} if method == "post" else set())
 
 

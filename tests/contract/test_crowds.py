@@ -1,4 +1,4 @@
-"""Crowds over HTTP: blocks that clients read whole, walks that open as USD, refusals that tell."""
+"""Tests of crowds over HTTP: tables, walking crowds as USD, and errors."""
 
 import io
 import json
@@ -10,6 +10,7 @@ import pytest
 from asking import asker
 from pxr import Usd, UsdSkel
 
+from service.web import crowd_query
 from service.web.app import create_app
 from service.web.settings import Settings
 
@@ -109,6 +110,21 @@ def test_more_characters_than_the_service_takes_are_refused(loaded, controls):
     assert small("GET", f"{WALK}.usdc?count=2&seconds=1").status_code == 200
 
 
+def test_a_body_of_more_values_than_any_crowd_has_is_refused_before_it_is_decoded(ask, controls):
+    def refused(count):
+        body = json.dumps({"controls": controls, "time": 0}).replace(
+            '"time": 0', '"time": [' + "0," * count + "x]"
+        )
+        headers = {"content-type": "application/json"}
+        return ask("POST", f"{CROWD}.arrow", content=body.encode(), headers=headers)
+
+    most = crowd_query.VALUES * crowd_query.FEWEST
+    answer = refused(most)
+    assert answer.status_code == 413 and f"expected at most {most}" in answer.json()["detail"]
+    # Negative control: with fewer the decoder finds the fault at the end.
+    assert refused(1000).status_code == 400
+
+
 @pytest.mark.parametrize(
     "query",
     [
@@ -121,6 +137,33 @@ def test_what_a_crowd_takes_is_counted_before_it_is_made(loaded, query):
     small = asker(create_app(loaded, Settings(crowd_poses=100)))
     answer = small("GET", f"{WALK}.usdc?{query}")
     assert answer.status_code == 422 and "expected at most 100" in answer.text
+
+
+@pytest.mark.parametrize(
+    ("query", "expected"),
+    [
+        # 438 MB, made in 2.4 GB of memory.
+        ("count=1&seconds=16000", "480001 frames of a motion, expected at most 36000"),
+        # More than a minute of work in 1.4 GB.
+        ("count=100000&motions=5&seconds=0.1&instancing=flatten", "expected at most 268.4 MB"),
+        ("count=100000&motions=2000&seconds=1", "expected at most 268.4 MB"),
+    ],
+)
+@pytest.mark.parametrize("ending", ["usda", "usdc", "usdz"])
+def test_a_crowd_that_takes_too_much_memory_is_refused(ask, ending, query, expected):
+    answer = ask("GET", f"{WALK}.{ending}?{query}")
+    assert answer.status_code == 422, answer.status_code
+    assert expected in answer.json()["detail"]
+
+
+def test_the_same_limits_hold_for_the_format_that_is_negotiated(loaded):
+    small = asker(create_app(loaded, Settings(output_limit=64 * 1024, crowd_frames=20)))
+    for path in (f"{WALK}.usdc", WALK):
+        large = small("GET", f"{path}?count=30&seconds=0.5")
+        assert large.status_code == 422 and "expected at most 0.1 MB" in large.json()["detail"]
+        long = small("GET", f"{path}?count=1&seconds=0.7")
+        assert long.status_code == 422 and "expected at most 20" in long.json()["detail"]
+        assert small("GET", f"{path}?count=2&seconds=0.5").status_code == 200
 
 
 def skeletons(path):
@@ -179,7 +222,7 @@ def test_shared_motions_are_sent_once(ask):
         ("camera=90,2,0&fov=0", 422, "fov"),
         ("camera=90,2,0&pixels=-1", 422, "pixels"),
         ("pixels=2", 422, "pixels"),
-        ("instancing=clones", 422, "instancing"),
+        ("instancing=clones", 400, "instancing"),
     ],
 )
 def test_a_walk_that_cannot_be_is_refused_before_it_begins(ask, query, status, parameter):

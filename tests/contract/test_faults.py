@@ -1,4 +1,4 @@
-"""The short form of benchmarks/serve_faults.py, and whether it would notice what it looks for."""
+"""A short run of benchmarks/serve_faults.py, and tests of its detection of errors."""
 
 import subprocess
 import sys
@@ -14,6 +14,8 @@ sys.path.insert(0, str(BENCHMARKS))
 from faults_book import Book  # noqa: E402
 from faults_known import Answer, Known, Question  # noqa: E402
 from faults_wire import Wire  # noqa: E402
+
+pytestmark = pytest.mark.system
 
 RIGHT = Answer(200, {"etag": '"a"'}, b"what it is")
 KNOWN = Known(Question("GET", "/pose"), "reach", (RIGHT,))

@@ -1,14 +1,10 @@
-"""Every header that an example's answer has is one that the contract names."""
+"""Tests of response headers: the contract documents all headers of the examples' responses."""
 
-import json
-from pathlib import Path
-
-import pytest
+import contract_examples
+from contract_examples import OPERATIONS, each_example
 
 from service.web import contract
 
-EXAMPLES = Path(__file__).parents[2] / "api/examples"
-OPERATIONS = {operation.id: operation for operation in contract.load().operations}
 # Of every answer of HTTP, or said once for all of them in the contract's introduction.
 USUAL = {
     *("content-type", "content-length", "content-encoding", "vary"),
@@ -17,10 +13,10 @@ USUAL = {
 }
 
 
-@pytest.mark.parametrize("name", OPERATIONS)
-def test_no_answer_has_a_header_that_the_contract_does_not_name(name, ask, spec, loaded):
+@each_example()
+def test_no_answer_has_a_header_that_the_contract_does_not_name(name, form, ask, spec, loaded):
     operation = OPERATIONS[name]
-    request = json.loads((EXAMPLES / name / "request.json").read_bytes())
+    request = contract_examples.request(name, form)
     given = {"json": request["body"]} if "body" in request else {}
     path = request["path"].replace("{version}", loaded.find("reach").session.digest)
     answer = ask(request["method"], path, headers=request.get("headers"), **given)

@@ -1,4 +1,4 @@
-"""Poses and clips that are held to targets and measured controls, and what is refused of these."""
+"""Tests of poses and clips with targets and exact controls, and of their errors."""
 
 import json
 from urllib.parse import urlencode

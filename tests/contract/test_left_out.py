@@ -1,4 +1,4 @@
-"""Controls that a request leaves out are chosen, and every format says so."""
+"""Tests of inferred controls: every format reports the controls that a request omits."""
 
 import io
 import json

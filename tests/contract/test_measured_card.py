@@ -1,4 +1,4 @@
-"""The card over HTTP says how a control is measured, and of none that was typed."""
+"""Tests of the card over HTTP: definitions of measured controls."""
 
 import jsonschema
 import pytest

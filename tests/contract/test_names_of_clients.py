@@ -1,7 +1,7 @@
-"""No name, path or address from a client reaches the file system or the network.
+"""Tests that names, paths and addresses from clients reach neither file system nor network.
 
-The real process tells of whatever is asked of the system in a client's words: Python's audit
-events, and, where strace is installed, system calls, those of libraries in C++ among them.
+The service process reports each access of the system with a client's text: Python's audit events
+and, where strace is installed, system calls, including those of C++ libraries.
 """
 
 import copy
@@ -17,6 +17,8 @@ from urllib.parse import quote
 
 import pytest
 from asking import exchange
+
+pytestmark = pytest.mark.system
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "api/examples"
@@ -94,7 +96,7 @@ def changed_bodies(node, name):
 def request(example):
     """The bytes of a request, which ends its connection."""
     body = json.dumps(example["body"]).encode() if "body" in example else b""
-    headers = {"Host": "x", "Connection": "close", **(example.get("headers") or {})}
+    headers = {"Host": "localhost", "Connection": "close", **(example.get("headers") or {})}
     if body:
         headers |= {"Content-Type": "application/json", "Content-Length": str(len(body))}
     lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())

@@ -1,9 +1,8 @@
-"""The contract as it is served, and its pages: the same for everybody, and standing alone."""
+"""Tests of the served contract and the HTML pages: equal for all clients and self-contained."""
 
+import html
 import json
 import re
-import shlex
-import xml.etree.ElementTree as ElementTree
 from base64 import b64encode
 from hashlib import sha256
 
@@ -14,14 +13,15 @@ from asking import asker
 from service.web import contract, pages
 from service.web.access import keys
 from service.web.app import create_app
-from service.web.contract import Contract
-from service.web.pages import docs, html, viewer
+from service.web.pages import standalone, templates
+from service.web.pages.problems import example
 from service.web.pages.texts import TEXTS
 from service.web.problems import KINDS
 from service.web.settings import Settings
 
-HTML = ["/docs", "/problems"]
-ALL = ["/openapi.yaml", "/openapi.json", "/", *HTML]
+BUILT = {"/": standalone.VIEWER, "/docs": standalone.DOCS}
+NO_ICON = '<link rel="icon" href="data:,"'
+ALL = ["/openapi.yaml", "/openapi.json", "/problems", *BUILT]
 
 
 def test_the_contract_is_served_as_it_is_written(ask, spec):
@@ -50,11 +50,11 @@ def test_a_page_is_not_sent_again(path, coding, ask):
 
 def test_the_tag_is_of_what_the_page_says(app):
     agreed = app.site.service.pages
-    changed = contract.parse(contract.load().source.replace(b"clips out", b"clips  out", 1))
-    for name, page in pages.made(changed).items():
+    changed = pages.made(contract.parse(contract.load().source.replace(b"clips out", b"clips", 1)))
+    for name, page in changed.items():
         assert (page.digest == agreed[name].digest) is (page.content == agreed[name].content)
-    assert pages.made(changed)["getDocs"].digest != agreed["getDocs"].digest
-    assert pages.made(changed)["getProblems"].digest == agreed["getProblems"].digest
+    assert changed["getContractJson"].digest != agreed["getContractJson"].digest
+    assert changed["getProblems"].digest == agreed["getProblems"].digest
 
 
 def test_a_closed_service_shows_its_pages_to_everybody(loaded):
@@ -66,31 +66,59 @@ def test_a_closed_service_shows_its_pages_to_everybody(loaded):
 
 
 def loads(page: str) -> list[str]:
-    """What a page would fetch or run."""
-    return re.findall(r"<script|<link|<iframe|<img|\ssrc=|\son\w+=|@import|url\(", page)
+    """What a page would fetch."""
+    return re.findall(r"<link|<iframe|<img|<object|\ssrc=|\son\w+=|\sstyle=|@import", page)
 
 
-@pytest.mark.parametrize("path", HTML)
-def test_a_page_loads_nothing_and_runs_nothing(path, ask):
+def inline(page: str, tag: str) -> list[str]:
+    return re.findall(rf"^\s*<{tag}\b[^>]*>(.*?)</{tag}>", page, re.DOTALL | re.MULTILINE)
+
+
+def digests(policy: str, tag: str) -> list[str]:
+    (sources,) = re.findall(rf"{tag}-src ([^;]+);", policy)
+    return re.findall(r"'sha256-([^']+)'", sources)
+
+
+@pytest.mark.parametrize("path", ["/problems", *BUILT])
+def test_a_page_loads_nothing_and_runs_what_stands_in_it(path, ask):
     answer = ask("GET", path)
-    assert loads(answer.text) == []
     policy = answer.headers["content-security-policy"]
-    (style,) = re.findall(r"<style>(.*?)</style>", answer.text, re.DOTALL)
-    digest = b64encode(sha256(style.encode()).digest()).decode()
-    assert policy.startswith(f"default-src 'none'; style-src 'sha256-{digest}';")
-    assert " style=" not in answer.text.partition("</style>")[2]
+    assert policy.startswith("default-src 'none'; ") and "unsafe" not in policy
+    assert "http" not in policy and "*" not in policy
+    rest = answer.text
+    for tag in ("script", "style"):
+        texts = inline(answer.text, tag)
+        own = [b64encode(sha256(text.encode()).digest()).decode() for text in texts]
+        assert digests(policy, tag) == own
+        assert len(own) == (0 if (path, tag) == ("/problems", "script") else 1)
+        for text in texts:
+            rest = rest.replace(text, "")
+    assert loads(rest.replace(NO_ICON, "")) == []
 
 
 def test_what_a_page_would_load_is_seen():
-    assert loads('<script src="x"></script><p onclick="x">') == ["<script", " src=", " onclick="]
+    assert loads('<script src="x"></script><p onclick="x">') == [" src=", " onclick="]
 
 
-@pytest.mark.parametrize("path", HTML)
-def test_every_link_leads_somewhere(path, ask):
-    page = ask("GET", path).text
+def test_only_scripts_and_styles_of_the_page_itself_are_named():
+    page = b"<script>a = '<style>b</style>'</script><style>c</style>"
+    policy = standalone.headers(page)["Content-Security-Policy"]
+    for tag, text in {"script": "a = '<style>b</style>'", "style": "c"}.items():
+        digest = b64encode(sha256(text.encode()).digest()).decode()
+        assert f"{tag}-src 'sha256-{digest}';" in policy
+    other = standalone.headers(page.replace(b"a =", b"a  ="))["Content-Security-Policy"]
+    assert other.partition("style-src")[0] != policy.partition("style-src")[0]
+    assert (
+        "script-src 'none'; style-src 'none'"
+        in standalone.headers(b"<p>")["Content-Security-Policy"]
+    )
+
+
+def test_every_link_of_the_problems_leads_somewhere(ask):
+    page = ask("GET", "/problems").text
     there = re.findall(r'id="([^"]+)"', page)
     assert len(there) == len(set(there))
-    for target in set(re.findall(r'href="([^"]+)"', page)):
+    for target in set(re.findall(r'<a href="([^"]+)"', page)):
         if target.startswith("#"):
             assert target[1:] in there
         elif target.startswith("/"):
@@ -99,100 +127,40 @@ def test_every_link_leads_somewhere(path, ask):
             assert target.startswith("https://www.rfc-editor.org/")
 
 
-def test_the_docs_show_every_operation_and_schema(ask, spec):
-    there = set(re.findall(r'id="([^"]+)"', ask("GET", "/docs").text))
-    assert {operation.id for operation in contract.load().operations} <= there
-    assert {f"schema-{name}" for name in spec["components"]["schemas"]} <= there
-
-
-def test_every_curl_line_of_the_docs_is_answered(ask, loaded):
-    lines = commands(ask("GET", "/docs").text)
-    assert len(lines) == len(contract.load().operations)
-    for line in lines:
-        method, path, given = understood(shlex.split(line))
-        # No two machines need train the same bytes.
-        path = path.replace("{version}", loaded.find("reach").session.digest)
-        assert ask(method, path, **given).status_code == 200, line
-
-
-def commands(page):
-    return [
-        "".join(ElementTree.fromstring(found).itertext())
-        for found in re.findall(r"<pre>.*?</pre>", page, re.DOTALL)
-        if "<code>curl " in found
-    ]
-
-
-def understood(words):
-    """Method, path and content of a curl command."""
-    assert words[0] == "curl" and words[1].startswith(docs.SERVER)
-    options = dict(zip(words[2::2], words[3::2], strict=False))
-    headers = dict([options["--header"].split(": ")]) if "--header" in options else {}
-    path, body = words[1].removeprefix(docs.SERVER), options.get("--json")
-    if body is None:
-        return "GET", path, {"headers": headers}
-    return "POST", path, {"headers": headers, "json": json.loads(body)}
-
-
-def test_what_the_contract_says_is_text(spec):
-    said = {"title": "<script>", "description": "<img> & `<b>`"}
-    document = {**spec, "info": {**spec["info"], **said}}
-    page = docs.page(Contract(b"", document, contract.load().operations)).content.decode()
-    assert loads(page) == []
-    assert "&lt;script&gt;" in page and "&lt;img&gt; &amp; <code>&lt;b&gt;</code>" in page
-
-
-def test_markdown_that_is_said_twice_is_not_one_element():
-    first, second = html.markdown("*a*"), html.markdown("*a*")
-    html.element("p", first, "tail")
-    assert second.tail is None
-
-
-def test_every_kind_of_problem_has_its_text_and_its_place(ask):
+def test_every_kind_of_problem_has_its_text_its_place_and_an_example(ask):
     assert set(TEXTS) == set(KINDS)
     page = ask("GET", "/problems").text
+    articles = re.findall(r'<article id="([^"]+)">(.*?)</article>', page, re.DOTALL)
+    assert sorted(name for name, _ in articles) == sorted(kind.name for kind in KINDS)
+    by_name = dict(articles)
     for kind in KINDS:
-        assert f'<article id="{kind.name}">' in page
-        for part in (kind.type, str(kind.status)):
-            assert part in page
+        article = html.unescape(by_name[kind.name])
+        for part in (kind.type, str(kind.status), kind.title):
+            assert part in article
+        (shown,) = re.findall(r"<pre><code>(.*?)</code></pre>", article, re.DOTALL)
+        assert shown == json.dumps(example(kind), indent=2)
 
 
-@pytest.fixture
-def built(tmp_path, monkeypatch):
-    """Puts a page where the built one lies."""
-
-    def put(text: str) -> str:
-        path = tmp_path / "index.html"
-        path.write_text(text)
-        monkeypatch.setattr(viewer, "BUILT", path)
-        return viewer.page().headers["Content-Security-Policy"]
-
-    return put
+def test_text_in_a_template_is_text():
+    kind = {"name": "n", "status": 400, "type": "<img>", "title": "<script>"}
+    text = {"comes": "a `<b>` & <i>", "remedy": "*so*"}
+    problem = {"kind": kind, "text": text, "example": "</code><script>"}
+    page = templates.render("problems.html", title="<T>", problems=[problem])
+    assert "<script>" not in page and "<img>" not in page and "<i>" not in page
+    assert "a <code>&lt;b&gt;</code> &amp; &lt;i&gt;" in page and "<em>so</em>" in page
 
 
-def test_the_viewer_runs_what_was_built_and_nothing_else(built):
-    one = built("<script type='module' crossorigin>go()</script><style>a { b: c }</style>")
-    for tag, content in (("script", "go()"), ("style", "a { b: c }")):
-        digest = b64encode(sha256(content.encode()).digest()).decode()
-        assert f"{tag}-src 'sha256-{digest}';" in one
-    assert "default-src 'none'" in one and "unsafe" not in one
-    assert built("<script>go( )</script>").partition("style-src")[0] not in one
-    assert "script-src 'none'" in built("<p>nothing")
+def test_a_page_that_was_not_built_says_how_to_build_it(tmp_path):
+    content = standalone.built(tmp_path / "index.html")
+    assert b"make page" in content and loads(content.decode().replace(NO_ICON, "")) == []
+    there = tmp_path / "index.html"
+    there.write_bytes(b"built")
+    assert standalone.built(there) == b"built"
 
 
-def test_without_a_built_page_it_says_how_to_build_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(viewer, "BUILT", tmp_path / "index.html")
-    assert b"make page" in viewer.page().content
-
-
-def test_the_built_page_is_served_and_loads_nothing(ask):
-    answer = ask("GET", "/")
-    assert answer.content == viewer.BUILT.read_bytes()
-    text = re.sub(
-        r"<script\b[^>]*>.*?</script>|<style\b[^>]*>.*?</style>", "", answer.text, flags=re.S
-    )
-    assert loads(text.replace('<link rel="icon" href="data:,"', "")) == []
-    assert " style=" not in text
+@pytest.mark.parametrize("path", BUILT)
+def test_a_built_page_is_served_as_it_was_built(path, ask):
+    assert ask("GET", path).content == BUILT[path].read_bytes()
 
 
 def test_the_service_says_which_contract_it_speaks(ask, spec):

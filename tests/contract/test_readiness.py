@@ -1,15 +1,17 @@
-"""Ready is a service whose models answer as they did when they were opened, and that goes on."""
+"""Tests of readiness: unchanged output of the models, and no shutdown in progress."""
 
 import dataclasses
 import shutil
+import time
 
+import model_files
 import pytest
 from asking import asker
+from model_files import numbered
 
 from service.synthesis import library
 from service.synthesis.library import Bounds, Library
 from service.synthesis.shelf import Fixed, Shelf
-from service.web import readiness
 from service.web.app import create_app
 from service.web.readiness import Readiness
 from service.web.settings import Settings
@@ -82,7 +84,7 @@ def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkey
 
     counted = changed(model, runtimes=(Counted(),))
     clock = [100.0]
-    monkeypatch.setattr(readiness.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     fixed = Fixed(Library({"reach": counted}))
     ready = Readiness(fixed)
     for moment, times in ((100.0, 1), (100.9, 1), (101.1, 2)):
@@ -107,17 +109,54 @@ def test_a_broken_new_file_is_told_and_the_old_one_is_ready(told, models, tmp_pa
     told_of = answer.json()["reload"]
     assert (told_of["looks"], told_of["opened"], told_of["failed"]) == (3, 1, 1)
     # No more than that: a message may name paths.
-    detail = "onnxruntime cannot load it"
+    detail = "does not end with its checksum"
     assert told_of["faults"] == [{"model": "reach", "version": "", "detail": detail}]
     assert str(tmp_path) not in answer.text and str(tmp_path) in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("hostile", "said"),
+    [
+        (model_files.large, "takes more than 512 MB of memory to open"),
+        (
+            model_files.loop,
+            "it has a field 7.1.5.6 of onnx.proto, which posefield does not write",
+        ),
+        (
+            model_files.fill,
+            "its graph has an operator 'ConstantOfShape', which posefield does not use",
+        ),
+        (model_files.deep, "its card's entry 'diagnostics' is wrong"),
+    ],
+)
+def test_a_file_that_is_meant_to_do_harm_is_told_and_the_others_are_taken(
+    told, models, tmp_path, caplog, hostile, said
+):
+    """In /readyz, the metric and the log."""
+    shutil.copy(models / "reach.onnx", tmp_path)
+    shelf = Shelf([tmp_path], Bounds())
+    (tmp_path / "bad.onnx").write_bytes(hostile((models / "reach.onnx").read_bytes()))
+    shutil.copy(models / "walk.onnx", tmp_path)
+    shelf.look()
+    shelf.look()
+    ready = Readiness(shelf)
+    answer = told(ready)
+    assert answer.status_code == 200
+    names = [identity.partition("@")[0] for identity in answer.json()["models"]]
+    assert sorted(names) == ["reach", "walk"]
+    expected = [{"model": "bad", "version": "", "detail": said}]
+    assert answer.json()["reload"]["faults"] == expected
+    assert f"bad.onnx: {said}" in caplog.text
+    page = asker(create_app(ready, Settings()))("GET", "/metrics").text
+    assert 'posefield_reloads{what="faults"} 1.0' in page
+    assert 'posefield_reloads{what="failed"} 1.0' in page
+
+
 def test_versions_are_listed_and_each_answers_under_its_hash(models, tmp_path):
     content = (models / "reach.onnx").read_bytes()
-    # The same model but for its description in the file's own words.
-    for version, more in (("1", b""), ("2", b"\x32\x01x")):
+    for version in (1, 2):
         (tmp_path / "reach").mkdir(exist_ok=True)
-        (tmp_path / f"reach/{version}.onnx").write_bytes(content + more)
+        (tmp_path / f"reach/{version}.onnx").write_bytes(numbered(content, version))
     ask = asker(create_app(Readiness(Shelf([tmp_path], Bounds())), Settings()))
     (listed,) = ask("GET", "/v1/models").json()["models"]
     assert listed["identity"] == listed["versions"][0] and len(listed["versions"]) == 2

@@ -1,4 +1,4 @@
-"""Grids of sigma over HTTP: one grid in every format, and refusals that tell."""
+"""Tests of grids of sigma over HTTP: equal in all formats, and errors."""
 
 import io
 import json

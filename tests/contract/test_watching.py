@@ -1,15 +1,17 @@
-"""What an operator sees: counters for Prometheus and one line for each request."""
+"""Tests of monitoring: Prometheus metrics and the request log."""
 
 import asyncio
+import contextlib
 import json
 import os
+import socket
 from urllib.parse import urlencode
 
 import pytest
 from asking import asker
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.web import deadline, log, metrics
+from service.web import log, metrics
 from service.web.app import create_app
 from service.web.settings import Settings
 from service.web.telling import Telling
@@ -35,43 +37,29 @@ def pose(ask, controls, **headers):
 
 
 def test_requests_are_counted_by_operation_and_status(ask, controls, page):
+    labels = {"operation": "getPose", "format": "json"}
+
     def counted(status):
-        labels = {"operation": "getPose", "status": status}
-        return value(now, "posefield_request_seconds_count", **labels)
+        return value(now, "posefield_request_seconds_count", **labels, status=status)
 
     now = page()
     before = [counted(status) for status in ("200", "304", "422")]
-    held = value(now, "posefield_not_modified_total", operation="getPose")
-    size = value(now, "posefield_sent_bytes_total", operation="getPose")
+    held = value(now, "posefield_not_modified_total", **labels)
+    size = value(now, "posefield_sent_bytes_total", **labels)
     first = pose(ask, controls)
     pose(ask, controls, **{"if-none-match": first.headers["etag"]})
     refused = pose(ask, {**controls, "spin": 1.0})
     now = page()
     assert [counted(s) for s in ("200", "304", "422")] == [n + 1 for n in before]
-    assert value(now, "posefield_not_modified_total", operation="getPose") == held + 1
+    assert value(now, "posefield_not_modified_total", **labels) == held + 1
     sent = int(first.headers["content-length"]) + len(refused.content)
-    assert value(now, "posefield_sent_bytes_total", operation="getPose") == size + sent
+    assert value(now, "posefield_sent_bytes_total", **labels) == size + sent
 
 
 def test_paths_of_clients_are_no_labels(ask, page):
     ask("GET", "/nowhere/a1b2c3")
     assert "a1b2c3" not in page()
     assert value(page(), "posefield_request_seconds_count", operation="none", status="404") > 0
-
-
-def test_open_requests_are_looked_at(page):
-    async def three():
-        watch = deadline.Watch()
-        waits = [watch.within(30.0, asyncio.sleep(2.5 * deadline.LOOK)) for _ in range(3)]
-        waiting = asyncio.gather(*waits)
-        await asyncio.sleep(1.5 * deadline.LOOK)
-        now = value(metrics.page().decode(), "posefield_open_requests")
-        await waiting
-        await asyncio.sleep(2.5 * deadline.LOOK)
-        return now
-
-    assert asyncio.run(three()) == 3.0
-    assert value(metrics.page().decode(), "posefield_open_requests") == 0.0
 
 
 @pytest.fixture
@@ -94,7 +82,8 @@ def told(loaded):
 def test_a_request_is_one_line(told, loaded, controls):
     url = f"/v1/models/reach/clip.usdc?{urlencode(controls)}"
     answer, (line,) = told("GET", url, headers={"x-request-id": "mine"})
-    assert line["request"] == "mine" and line["operation"] == "getClipUsdc"
+    assert line["request"] == "mine"
+    assert (line["operation"], line["format"]) == ("getClipInFormat", "usdc")
     assert line["model"] == loaded.find("reach").identity
     assert (line["method"], line["status"]) == ("GET", 200)
     assert line["bytes"] == len(answer.content)
@@ -109,6 +98,7 @@ LINE = (
     "trace",
     "method",
     "operation",
+    "format",
     "model",
     "who",
     "tag",
@@ -130,12 +120,26 @@ def test_a_moment_is_a_time_of_day():
     assert log.moment(1_763_742_000.999) == "2025-11-21T16:20:00.999Z"
 
 
+async def written(contents, target):
+    lines = log.Lines(target)
+    for content in contents:
+        lines.add(content)
+    lines.flush()
+
+
 def test_lines_are_written_whole():
-    short, long = [b"x" * 100] * 100, [b"y" * 9000]
-    pieces = log._pieces([*short, *long, *short])
-    assert b"".join(pieces) == b"".join([*short, *long, *short])
-    assert [len(p) for p in pieces if b"y" not in p] == [4000, 4000, 2000] * 2
-    assert b"y" * 9000 in pieces
+    short, long = {"x": "x" * 91}, {"y": "y" * 8991}
+    reader, writer = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    reader.setblocking(False)
+    pieces = []
+    with reader, writer, contextlib.suppress(BlockingIOError):
+        asyncio.run(written([*[short] * 100, long, *[short] * 100], writer.fileno()))
+        # Each datagram is the content of one system call.
+        while True:
+            pieces.append(reader.recv(1 << 16))
+    assert [len(piece) for piece in pieces] == [4000, 4000, 2000, 9000, 4000, 4000, 2000]
+    lines = [json.loads(line) for line in b"".join(pieces).splitlines()]
+    assert lines == [*[short] * 100, long, *[short] * 100]
 
 
 def test_a_line_names_the_trace_of_its_request(told):

@@ -1,4 +1,4 @@
-"""What an answer is made of, over HTTP."""
+"""Tests of the operation `why` over HTTP: captured clips and their weights."""
 
 from urllib.parse import urlencode
 

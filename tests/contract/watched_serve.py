@@ -1,5 +1,7 @@
-"""`posefield serve` that tells on file descriptor WATCH of each thing asked of the system in words
-that name the canary; with PLANT set, a model's name is looked up as a file first."""
+"""`posefield serve` with a log on file descriptor WATCH of system accesses that contain the canary.
+
+With PLANT set, a model's name is first looked up as a file, as a check of the detection.
+"""
 
 import os
 import sys

@@ -1,9 +1,9 @@
-"""The Blender add-on, installed and driven in both Blenders, against our own kinematics.
+"""Test of the Blender add-on in both Blenders against the kinematics of this project.
 
     .venv/bin/python tests/interop/addon.py
 
-Every joint of every frame must be where the model says; each row stands beside one in which the
-same frames must not be what was asked for otherwise.
+Every joint of every frame must be at the model's position; each row has a control row, whose frames
+must differ from those of another request.
 """
 
 import json
@@ -23,8 +23,8 @@ from compare import FURTHEST, TURNED
 
 from service.motion import quat, skeleton
 from service.motion.clip import Clip, assemble
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips, session
-from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 HERE = Path(__file__).parent

@@ -1,9 +1,8 @@
-"""Drives the add-on inside Blender: addon_drive.py ARCHIVE ADDRESS PID RESULT README WALKS.
+"""Driver of the add-on inside Blender: addon_drive.py ARCHIVE ADDRESS PID RESULT README WALKS.
 
-The archive is installed as Blender installs extensions. What armatures did is kept with what was
-asked for, to be compared elsewhere; what was said and done besides, as facts. PID is the service's,
-which is stopped in the end. WALKS: of each gait the model, a performer, and controls at which it
-goes straight on.
+It installs the archive as an extension. It records the armatures' motion with the requested one for
+later comparison, and messages and other effects as facts. PID is the service's process, which is
+stopped at the end. WALKS: for each gait the model, a performer, and controls that walk straight.
 """
 
 import json

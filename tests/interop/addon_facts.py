@@ -1,4 +1,4 @@
-"""What the add-on must have said and done while it was driven."""
+"""Expected messages and effects of the add-on while it was driven."""
 
 from typing import Any
 

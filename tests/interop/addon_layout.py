@@ -1,4 +1,4 @@
-"""The add-on's panel without a window: Blender draws none in the background."""
+"""Stand-in for Blender's panel layout, since Blender draws no window in the background."""
 
 from types import SimpleNamespace
 

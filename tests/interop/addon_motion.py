@@ -1,4 +1,4 @@
-"""Clips on new and existing armatures, at all rates and as loops: how the joints move."""
+"""Checks of joint motion: clips on new and existing armatures, at all rates and as loops."""
 
 import time
 

@@ -1,6 +1,6 @@
-"""What driving the add-on inside Blender takes: a scene afresh, sliders, and what came of it.
+"""Helpers to drive the add-on inside Blender: scenes, sliders and recordings.
 
-`cases` and `arrays` keep where joints were and what was asked for, `facts` what was said and done.
+`cases` and `arrays` hold recorded and requested joint positions, `facts` messages and effects.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""What the add-on refuses, and what may happen between a question and its answer."""
+"""Checks of the add-on's errors, and of events between a request and its response."""
 
 import os
 import signal
@@ -108,8 +108,8 @@ def another_model(model, performer):
     wait()
     asked = []
     part("live").stop()
-    part("live")._asking = part("without_blender.latest").Latest(lambda _: None)
-    part("live")._asking.ask = asked.append
+    part("live").asking = part("without_blender.latest").Latest(lambda _: None)
+    part("live").asking.ask = asked.append
     settings().model = "reaching"
     part("live").stop()
     newest = asked[-1].question
@@ -124,7 +124,7 @@ def unforeseen():
     bpy.ops.posefield.import_clip()
     settings().live = True
     wait()
-    part("live")._asking.ask(None)
+    part("live").asking.ask(None)
     wait()
     facts["unforeseen"] = list(part("session").current.said)
     slide(stature=1.7)
@@ -174,7 +174,7 @@ def reload(file):
     settings().live = True
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     slide(stature=1.8)
-    thread = part("live")._asking
+    thread = part("live").asking
     bpy.ops.wm.open_mainfile(filepath=str(file))
     facts["reload: thread ended"] = thread.join(PATIENCE)
     facts["reload: next look"] = part("live").tick()
@@ -224,7 +224,7 @@ def stopped(pid):
 def switched_off():
     live = part("live")
     slide(stature=1.75)
-    thread = live._asking
+    thread = live.asking
     tick = live.tick
     facts["on: timer"] = bpy.app.timers.is_registered(tick)
     facts["on: threads"] = threads()

@@ -1,7 +1,7 @@
-"""Reads USD and glTF files in Blender with its default options: blender_read.py FOLDER RESULT.npz.
+"""Reader of USD and glTF files in Blender with default options: blender_read.py FOLDER RESULT.npz.
 
 For each character of a file the result holds FILE/NAME/joints, and FILE/NAME/matrices (F, J, 4, 4):
-the joints in the world, column vectors, Y up, metres. Without an animation it has no frames.
+the joints in the world, column vectors, Y up, metres. A file without animation has no frames.
 """
 
 import sys

@@ -1,8 +1,6 @@
-"""nginx before the service, by the configuration that we ship: what is kept, and what never."""
+"""Checks of the shipped nginx configuration as a cache: cached and uncached responses."""
 
-import os
 import re
-import subprocess
 import sys
 import tempfile
 import time
@@ -13,15 +11,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Barrier
 
-import debian
-import environment
 import httpx
+import proxy
 import running
 import trained
 
-CONF = environment.ROOT / "service/deploy/nginx.conf"
-# Another file of the same model: a text that is nothing to it, as field 6 of onnx.proto.
-REMARK = b"\x32\x01x"
+from service.motion import checksum
+from service.synthesis import protobuf
+
+# Another file of the same model: one more entry of metadata, field 14 of onnx.proto.
+REMARK = protobuf.nested(14, protobuf.nested(1, b"remark") + protobuf.nested(2, b"x"))
 # Seconds: of POSEFIELD_ALIAS_SECONDS and _RELOAD, and until what hangs on them must have happened.
 AGAIN, PATIENCE = 1, 20.0
 # Clips that twenty ask for at once: of one alone, chance may keep the others until it is there.
@@ -52,21 +51,20 @@ class Site:
         answer = self.cache.get(path, params=self.query, headers=headers)
         return answer.headers.get("x-cache-status", ""), answer
 
-    def asked(self, operation: str, status: int) -> int:
-        """How often the service itself has answered so."""
-        pattern = (
-            rf'^posefield_request_seconds_count{{operation="{operation}",status="{status}"}} (\S+)'
-        )
+    def asked(self, form: str, status: int) -> int:
+        """How often the service itself has answered with a clip of that format."""
+        labels = f'format="{form}",operation="getClipInFormat",status="{status}"'
+        pattern = rf"^posefield_request_seconds_count{{{labels}}} (\S+)"
         found = re.search(pattern, self.service.get("/metrics").text, re.MULTILINE)
         return int(float(found[1])) if found else 0
 
 
 def faults() -> list[str]:
     """What the cache does that it should not, or does not that it should, a line each."""
-    if reason := debian.missing({"nginx": "nginx-light"}):
+    if reason := proxy.missing():
         print(f"no cache before the service: {reason}")
         return []
-    ours = spoiled = CONF.read_text()
+    ours = spoiled = proxy.CONF.read_text()
     for line, (other, _) in SPOILED.items():
         spoiled = spoiled.replace(line, other)
     found, noticed = _faults(ours), _faults(spoiled)
@@ -91,10 +89,10 @@ def _faults(text: str) -> list[str]:
 def _kept(site: Site) -> Iterator[str]:
     path = f"/v1/models/{_identity(site)}/clip.usdc"
     direct = site.service.get(path, params=site.query)
-    before = site.asked("getClipUsdc", 200)
+    before = site.asked("usdc", 200)
     (first, made), (second, kept) = site.get(path), site.get(path)
     yield from _expected("under a hash", (first, second), ("MISS", "HIT"))
-    yield from _expected("asked of the service", site.asked("getClipUsdc", 200) - before, 1)
+    yield from _expected("asked of the service", site.asked("usdc", 200) - before, 1)
     yield from _expected("the bytes", made.content == kept.content == direct.content, True)
     one, other = (answer.headers.get_list("x-request-id") for answer in (made, kept))
     yield from _expected("ids of two requests", len({*one, *other}), len(one + other))
@@ -110,17 +108,17 @@ def _kept(site: Site) -> Iterator[str]:
 def _asked_again(site: Site, folder: Path) -> Iterator[str]:
     alias, old = "/v1/models/reaching/clip.usdc", _identity(site)
     first, made = site.get(alias)
-    before = site.asked("getClipUsdc", 200), site.asked("getClipUsdc", 304)
+    before = site.asked("usdc", 200), site.asked("usdc", 304)
     time.sleep(EXPIRED)
     second, again = site.get(alias)
-    after = site.asked("getClipUsdc", 200), site.asked("getClipUsdc", 304)
+    after = site.asked("usdc", 200), site.asked("usdc", 304)
     yield from _expected("under the name", (first, second), ("MISS", "REVALIDATED"))
     yield from _expected("asked again", (after[0] - before[0], after[1] - before[1]), (0, 1))
     yield from _expected("the same bytes", again.content == made.content, True)
 
     path = folder / "models/reaching.onnx"
     aside = folder / "new.onnx"
-    aside.write_bytes(path.read_bytes() + REMARK)
+    aside.write_bytes(checksum.sealed(path.read_bytes()[: -checksum.SIZE] + REMARK))
     aside.rename(path)
     end = time.monotonic() + PATIENCE
     while (new := _identity(site)) == old and time.monotonic() < end:
@@ -171,10 +169,10 @@ def _never_kept(site: Site) -> Iterator[str]:
 
 
 def _at_once(site: Site) -> Iterator[str]:
-    path, before = f"/v1/models/{_identity(site)}/clip.glb", site.asked("getClipGlb", 200)
+    path, before = f"/v1/models/{_identity(site)}/clip.glb", site.asked("glb", 200)
     with ThreadPoolExecutor(20) as crowd:
         found = [_crowded(_at(site, 31.0 + i), crowd, path) for i in range(CLIPS)]
-    asked = site.asked("getClipGlb", 200) - before
+    asked = site.asked("glb", 200) - before
     yield from _expected("twenty at once", (set(found), asked), ({1}, CLIPS))
 
 
@@ -218,37 +216,12 @@ def _sited(folder: Path, text: str) -> Iterator[Site]:
     controls = {control.name: control.default for control in model.session.card.controls}
     with (
         running.started(command, folder / "service.txt", **told),
-        running.started(_nginx(folder, text, own, before), folder / "nginx.txt"),
+        running.started(proxy.command(folder, text, own, before), folder / "nginx.txt"),
         httpx.Client(base_url=f"http://127.0.0.1:{own}", timeout=30) as service,
         httpx.Client(base_url=f"http://127.0.0.1:{before}", timeout=30) as cache,
     ):
         running.wait(lambda: cache.get("/readyz").status_code == 200)
         yield Site(service, cache, controls)
-
-
-def _nginx(folder: Path, text: str, service: int, port: int) -> list[str | Path]:
-    """A configuration with its places put elsewhere, within the least that nginx needs."""
-    places = {
-        "127.0.0.1:8000": f"127.0.0.1:{service}",
-        "listen 8080": f"listen 127.0.0.1:{port}",
-        "/var/cache/nginx/posefield": str(folder / "cache"),
-    }
-    for usual, here in places.items():
-        assert text.count(usual) == 1, usual
-        text = text.replace(usual, here)
-    folders = "".join(
-        f"{kind}_temp_path {folder / kind};\n"
-        for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
-    )
-    user = "user root;\n" if os.geteuid() == 0 else ""
-    whole = (
-        f"{user}daemon off;\npid {folder / 'nginx.pid'};\nerror_log stderr;\nevents {{}}\n"
-        f"http {{\naccess_log off;\n{folders}{text}}}\n"
-    )
-    path = folder / "nginx.conf"
-    path.write_text(whole)
-    subprocess.run(["nginx", "-t", "-q", "-c", path], check=True)
-    return ["nginx", "-c", path]
 
 
 if __name__ == "__main__":

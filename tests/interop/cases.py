@@ -1,4 +1,4 @@
-"""The clips that other programs must read as we do, and one that they must not."""
+"""Clips for the readers' tests, and an invalid clip that they must refuse."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Whether a reader saw the joints where they were meant to be."""
+"""Comparison of the joint positions in a reader with the expected ones."""
 
 from dataclasses import dataclass
 from pathlib import Path

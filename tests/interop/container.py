@@ -1,4 +1,4 @@
-"""The image runs where it may write nothing, and answers there what the service answers here."""
+"""Checks of the image on a read-only file system: responses equal those of the service here."""
 
 import json
 import os
@@ -19,11 +19,11 @@ from image import Image
 
 from service import __version__
 from service.encode import ENCODERS, POSE_ENCODERS
+from service.question.motion_question import ClipQuestion, PoseQuestion
 from service.synthesis import clips, poses
-from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web.access import keys
-from service.web.pages import viewer
+from service.web.pages import standalone
 
 # What the Dockerfile adds to its base: 334 MB were measured, 428 before anything was left out.
 BUDGET = 350_000_000
@@ -61,7 +61,7 @@ def _described(built: Image) -> Iterator[str]:
         "title": "posefield",
         "version": __version__,
         "licenses": "Apache-2.0",
-        "base.name": image.base(),
+        "base.name": "docker.io/library/python:3.11-slim-bookworm",
         "source": image.SOURCE,
         "revision": image.REVISION,
     }
@@ -139,10 +139,10 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
 def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
     """Faults of answers, which have to be those of here to the last byte."""
     controls = {control.name: control.default for control in model.session.card.controls}
-    clip = clips.clip(model, ClipQuestion(controls))
+    clip = clips.clip(model, ClipQuestion(controls=controls))
     expected = {
         f"/v1/models/{model.name}/pose": POSE_ENCODERS["json"].encode(
-            poses.pose(model, PoseQuestion(controls, [0.5]))
+            poses.pose(model, PoseQuestion(controls=controls, times=[0.5]))
         ),
         f"/v1/models/{model.name}/clip.usdc": ENCODERS["usdc"].encode(
             clip, ENCODERS["usdc"].convention(None, None)
@@ -153,8 +153,9 @@ def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
         for path in ("/livez", "/readyz"):
             if (status := client.get(path).status_code) != httpx.codes.OK:
                 yield f"{path} answers {status}"
-        if client.get("/").content != viewer.BUILT.read_bytes():
-            yield "/ is not the page that was built here"
+        for path, built in (("/", standalone.VIEWER), ("/docs", standalone.DOCS)):
+            if client.get(path).content != built.read_bytes():
+                yield f"{path} is not the page that was built here"
         for path, content in expected.items():
             answer = client.get(
                 path, params=controls | {"time": 0.5} if "pose" in path else controls

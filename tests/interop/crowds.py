@@ -1,4 +1,4 @@
-"""Crowds that other programs must read as we do, those that they are known not to, and a wrong one.
+"""Crowds for the readers' tests: supported ones, known unsupported ones and a wrong one.
 
 Eight characters play five motions; all positions, headings and sizes differ.
 """
@@ -9,6 +9,7 @@ import cases
 import numpy as np
 
 from service.encode import crowd
+from service.encode.crowd import writer
 from service.motion import clip as clips
 from service.motion import quat
 from service.motion.crowd import CrowdClip, Motions, Placement
@@ -39,9 +40,9 @@ def write(folder: Path) -> dict[str, dict[str, Path]]:
     for index, path in enumerate(expectations.values()):
         np.savez(path, **_expected(made, placement, index))
     ahead = Placement(placement.positions, np.zeros(len(MOTION)))
-    crowd.write(_crowd(made, ahead), folder / f"{CONTROL}.usdc", "flatten")
+    writer.write(_crowd(made, ahead), folder / f"{CONTROL}.usdc", "flatten")
     for name, ending, instancing in FILES:
-        crowd.write(_crowd(made, placement), folder / f"{name}.{ending}", instancing)
+        writer.write(_crowd(made, placement), folder / f"{name}.{ending}", instancing)
     names = [f"{CONTROL}.usdc", *(f"{name}.{ending}" for name, ending, _ in FILES)]
     return dict.fromkeys(names, expectations)
 

@@ -1,4 +1,4 @@
-"""Programs of Debian's packages, installed where they are missing."""
+"""Installation of missing Debian packages for the checks."""
 
 import os
 import shutil

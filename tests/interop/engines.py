@@ -1,7 +1,7 @@
-"""The same model file in other engines, unchanged: each answers what the service answers.
+"""Comparison of the same model file in other inference engines with onnxruntime's results.
 
-Over the Open Inference Protocol, by Triton's client: our own service, MLServer and Triton. In a
-process of their own: OpenVINO, and onnxruntime-web on Node.
+MLServer and Triton are called over the Open Inference Protocol with Triton's client; OpenVINO and
+onnxruntime-web (on Node) run in their own processes.
 """
 
 import json
@@ -92,9 +92,6 @@ def _question(session: Session) -> dict[str, np.ndarray]:
 
 def _served(python: Path, folder: Path) -> Iterator[tuple[str, Tensors]]:
     """Answers over the protocol by engine and way to send tensors."""
-    with _ours(folder) as address:
-        yield "posefield", _asked(python, folder, address)
-        yield "posefield, JSON", _asked(python, folder, address, "--json")
     with _mlserver(python, folder) as address:
         yield "MLServer, JSON", _asked(python, folder, address, "--json")
     if not sysconfig.get_config_var("Py_ENABLE_SHARED"):
@@ -110,14 +107,6 @@ def _asked(python: Path, folder: Path, address: str, *options: str) -> Tensors:
     command = (python, client, address, "reaching", folder / "question.npz", result, *options)
     _call(*command)
     return _loaded(result)
-
-
-@contextmanager
-def _ours(folder: Path) -> Iterator[str]:
-    port = running.ports(1)[0]
-    command = [Path(sys.executable).with_name("posefield"), "serve", folder]
-    with running.started(command, folder / "said.txt", POSEFIELD_PORT=str(port)):
-        yield f"127.0.0.1:{port}"
 
 
 @contextmanager

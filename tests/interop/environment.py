@@ -1,8 +1,7 @@
-"""The programs that read our files: Blender as a Python module, three.js on Node, and the Khronos
-glTF validator beside it; Redocly, which lints the contract; and what else the checks install.
+"""Environment of the checks: Blender as a Python module, three.js on Node, the Khronos glTF
+validator, Redocly for the contract, and further packages.
 
-Everything a machine needs beforehand is Python 3.11; Debian's libraries for Blender are fetched
-where they are missing.
+The machine needs only Python 3.11; missing Debian libraries for Blender are downloaded.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A thousand clips exported at once: every file is checked, and twenty are read back."""
+"""Check of an export of a thousand clips: every file is checked, and twenty are read back."""
 
 import json
 import shutil
@@ -11,8 +11,8 @@ import numpy as np
 import trained
 
 from service.check import check
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips
-from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 CLIPS, READ = 1000, 20
@@ -52,6 +52,6 @@ def _taken(model: Synthesizer, entry: dict, folder: Path) -> tuple[str, dict[str
     path = folder / f"export_{made.name.replace('-', '_')}"
     shutil.copyfile(made, path)
     expectation = folder / f"{path.name}.npz"
-    question = ClipQuestion(entry["controls"], entry["fps"])
+    question = ClipQuestion(controls=entry["controls"], fps=entry["fps"])
     np.savez(expectation, **cases.matrices_of(clips.clip(model, question).clip))
     return path.name, {cases.WHO: expectation}

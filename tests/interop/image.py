@@ -1,12 +1,10 @@
-"""The image of the Dockerfile, built for real where there is no container engine.
+"""Build of the Dockerfile's image on a machine without a container engine.
 
-buildah builds it as it is; in place of the base, which lies in a registry, there is one of Debian's
-packages under the same name.
+buildah builds it unchanged; a base image of Debian's packages replaces the one in the registry.
 """
 
 import json
 import os
-import re
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +17,7 @@ import environment
 TOOLS = {"buildah": "buildah", "mmdebstrap": "mmdebstrap"}
 ROOTFS = environment.ROOT / "build/image/rootfs.tar"
 PACKAGES = "ca-certificates,python3.11,python3.11-venv,python3-pip,python-is-python3"
+BASE = "localhost/posefield-base:interop"
 NAME, SOURCE, REVISION = "posefield:interop", "https://example.org/posefield", "0" * 40
 # Where the machine trusts another certificate authority, or takes packages from elsewhere.
 LENT = ("/etc/ssl/certs/ca-certificates.crt", "/etc/pip.conf")
@@ -78,22 +77,17 @@ def built() -> Iterator[Image]:
     lent = [word for path in LENT if Path(path).exists() for word in ("-v", f"{path}:{path}:ro")]
     told = ["--build-arg", f"SOURCE={SOURCE}", "--build-arg", f"REVISION={REVISION}"]
     # Docker's format: the other one knows no HEALTHCHECK.
+    told += ["--build-arg", f"BASE={BASE}"]
     _build("--format", "docker", "--network", "host", *lent, *told, "-t", NAME, environment.ROOT)
     container = _buildah("from", "--pull-never", NAME)
     try:
         root = Path(_buildah("mount", container))
         (root / "models").mkdir()
-        of_base = _layers(base())
+        of_base = _layers(BASE)
         own = sum(_layers(NAME)) - sum(of_base)
         yield Image(root, _inspected(NAME)["Docker"]["config"], own, sum(of_base))
     finally:
         _buildah("rm", container)
-
-
-def base() -> str:
-    """Name of the image that the Dockerfile is built on."""
-    found = re.findall(r"^FROM (\S+)", (environment.ROOT / "Dockerfile").read_text(), re.MULTILINE)
-    return f"docker.io/library/{found[-1]}"
 
 
 def _base() -> None:
@@ -105,10 +99,10 @@ def _base() -> None:
         options = ("--variant=minbase", f"--include={PACKAGES}", f"--customize-hook={freed}")
         _run("mmdebstrap", "--quiet", *options, "bookworm", aside)
         aside.rename(ROOTFS)
-    if subprocess.run(["buildah", "inspect", base()], capture_output=True).returncode:
+    if subprocess.run(["buildah", "inspect", BASE], capture_output=True).returncode:
         recipe = ROOTFS.with_name("base.Dockerfile")
         recipe.write_text(f"FROM scratch\nADD {ROOTFS.name} /\n")
-        _build("-f", recipe, "-t", base(), ROOTFS.parent)
+        _build("-f", recipe, "-t", BASE, ROOTFS.parent)
 
 
 def _build(*words: str | Path) -> None:

@@ -1,8 +1,8 @@
-"""Asks a server of the Open Inference Protocol by Triton's own client.
+"""Client of a server of the Open Inference Protocol, with Triton's own library.
 
     inference_client.py HOST:PORT MODEL QUESTION.npz RESULT.npz [--json]
 
-All that is asked is one question, tensor by tensor; --json keeps to what has no binary tensors.
+It sends one request, with one tensor per input; --json selects JSON instead of binary tensors.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""The contract is sound to Redocly, which finds what is broken on purpose."""
+"""Checks of the contract by Redocly, which must also detect deliberate errors."""
 
 import json
 import os

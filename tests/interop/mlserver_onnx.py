@@ -1,4 +1,4 @@
-"""A model file in MLServer: onnxruntime behind its own protocol and codecs."""
+"""MLServer runtime of a model file: onnxruntime behind MLServer's protocol and codecs."""
 
 import onnxruntime
 from mlserver import MLModel

@@ -1,4 +1,4 @@
-"""Asks a model file in OpenVINO, which has no part of onnxruntime.
+"""Evaluation of a model file in OpenVINO.
 
 openvino_read.py MODEL.onnx QUESTION.npz RESULT.npz
 """

@@ -1,4 +1,4 @@
-"""The page in a browser: everything on it is clicked, for a procedural and a real model."""
+"""Checks of the pages at `/` and `/docs` in a browser, for a procedural and a real model."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ import httpx
 import running
 import trained
 
-VIEWER = environment.ROOT / "clients/viewer"
+CLIENTS = environment.ROOT / "clients"
 REAL = "cmu_walk"
 
 
@@ -44,7 +44,7 @@ def _models(folder: Path, real: bytes) -> Path:
 
 
 def _clicked(node: Path, address: str, models: Path) -> list[str]:
-    tests = sorted(VIEWER.glob("test/*.page.ts"))
+    tests = sorted(CLIENTS.glob("*/test/*.page.ts"))
     told = {
         "POSEFIELD_URL": address,
         "POSEFIELD_MODELS": str(models),
@@ -53,7 +53,7 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
     # One after the other: they measure.
     options = ("--test-concurrency=1", "--test-timeout=300000", "--test-reporter=spec")
     command = [node, "--test", *options, *tests]
-    done = subprocess.run(command, cwd=VIEWER, env=os.environ | told, text=True)
+    done = subprocess.run(command, cwd=CLIENTS, env=os.environ | told, text=True)
     return [f"page: {len(tests)} files of tests ended with {done.returncode}"] * bool(
         done.returncode
     )

@@ -1,13 +1,12 @@
-"""Reads our files back in Blender and three.js and prints how far every joint is off.
+"""Interoperability checks; prints the position errors of joints in Blender and three.js.
 
     .venv/bin/python tests/interop/run.py
 
-Fails when a reader sees a joint elsewhere than our own kinematics, no animation, or another number
-of frames; and when a file passes that was damaged on purpose, or that the reader is known not to
-read. glTF files must also be without an error or a warning to the Khronos validator, and the
-contract to Redocly. Then builds the image and asks the service in it, puts a cache before the
-service, asks the model in other engines, clicks through the page in a browser, and drives the
-Blender add-on.
+It fails if a reader differs from the kinematics of this project, finds no animation or another
+number of frames, and if a deliberately damaged or known unsupported file passes. glTF files must
+pass the Khronos validator without errors and warnings, and the contract must pass Redocly. Then it
+builds and queries the image, and checks a cache before the service, the model in other engines, the
+page in a browser and the Blender add-on.
 """
 
 import json
@@ -27,6 +26,7 @@ import exports
 import lint
 import numpy as np
 import page
+import slow_clients
 from compare import Characters, Row, compare
 
 HERE = Path(__file__).parent
@@ -86,6 +86,7 @@ def main() -> int:
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
     others = lint.faults(node) + container.faults() + cache.faults()
+    others += slow_clients.faults()
     others += engines.faults(*environment.node()) + page.faults(node) + addon.faults()
     print("\n".join(others) or "no fault in what runs elsewhere")
     return wrong or bool(faults + others)

@@ -1,4 +1,4 @@
-"""Servers that run as long as they are asked."""
+"""Servers as context managers."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""Clips of models that are trained for the purpose: the procedural family and the real recipes."""
+"""Clips of trained models: the procedural family and the real recipes."""
 
 import os
 import tempfile
@@ -9,8 +9,8 @@ from model_export import export, ingest, recipe, train
 from model_export.recipe import Recipe
 from model_export.sample import stroll, write
 from service.motion.answer import ClipAnswer
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips, session
-from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 ROOT = Path(__file__).parents[2]
@@ -67,4 +67,6 @@ def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
 
 def _middle(model: Synthesizer) -> tuple[str, ClipAnswer]:
     controls = {control.name: control.default for control in model.session.card.controls}
-    return model.name, clips.clip(model, ClipQuestion(controls, 30.0, "refuse"))
+    return model.name, clips.clip(
+        model, ClipQuestion(controls=controls, fps=30.0, extrapolate="refuse")
+    )

@@ -1,4 +1,5 @@
-"""A model file in Triton: onnxruntime behind its Python backend, for its own is in no package."""
+"""Triton model of a model file: onnxruntime in Triton's Python backend, since no package has
+Triton's onnxruntime backend."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""The least that a recipe must say, and folders of small motions that it can be followed with."""
+"""Minimal recipes, and folders of small motions to train them on."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from model_export.recipe import Recipe
-from service.motion import bvh, quat
+from service.motion import bvh_writer, quat
 from service.motion.clip import Clip, assemble
 from service.motion.skeleton import Skeleton
 
@@ -74,7 +74,7 @@ def write_clips(folder: Path, clips: Sequence[Clip], metres_per_unit: float = 1.
     """Folder of clips as 0.bvh, 1.bvh, … and the table that lists them, controls 0, 1, …"""
     folder.mkdir(parents=True, exist_ok=True)
     for index, clip in enumerate(clips):
-        content = bvh.dumps(clip, metres_per_unit=metres_per_unit)
+        content = bvh_writer.dumps(clip, metres_per_unit=metres_per_unit)
         (folder / f"{index}.bvh").write_bytes(content)
     rows = [f"{index}.bvh,{index}" for index in range(len(clips))]
     (folder / "clips.csv").write_text("\n".join(["file,v", *rows]) + "\n")

@@ -1,4 +1,4 @@
-"""A small family of three performers, and a fourth who was never seen, as files and as a model."""
+"""A small family of three performers and a fourth unseen one, as files and as a model."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A piece of a graph run on its own in onnxruntime."""
+"""Evaluation of a graph fragment in onnxruntime."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""`posefield adapt`: a model file and clips to a model file that knows one performer more."""
+"""Tests of `posefield adapt`: a model file and new clips give a model with one more performer."""
 
 import json
 
@@ -8,8 +8,8 @@ import pytest
 
 from model_export import export, ingest, train
 from model_export.recipe import Recipe
-from service.synthesis import clips, session
-from service.synthesis.question import ClipQuestion
+from service.question.motion_question import ClipQuestion
+from service.synthesis import clips, model_file, session
 from service.synthesis.synthesizer import Synthesizer
 
 SHOWN = (2.0, 7.0, 12.5)
@@ -54,11 +54,11 @@ def test_the_new_file_says_who_it_knows_and_where_that_comes_from(base, adapted)
     assert new.sources[-1] == "2.bvh" and len(new.left_out) == new.samples
     assert len(new.levels) == len(old.levels) and new.skeleton.same_tree(old.skeleton)
     step = new.provenance["adapted"][0]
-    assert step["parent_sha256"] == session.sha256(base.read_bytes())
+    assert step["parent_sha256"] == model_file.sha256(base.read_bytes())
     assert (step["performer"], step["clips"], step["licence"]) == ("cy", 3, "CC0-1.0")
     assert "adapted from small@" not in new.diagnostics["notes"][0]
     assert (
-        f"adapted from tiny@{session.digest(base.read_bytes())} to 'cy' by 3 clips"
+        f"adapted from tiny@{model_file.digest(base.read_bytes())} to 'cy' by 3 clips"
         in (new.diagnostics["notes"][-1])
     )
     assert 0.0 < facts["parity_m"] < export.ALLOWED
@@ -78,7 +78,7 @@ def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp
 def head(path, who, level=0):
     """Path of the head in a clip of somebody, on the whole."""
     model = Synthesizer("small", session.load(path))
-    answer = clips.clip(model, ClipQuestion({"speed": 4.0}, performer=who, level=level))
+    answer = clips.clip(model, ClipQuestion(controls={"speed": 4.0}, performer=who, level=level))
     return answer.clip.positions()[:, 2].mean(axis=0)
 
 

@@ -1,4 +1,4 @@
-"""Alignment of a family whose true warps are known."""
+"""Tests of temporal alignment on a family with known warps."""
 
 from dataclasses import replace
 from pathlib import Path

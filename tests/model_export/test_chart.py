@@ -1,4 +1,4 @@
-"""Poses as numbers and back, past half a turn too."""
+"""Tests of the conversion of poses to vectors and back, beyond rotations of 180 degrees."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What ranks cost is what a file holds, and what a pose takes."""
+"""Tests of the cost of ranks: stored numbers and operations per pose."""
 
 from dataclasses import asdict
 

@@ -1,4 +1,4 @@
-"""Every covariance: NumPy form against ONNX form, and what makes it a covariance."""
+"""Tests of all covariance functions: NumPy against ONNX, and their mathematical properties."""
 
 import numpy as np
 import pytest

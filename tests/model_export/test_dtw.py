@@ -1,4 +1,4 @@
-"""Dynamic time warping with a limited slope."""
+"""Tests of dynamic time warping with limited slope."""
 
 from functools import cache
 from itertools import pairwise

@@ -1,41 +1,57 @@
-"""Evaluation and other jobs on a Dask cluster: the same answers, whoever dies on the way."""
+"""Tests of evaluation and other jobs on a Dask cluster: equal results despite lost workers."""
 
+import contextlib
+import re
+import shutil
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import numpy as np
 import pytest
 from clusters import started, wait_for
 from minimal import TOML, small_clip, write_clips
 
+import model_export
+import service
+
+pytestmark = pytest.mark.system
+
 CLIPS = 5
 MAIN = "from service.cli import main; main()"
-# A job of joblib's that leaves a mark wherever it ran, and dies where it is told to.
+# Jobs that leave a mark for each run, and one that kills its worker.
 JOBS = """
 import os, sys, time
 from pathlib import Path
-from joblib import Parallel, delayed
 from model_export import cluster
 from service.motion.errors import ClusterError
 
-def job(shared, number, marks, deadly):
-    Path(marks, f"{number}.{os.getpid()}").touch()
+class Shared:
+    def __init__(self, folder):
+        self.folder = Path(folder)
+
+    def __setstate__(self, state):
+        self.__dict__ = state
+        (self.folder / f"shared.{os.getpid()}.{time.monotonic_ns()}").touch()
+
+def job(shared, number, deadly):
+    (shared.folder / f"{number}.{os.getpid()}").touch()
     time.sleep(0.1)
     if number == deadly:
         os.kill(os.getpid(), 9)
-    return number * shared[0]
+    return number
+
+def work(address, folder, deadly, count, patience):
+    with cluster.connect(address, float(patience)) as jobs:
+        arguments = ((number, int(deadly)) for number in range(int(count)))
+        return list(jobs.run(job, arguments, (Shared(folder),)))
 
 if __name__ == "__main__":
-    address, marks, deadly = sys.argv[1:]
-    shared = [7]
     try:
-        with cluster.jobs(address, [shared]):
-            jobs = [delayed(job)(shared, number, marks, int(deadly)) for number in range(24)]
-            found = list(Parallel(return_as="generator_unordered")(jobs))
-        print(sorted(found) == [7 * number for number in range(24)])
-    except ClusterError as fault:
-        print(fault)
+        print(sorted(work(*sys.argv[1:])) == list(range(int(sys.argv[4]))))
+    except ClusterError as error:
+        print(error)
 """
 
 
@@ -57,16 +73,26 @@ def cluster(tmp_path):
 
 @pytest.fixture
 def jobs(cluster, tmp_path):
-    """Function that begins the jobs above in a process of its own, and where their marks are."""
+    """Function that starts the jobs above in a process of their own, and the folder of marks."""
     script, marks = tmp_path / "jobs.py", tmp_path / "marks"
     script.write_text(textwrap.dedent(JOBS))
     marks.mkdir()
 
-    def begin(deadly):
-        words = [sys.executable, script, cluster.address, marks, str(deadly)]
-        return subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    with contextlib.ExitStack() as started:
 
-    return begin, marks
+        def start(deadly=-1, count=24, patience=60):
+            words = [sys.executable, script, cluster.address, marks, deadly, count, patience]
+            own = subprocess.Popen(list(map(str, words)), stdout=subprocess.PIPE, text=True)
+            started.enter_context(own)
+            started.callback(own.kill)
+            return own
+
+        yield start, marks
+
+
+def ran(marks):
+    """Numbers of the jobs that were started, one for each time."""
+    return [int(mark.stem) for mark in marks.iterdir() if not mark.name.startswith("shared")]
 
 
 def evaluate(recipe, output, *words):
@@ -87,23 +113,74 @@ def test_a_cluster_measures_what_one_machine_measures(recipe, cluster, tmp_path)
 
 
 def test_a_worker_that_dies_loses_no_job(cluster, jobs):
-    begin, marks = jobs
-    running = begin(deadly=-1)
-    wait_for(lambda: len(list(marks.iterdir())) >= 8)
-    before = len(list(marks.iterdir()))
+    start, marks = jobs
+    running = start()
+    wait_for(lambda: len(ran(marks)) >= 8)
+    before = len(ran(marks))
     cluster.kill(0)
     said, _ = running.communicate()
     assert said == "True\n"
-    # It died in the middle, and its work was done again by the other.
-    ran = [mark.stem for mark in marks.iterdir()]
-    assert before < 24 < len(ran) and len(set(ran)) == 24
+    # It died in the middle, and the other worker ran its jobs again.
+    assert before < 24 < len(ran(marks)) and len(set(ran(marks))) == 24
+
+
+def test_shared_arguments_are_sent_to_each_worker_once(cluster, jobs):
+    start, marks = jobs
+    said, _ = start().communicate()
+    assert said == "True\n"
+    workers = {worker.pid for worker in cluster.workers}
+    read = [int(mark.name.split(".")[1]) for mark in marks.glob("shared.*")]
+    assert {pid: read.count(pid) for pid in workers} == dict.fromkeys(workers, 1)
+
+
+def test_the_last_worker_may_be_replaced(cluster, jobs):
+    """Data and jobs are not lost with the workers that had them."""
+    start, marks = jobs
+    running = start()
+    wait_for(lambda: len(ran(marks)) >= 8)
+    for worker in (0, 1):
+        cluster.kill(worker)
+    cluster.add()
+    assert running.communicate() == ("True\n", None)
+
+
+def test_a_worker_that_joins_with_another_source_is_refused(cluster, jobs, tmp_path):
+    start, marks = jobs
+    for package in (model_export, service):
+        shutil.copytree(Path(package.__file__).parent, tmp_path / "older" / package.__name__)
+    with (tmp_path / "older" / "service" / "crowds.py").open("a") as file:
+        file.write("# one more line\n")
+    running = start(count=1000)
+    wait_for(lambda: len(ran(marks)) >= 8)
+    cluster.add(path=str(tmp_path / "older"))
+    said, _ = running.communicate()
+    assert re.fullmatch(r"tcp://127.0.0.1:\d+: service source \w+, expected source \w+\n", said)
+
+
+def test_without_workers_it_ends(cluster, jobs):
+    start, marks = jobs
+    running = start(patience=2)
+    wait_for(lambda: len(ran(marks)) >= 8)
+    for worker in (0, 1):
+        cluster.kill(worker)
+    said, _ = running.communicate()
+    assert said == f"{cluster.address}: has had no workers for 2 s\n"
+
+
+def test_without_a_scheduler_it_ends(cluster, jobs):
+    start, marks = jobs
+    running = start()
+    wait_for(lambda: len(ran(marks)) >= 8)
+    cluster.running[0].kill()
+    said, _ = running.communicate()
+    assert said == f"{cluster.address}: the scheduler has gone\n"
 
 
 def test_a_job_that_kills_whoever_takes_it_up_ends(cluster, jobs):
-    begin, _ = jobs
+    start, _ = jobs
     for _ in range(2):
         cluster.add()
-    said, _ = begin(deadly=5).communicate(timeout=60)
+    said, _ = start(deadly=5).communicate(timeout=60)
     assert said.startswith(f"{cluster.address}: workers died at the same job 4 times, the last was")
 
 
@@ -112,9 +189,3 @@ def test_an_unreachable_scheduler_is_said_and_nothing_written(recipe, tmp_path):
     done, written = evaluate(recipe, tmp_path / "none.json", "--scheduler", address)
     assert (done.returncode, written) == (2, b"")
     assert done.stderr == f"posefield: {address}: no Dask scheduler answers within 10 s\n"
-
-
-def test_table_1_is_timed_here_only(recipe, tmp_path):
-    done, _ = evaluate(recipe, tmp_path / "none.json", "--table1", "--scheduler", "tcp://a:1")
-    assert done.returncode == 2
-    assert "Table 1 is timed on one machine" in done.stderr

@@ -1,4 +1,4 @@
-"""Errors between motions whose distance is known."""
+"""Tests of error measures on motions with known distances."""
 
 import math
 

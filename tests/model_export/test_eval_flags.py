@@ -1,11 +1,11 @@
-"""How the support flag does on clips held out, and what is told of it."""
+"""Tests of the support flag on held-out clips, and of its report."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from model_export.evaluate import flags, summary
+from model_export.evaluate import flags
 from model_export.evaluate.flags import Flags
 from model_export.evaluate.folds import Fold
 from service.motion import support
@@ -56,12 +56,12 @@ def test_families_without_a_gap_cannot_be_joined(small_recipe, examples):
 
 def test_it_is_said_in_a_sentence_and_in_figures():
     found = Flags(0.1034, {"left": 1.0, "up": 0.75}, ("up", 0.5))
-    said = summary.flags_said(found)
-    assert "10.3 % of held-out clips flagged" in said
-    assert said.endswith("left 100, up 75; in the gap of up, %: 50")
-    assert summary.flags_facts(found) == {
+    text = found.text()
+    assert "10.3 % of held-out clips are flagged" in text
+    assert text.endswith("left 100 %, up 75 %; of clips moved into the gap of up: 50 %")
+    assert found.facts() == {
         "false_alarms": 0.1034,
         "beyond": {"left": 1.0, "up": 0.75},
         "gap": {"control": "up", "flagged": 0.5},
     }
-    assert "gap" not in summary.flags_facts(replace(found, gap=None))
+    assert "gap" not in replace(found, gap=None).facts()

@@ -1,4 +1,4 @@
-"""Each peer does what its name says; equal controls and missing labels harm none."""
+"""Tests of the comparison methods, with equal controls and missing labels too."""
 
 import numpy as np
 import pytest

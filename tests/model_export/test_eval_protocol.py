@@ -1,4 +1,4 @@
-"""What is held out has no say, and what is reported is what was measured."""
+"""Tests of the evaluation protocol: held-out clips do not influence their predictions."""
 
 import json
 import sys
@@ -6,36 +6,49 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from joblib import parallel_config
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from model_export import ingest
 from model_export.evaluate import (
+    charts,
+    corrections,
     errors,
+    evaluation_page,
     exact,
     folds,
+    ground_truth,
+    learning,
     methods,
     motion,
     newcomers,
     protocol,
-    reach,
-    render,
     summary,
-    worth,
 )
 from model_export.evaluate.methods import Asked
+from model_export.jobs import Processes
 from model_export.recipe import Recipe
-from model_export.report import picture
+from model_export.report import chart
 from model_export.train import train
 from service import cli
 from service.motion.errors import TrainingError
 
 CLIPS = 12
+# In this process: starting others takes longer, and other tests do.
+JOBS = Processes(1)
 
 LABELLED = TOML.replace('file = "file"\n', 'file = "file"\nperformer = "who"\n').replace(
     "[size]", '[kriging]\nlabel = "performer"\n[size]'
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _sequential():
+    """Run joblib's jobs here: starting its processes takes longer, and test_eval_cluster does."""
+    with parallel_config(backend="sequential"):
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +84,7 @@ def family(recipe, folder):
 def results(recipe, family):
     said = []
     found = [
-        protocol.run(recipe, family, name, lambda done, parts: said.append((done, parts)))
+        protocol.run(recipe, family, name, JOBS, lambda done, parts: said.append((done, parts)))
         for name in ("clip", "performer")
     ]
     return found, said
@@ -184,20 +197,20 @@ def test_what_is_held_to_the_captured_event_meets_it(results):
 
 def test_places_a_metre_off_are_told_to_be_out_of_reach(results):
     """Arms of the small skeleton are shorter than that."""
-    corrections = [c for result in results[0] for c in result.corrections]
-    assert not any(c.far.reached for c in corrections)
-    assert all(len(c.beyond) == len(exact.BEYOND) for c in corrections)
-    assert any(c.reached for c in corrections)
-    assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in corrections)
+    found = [c for result in results[0] for c in result.corrections]
+    assert not any(c.far.reached for c in found)
+    assert all(len(c.beyond) == len(exact.BEYOND) for c in found)
+    assert any(c.reached for c in found)
+    assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in found)
 
 
 def test_ours_is_drawn_in_orange_however_it_is_asked(results):
     found, figure = summary.of(results[0][1]), Figure()
-    render._paint_bars(found, figure)
+    charts.paint_bars(found, figure)
     orange = {
         one.name
         for one, bar in zip(found, figure.axes[0].patches, strict=True)
-        if to_hex(bar.get_facecolor()) == to_hex(picture.ORANGE)
+        if to_hex(bar.get_facecolor()) == to_hex(chart.ORANGE)
     }
     assert orange == {methods.OURS, methods.EXACT, *newcomers.SHOWN} & {one.name for one in found}
     # Negative control: there are others, who are not.
@@ -207,9 +220,9 @@ def test_ours_is_drawn_in_orange_however_it_is_asked(results):
 def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
     event = recipe.event.model_copy(update={"joint": "Hips"})
     own = recipe.model_copy(update={"event": event})
-    found = protocol.run(own, family, "performer", lambda done, parts: None)
+    found = protocol.run(own, family, "performer", JOBS, lambda done, parts: None)
     assert all(c.beyond == () and c.far is None for c in found.corrections)
-    facts = reach.facts(found)
+    facts = corrections.facts(found)
     assert all(np.isfinite(value) for value in facts.values())
     before, after = (summary.facts(found)["methods"][n] for n in (methods.OURS, methods.EXACT))
     assert after["effector_cm"] < 0.5 * before["effector_cm"]
@@ -218,11 +231,11 @@ def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
 
 def test_without_an_event_nothing_is_held(recipe, family):
     plain = recipe.model_copy(update={"event": None})
-    found = protocol.run(plain, family, "performer", lambda done, parts: None)
+    found = protocol.run(plain, family, "performer", JOBS, lambda done, parts: None)
     assert found.corrections == ()
     assert methods.EXACT not in found.errors
     assert "exact" not in str(summary.facts(found)["methods"].keys())
-    assert len(reach.rows(found)) == 0
+    assert len(corrections.rows(found)) == 0
 
 
 def test_what_was_held_stands_in_table_and_json(results):
@@ -231,7 +244,7 @@ def test_what_was_held_stands_in_table_and_json(results):
     steps = [c.steps for c in clips.corrections]
     assert told["steps_worst"] == max(steps)
     assert told["steps"] == pytest.approx(np.mean(steps), abs=1e-3)
-    assert f"| {np.mean(steps):.1f} " in reach.table(clips)
+    assert f"| {np.mean(steps):.1f} " in corrections.table(clips)
     assert told["far_out_of_reach"] == 1.0
 
 
@@ -243,7 +256,7 @@ def test_an_unknown_performer_is_trusted_less(results):
 def test_a_name_is_worth_something_and_so_are_clips(results):
     """Three clips say more than one, and a name than none; the figures are those of the rows."""
     (clips, performers), _ = results
-    facts = worth.facts([clips, performers])
+    facts = summary.performer_facts([clips, performers])
     one, three = (facts[f"posefield_adapt_{count}"] for count in (1, 3))
     assert facts["named_nearer"] > 0.0
     assert three["relative_cm"] < one["relative_cm"] < three["shown_none_cm"]
@@ -253,8 +266,8 @@ def test_a_name_is_worth_something_and_so_are_clips(results):
     assert three["farther_than_all"] == pytest.approx(
         three["relative_cm"] / three["shown_all_cm"] - 1.0, abs=1e-4
     )
-    assert worth.facts([clips]) == {} and worth.said([performers]) == []
-    assert len(worth.said([clips, performers])) == 4
+    assert summary.performer_facts([clips]) == {} and summary.performer_text([performers]) == []
+    assert len(summary.performer_text([clips, performers])) == 4
 
 
 def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take(family):
@@ -306,6 +319,32 @@ def test_progress_is_told(results):
     assert said == [*((i + 1, CLIPS) for i in range(CLIPS)), (1, 3), (2, 3), (3, 3)]
 
 
+class Backwards:
+    """Jobs whose results come as they finished, and when run again, in the reverse order."""
+
+    results = None
+
+    def run(self, function, arguments, shared=()):
+        if self.results:
+            return reversed(self.results)
+        self.results = list(JOBS.run(function, arguments, shared))
+        return iter(self.results)
+
+
+def test_the_order_in_which_jobs_finish_changes_nothing(recipe, family):
+    # Without the last clip a single performer is left, and methods that need two do not run.
+    plain = recipe.model_copy(update={"event": None})
+    named = [replace(e, row=replace(e.row, performer="aaab"[i])) for i, e in enumerate(family[:4])]
+    jobs = Backwards()
+    found, backwards = (
+        protocol.run(plain, named, "clip", jobs, lambda done, parts: None) for _ in range(2)
+    )
+    assert any(None in own for own in found.errors.values())
+    # Text, as a NaN is not equal to itself; the order of the methods counts too.
+    assert str(summary.facts(found)) == str(summary.facts(backwards))
+    assert np.array_equal(found.joint_sigma, backwards.joint_sigma)
+
+
 def test_without_labels_rows_that_would_repeat_others_are_left_out(recipe, family):
     plain = recipe.model_copy(update={"kriging": recipe.kriging.model_copy(update={"label": None})})
     trained = train(plain, family, lambda _: None)
@@ -317,7 +356,7 @@ def test_without_labels_rows_that_would_repeat_others_are_left_out(recipe, famil
 def test_what_cannot_be_trained_is_named(recipe, family):
     few = family[:4]
     with pytest.raises(TrainingError, match=r"held out: 2 samples, expected at least 3"):
-        protocol.run(recipe, few, "performer", lambda done, parts: None)
+        protocol.run(recipe, few, "performer", JOBS, lambda done, parts: None)
 
 
 def test_a_recipe_says_what_can_be_asked(recipe, family):
@@ -367,8 +406,8 @@ def test_the_flag_is_held_to_its_promise_on_the_same_folds(results):
     result = results[0][0]
     found = summary.facts(result)["support"]
     assert result.flags is not None and found["false_alarms"] == result.flags.alarms
-    said = summary.trust_said(result)
-    assert len(said) == 2 and said[1].startswith("support: ")
+    text = summary.trust_text(result)
+    assert len(text) == 2 and text[1].startswith("support: ")
 
 
 def test_the_table_has_a_row_for_every_method(results):
@@ -379,29 +418,46 @@ def test_the_table_has_a_row_for_every_method(results):
 
 
 def test_the_page_is_the_same_twice_and_loads_nothing(results):
-    html = render.html("small motions", results[0])
-    assert html == render.html("small motions", results[0])
+    html = evaluation_page.html("small motions", results[0])
+    assert html == evaluation_page.html("small motions", results[0])
     text = html.decode()
     for name in methods.DEFINITIONS:
         assert name in text
-    assert 'src="' not in text and "@import" not in text
     # Bars, clips, calibration, and a clip at its event.
-    assert text.count("<svg") == 4 * len(results[0])
+    assert text.count("<img ") == text.count('src="data:') == 4 * len(results[0])
+    assert "@import" not in text and text.count("http") == 0
+
+
+def test_the_page_escapes_the_names_of_clips_and_the_description(results):
+    markup = "<script>$x^2$"
+    result = replace(results[0][0], clips=(markup,) * CLIPS, family=markup)
+    text = evaluation_page.html(markup, [result]).decode()
+    assert "<script>" not in text
+    assert text.count("&lt;script&gt;$x^2$") >= 4
+    # Negative control: other markup is that of the page.
+    assert "<table>" in text
+
+
+def test_the_page_has_the_learning_curve(results):
+    near, far = np.array([[0.04, 0.02], [0.03, 0.01]]), np.array([[0.04, 0.03], [0.03, 0.02]])
+    trials = {learning.SUGGESTED: np.stack([near, near]), learning.CHANCE: np.stack([far, far])}
+    curve = learning.Learning((40, 92), trials)
+    text = evaluation_page.html("small motions", results[0], curve).decode()
+    assert text.count("<img ") == 4 * len(results[0]) + 1
+    assert '<section id="learning">' in text
 
 
 @pytest.fixture(scope="module")
 def truth_result(small_recipe, examples):
-    from model_export.evaluate import truth
-
-    return protocol.against_truth(small_recipe, examples[::2], truth.points(6), lambda a, b: None)
+    points = ground_truth.points(6)
+    return protocol.against_truth(small_recipe, examples[::2], points, JOBS, lambda a, b: None)
 
 
 def test_truth_is_asked_where_bodies_can_be_and_is_reproducible():
-    from model_export.evaluate import truth
     from model_export.sample import controls
 
-    points = truth.points(200)
-    assert np.array_equal(points[:10], truth.points(10))
+    points = ground_truth.points(200)
+    assert np.array_equal(points[:10], ground_truth.points(10))
     for point in points:
         controls.parse(list(point))
     low, high = np.array([r[:2] for r in controls.RANGES.values()]).T
@@ -457,6 +513,6 @@ def test_what_cannot_be_asked_is_refused_first(tmp_path, folder, monkeypatch, ca
     assert told.out == ""
 
 
-def test_a_recipe_or_the_table_must_be_asked_for(monkeypatch, capsys):
+def test_a_missing_recipe_is_named(monkeypatch, capsys):
     assert run(monkeypatch, "evaluate") == 2
-    assert "expected a recipe, or --table1" in capsys.readouterr().err
+    assert "Missing argument 'RECIPE'" in capsys.readouterr().err

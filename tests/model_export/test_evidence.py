@@ -1,4 +1,4 @@
-"""What can speak against a clip: leaps, bones, a disguise, and a distance that is not usual."""
+"""Tests of evidence against clips: jumps, bone lengths, exchanged sides and unusual distances."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from model_export.kriging import Hyper
 from model_export.samples import Samples
 from service.motion import quat
 
-HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1)
+HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)
 NAMES = ("Hips", "LeftHand", "RightHand", "lfoot", "rfoot", "Neck")
 
 

@@ -1,4 +1,4 @@
-"""True distances of a truncation: what joints do, not what the metric says."""
+"""Tests of the true errors of truncation, as joint distances rather than metric distances."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def test_nothing_cut_off_costs_nothing(trained, judge, reduced):
 def test_distances_are_those_of_the_joints(judge, reduced, gaps):
     found = judge.of(reduced)
     assert found.rms == pytest.approx(np.sqrt(np.mean(gaps**2)))
-    assert found.max == gaps.max()
+    assert found.max == pytest.approx(gaps.max())
     assert np.mean(gaps > found.p99) == pytest.approx(0.01, abs=1e-4)
     assert found.effector == pytest.approx(np.sqrt(np.mean(gaps[:, -1, hand(judge)] ** 2)))
 
@@ -136,7 +136,8 @@ def test_predicted_error_is_the_true_one(small_recipe, trained, judge):
     """The metric's own figure is some percent off: it counts skin, and is first-order."""
     kept = trained.model.decoder.reduced
     predicted = trained.tensor.rms(np.sum(trained.full.core**2) - np.sum(kept.core**2))
-    assert trained.fidelity == judge.of(kept)
+    # Training computes on one thread, which rounds otherwise.
+    assert vars(trained.fidelity) == pytest.approx(vars(judge.of(kept)))
     assert abs(trained.fidelity.rms / (0.01 * small_recipe.size.rms_budget_cm) - 1.0) < 0.05
     assert abs(predicted / trained.fidelity.rms - 1.0) > 0.005
 

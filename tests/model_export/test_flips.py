@@ -1,4 +1,4 @@
-"""Half turns that a solver makes are undone where nobody sees them, and only there."""
+"""Tests of the removal of half-turn flips of small joints, a capture artefact."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The theorems of De Lathauwer, De Moor and Vandewalle (2000), on tensors of every shape."""
+"""Tests of the HOSVD theorems of De Lathauwer, De Moor and Vandewalle (2000), on many shapes."""
 
 from itertools import combinations, product
 

@@ -1,4 +1,4 @@
-"""Clips come out in one frame, whatever frame they were captured in."""
+"""Tests of ingestion: clips are converted to one coordinate frame."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Universal kriging: its theorems, and the samples it refuses."""
+"""Tests of universal kriging: its theorems, and the samples that it refuses."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 
 from model_export import kriging
 from model_export.covariance import COVARIANCES
-from model_export.kriging import Hyper
+from model_export.kriging import Hyper, LeaveOneOut
 from service.motion.errors import TrainingError
 
 # The systems here have condition numbers below 1e5.
@@ -22,7 +22,7 @@ def covariance(request):
 
 @pytest.fixture(params=[(0,), (1,), (0, 1), (0, 1, 1)], ids=["constant", "linear", "both", "mixed"])
 def hyper(request, covariance):
-    return Hyper(covariance, request.param, np.array([0.5, 0.9, 1.4]), 0.1)
+    return Hyper(covariance, request.param, np.array([0.5, 0.9, 1.4]), 0.1, 0.0)
 
 
 def each_drift(hyper):
@@ -223,6 +223,22 @@ def test_leaving_out_in_closed_form_is_what_leaving_out_gives(hyper, samples, va
     assert far(kriging.leave_out(hyper, samples, other) @ values, residuals) > 1e-2
 
 
+def test_one_leave_one_out_serves_fields_of_all_parameters(hyper, samples):
+    shared = LeaveOneOut(samples, 3, TAKES)
+    others = [
+        replace(hyper, nugget=2.0),
+        replace(hyper, scales=2.0 * hyper.scales),
+        replace(hyper, drifts=(0,) if hyper.drifts == (1,) else (1,)),
+    ]
+    first = shared.matrix(hyper)
+    assert np.array_equal(first, kriging.leave_out(hyper, samples, TAKES))
+    for other in others:
+        found = shared.matrix(other)
+        assert np.array_equal(found, kriging.leave_out(other, samples, TAKES))
+        assert far(found, first) > 1e-3
+    assert np.array_equal(shared.matrix(hyper), first)
+
+
 def test_names_of_groups_do_not_matter(hyper, samples):
     renamed = np.array([7, 3, 100, -2, *range(200, 226)])[TAKES]
     expected = kriging.leave_out(hyper, samples, TAKES)
@@ -231,7 +247,7 @@ def test_names_of_groups_do_not_matter(hyper, samples):
 
 
 def check(samples, degree=1, nugget_is_zero=False, names=NAMES):
-    kriging.check(samples, names[: samples.shape[1]], degree, nugget_is_zero)
+    return kriging.check(samples, names[: samples.shape[1]], degree, nugget_is_zero)
 
 
 def refusal(*given, **more):
@@ -241,9 +257,9 @@ def refusal(*given, **more):
 
 
 def test_good_samples_are_taken(samples):
-    check(samples, degree=1, nugget_is_zero=True)
-    check(samples[:5], degree=1)
-    check(samples[:2], degree=0)
+    assert check(samples, degree=1, nugget_is_zero=True) is None
+    assert check(samples[:5], degree=1) is None
+    assert check(samples[:2], degree=0) is None
 
 
 def test_too_few_samples_are_refused(samples):

@@ -1,4 +1,4 @@
-"""Performers in the distance of a field: who is how far from whom, and what that does not touch."""
+"""Tests of performer labels in the distances of a kriging model."""
 
 from dataclasses import replace
 

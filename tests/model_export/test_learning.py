@@ -1,4 +1,4 @@
-"""What suggested clips are worth: how fast is said as it is meant."""
+"""Tests of learning curves of suggested and random samples."""
 
 import numpy as np
 import pytest
@@ -26,6 +26,12 @@ def test_it_is_as_fast_as_it_comes_to_where_chance_ends():
     assert (between.reached, between.faster) == (pytest.approx(70.0), pytest.approx(2.0))
 
 
+def test_random_samples_that_do_not_help_give_no_ratio():
+    found = curve([4.0, 3.0, 2.0, 1.0], [4.0, 4.5, 4.5, 4.5])
+    assert found.faster is None and learning.facts(found)["faster"] is None
+    assert "nothing to compare with" in learning.table(found)
+
+
 def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
     same = curve([4.0, 3.0, 2.5, 2.0], [4.0, 3.0, 2.5, 2.0])
     assert same.faster == pytest.approx(1.0)
@@ -34,7 +40,7 @@ def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
 
 def test_it_is_told_as_a_table_and_as_figures():
     found = curve([4.0, 2.0, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
-    row = "| suggested, global | 4.00 ± 0.10 | 2.00 ± 0.10 | 1.50 ± 0.10 | 1.00 ± 0.10 |"
+    row = "| suggested, global   | 4.00 ± 0.10 | 2.00 ± 0.10 | 1.50 ± 0.10 | 1.00 ± 0.10 |"
     assert row in learning.table(found)
     assert "3.0 times as fast" in learning.table(found)
     facts = learning.facts(found)
@@ -49,7 +55,7 @@ def test_it_is_told_as_a_table_and_as_figures():
 
 def test_samples_of_ones_own_are_a_family(tmp_path):
     chosen = list(family.samples())[3:6]
-    file = write.some(tmp_path / "own", chosen)
+    file = write.family(tmp_path / "own", chosen)
     found, _ = ingest.ingest(recipe.read(file), file.parent)
     expected = [[*vars(sample.controls).values()] for sample in chosen]
     assert [example.controls.tolist() for example in found] == expected

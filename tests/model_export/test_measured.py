@@ -1,4 +1,4 @@
-"""Controls that a recipe says how to measure are those of the very clips that training sees."""
+"""Tests of measured controls: their values come from the clips as trained."""
 
 import tomllib
 from dataclasses import replace
@@ -14,6 +14,7 @@ from model_export.sample import stroll
 from service.motion import card, measure
 from service.motion.errors import RecipeError, TrainingError
 from service.motion.measure import Measure, Seen
+from service.synthesis import card_reader
 
 # Half of the last decimal that is kept.
 KEPT = 0.5000001 * 10.0**-measured.DECIMALS
@@ -210,7 +211,8 @@ def test_a_models_examples_are_what_is_measured_of_its_clips(made):
         clip = replace(example, landmarks=(0.0,))
         expected = [measure.value(one, seen(clip)) for one in asked]
         assert np.abs(np.array(kept) - expected).max() < KEPT
-    again = card.load(card.dump(own_card))
+    entries = {key: text.encode() for key, text in card.dump(own_card).items()}
+    again = card_reader.decode(entries)
     assert [control.measure for control in again.controls] == asked
 
 

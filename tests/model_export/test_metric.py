@@ -1,4 +1,4 @@
-"""The metric of pose space against forward kinematics that are only evaluated."""
+"""Tests of the pose-space metric against forward kinematics."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Naive kriging, the baseline: all its forms are one, and it is what SciPy's weights give."""
+"""Tests of naive kriging, the baseline: equal forms, and agreement with SciPy's weights."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""New clips are read as a recipe's are, and what cannot be meant is named."""
+"""Tests of reading new clips for a recipe, and of errors for invalid ones."""
 
 from dataclasses import replace
 
@@ -6,9 +6,8 @@ import newcomers
 import numpy as np
 import pytest
 
-from model_export import export, ingest, new_clips, reopen, train
+from model_export import bvh, export, ingest, new_clips, reopen, train
 from model_export.recipe import Source
-from service.motion import bvh
 from service.motion.errors import RecipeError
 from service.motion.measure import Measure
 

@@ -1,4 +1,4 @@
-"""Cycles of one motion that were cut anywhere begin at one moment again."""
+"""Tests of phase alignment: cycles with different cuts get the same start."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How much of the core to keep: every triple is looked at."""
+"""Tests of rank selection, against a search over all ranks."""
 
 from itertools import product
 

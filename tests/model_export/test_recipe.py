@@ -1,4 +1,4 @@
-"""A recipe says everything, or which key says what it should not."""
+"""Tests of recipes: valid ones, and errors that name the invalid key."""
 
 import json
 import re
@@ -292,6 +292,54 @@ def test_text_that_is_not_utf_8_is_refused(read):
     with pytest.raises(RecipeError, match="not UTF-8 text"):
         read(MINIMAL.replace("Small", "Kleine für").encode("latin-1"))
     assert read(MINIMAL.replace("Small", "Kleine für")).description == "Kleine für motions"
+
+
+DEEP = "tables or arrays nested deeper than 16 levels, expected at most that many"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = " + "[" * 100_000,
+        "a = " + "[" * 17 + "]" * 17,
+        "a = " + "{a = " * 17 + "1" + "}" * 17,
+        ".".join("a" * 900) + " = 1",
+        ".".join("a" * 60_000) + " = 1",
+        "[" + ".".join("a" * 1_000) + "]",
+    ],
+    ids=["open arrays", "arrays", "inline tables", "dots", "many dots", "table names"],
+)
+def test_nesting_is_bounded(read, tmp_path, text):
+    with pytest.raises(RecipeError) as caught:
+        read(text)
+    assert str(caught.value) == f"{tmp_path / 'recipe.toml'}: {DEEP}"
+    # Negative control: a recipe is nested itself, and says what is wrong with a level less.
+    with pytest.raises(RecipeError, match=r"a: Extra inputs are not permitted, found \[\[") as one:
+        read(MINIMAL.replace("[source]", f"a = {'[' * 15}{']' * 15}\n[source]", 1))
+    assert len(one.value.message) < 400
+
+
+def test_a_number_of_thousands_of_digits_is_refused(read):
+    with pytest.raises(RecipeError, match="not TOML: Exceeds the limit"):
+        read(MINIMAL.replace("frames = 20", f"frames = {'9' * 5_000}"))
+
+
+def test_what_a_message_shows_of_a_value_is_bounded(read):
+    with pytest.raises(RecipeError, match=r"licence: .*found \['x+\.\.\.$") as caught:
+        read(MINIMAL.replace('"CC0-1.0"', f'["{"x" * 10_000}"]'))
+    assert len(caught.value.message) < 400
+
+
+def test_the_size_of_a_recipe_is_bounded(read, tmp_path):
+    filled = MINIMAL + "#" * (recipe.MOST_BYTES - len(MINIMAL))
+    assert read(filled).name == "tiny"
+    with pytest.raises(RecipeError) as caught:
+        read(filled + "#")
+    expected = "found more than 128 kB, expected a recipe of at most 128 kB"
+    assert str(caught.value) == f"{tmp_path / 'recipe.toml'}: {expected}"
+    # A file without an end is read no further.
+    with pytest.raises(RecipeError, match=f"/dev/zero: {expected}"):
+        recipe.read(Path("/dev/zero"))
 
 
 def test_a_missing_file_is_refused(tmp_path):

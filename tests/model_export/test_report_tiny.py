@@ -1,4 +1,4 @@
-"""A report of a family that lacks what others have: performers, pairs enough, a second control."""
+"""Test of a report of a family without performers and with few pairs and one control."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 from minimal import recipe_with, small_clip, write_clips
 
 from model_export import export, ingest, train
-from model_export.report import detail, render
+from model_export.report import levels_of_detail, training_report
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
@@ -17,8 +17,9 @@ def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path, cyclic
     examples, notes = ingest.ingest(recipe, write_clips(tmp_path, clips))
     trained = train.train(recipe, examples, lambda _: None)
     exported = export.export(recipe, trained, notes)
-    ladder = detail.of(recipe, trained, exported)
-    facts = json.loads(render.render(trained, exported, ladder, []).json)
+    others = levels_of_detail.alternatives(recipe, trained, exported.card)
+    levels = levels_of_detail.of(exported, others)
+    facts = json.loads(training_report.render(trained, exported, levels, []).json)
     assert [level["effector_m"] for level in facts["levels"]["levels"]] == [None] * 4
     assert ("travel" in facts["fields"]) == cyclic
     assert facts["coverage"]["one_value_a_performer"] == []

@@ -1,4 +1,4 @@
-"""Where samples lie: controls, labels of performers, and what is left out together."""
+"""Tests of sample locations: controls, performer labels and leave-out groups."""
 
 from pathlib import Path
 

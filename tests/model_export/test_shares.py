@@ -1,4 +1,4 @@
-"""How far each joint errs, beside all joints."""
+"""Tests of each joint's share of the error."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Every stage of the model: its graph answers what its float64 reference does."""
+"""Tests of every stage of the model: the graph against its float64 reference."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from running import outputs
 
 from model_export import field_graph, hosvd, kriging, thin
 from model_export.covariance import COVARIANCES
-from model_export.decoder import Decoder, Proportions, Rung
+from model_export.decoder import MOTIONS, Decoder, Proportions, Rung
 from model_export.field_bank import VARIANCE, Constant, FieldBank
 from model_export.hosvd import Multilinear
 from model_export.kriging import Hyper
@@ -49,7 +49,9 @@ def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
     samples = own.uniform(-1.0, 1.0, (SAMPLES, CONTROLS))
     fields = {}
     for name, size in {"pose": 6, "offsets": 2, "duration": 1, "warp": 4}.items():
-        hyper = Hyper(covariance, drifts, own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3))
+        hyper = Hyper(
+            covariance, drifts, own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3), 0.0
+        )
         if name == "offsets" and offsets is not None:
             hyper = replace(hyper, drifts=offsets)
         values = own.normal(size=(SAMPLES, size))
@@ -350,6 +352,32 @@ def test_poses_at_whole_frames_are_those_of_the_tensor():
     full = Multilinear(stage.reduced.core[::-1], stage.reduced.bases)
     other = replace(stage, reduced=full).numpy(coefficients, frames)
     assert np.max(np.abs(other[1] - numbers[..., :3])) > 1e-2
+
+
+def test_poses_at_one_frame_are_those_at_that_frame():
+    stage, coefficients = decoder_stage(), rng().normal(size=(5, 6))
+    joints = (0, 1, 3)
+    for decoder in (stage, stage.of_joints(joints)):
+        rotations, root = stage.numpy(coefficients, np.full((5, 1), 7.0))
+        found = decoder.at_frame(coefficients, 7)
+        kept = range(4) if decoder is stage else joints
+        assert np.max(np.abs(found[0] - rotations[:, 0, list(kept)])) < 1e-12
+        assert np.max(np.abs(found[1] - root[:, 0])) < 1e-12
+        other = decoder.at_frame(coefficients, 8)
+        assert np.max(np.abs(other[0] - found[0])) > 1e-3
+
+
+def test_poses_in_several_batches_are_those_of_a_few():
+    stage, coefficients = decoder_stage(), rng().normal(size=(5, 6))
+    few = stage.numpy(coefficients, np.full((5, 1), 7.3))
+    r1, r2, _ = stage.reduced.core.shape
+    many = 1 + MOTIONS // (r1 * r2)
+    both = stage.numpy(np.resize(coefficients, (many, 6)), np.full((many, 1), 7.3))
+    last = (many - 1) % 5
+    for one, all_ in zip(few, both, strict=True):
+        assert np.array_equal(all_[:5], one)
+        assert np.max(np.abs(all_[-1] - one[last])) < 1e-12
+        assert np.max(np.abs(all_[-1] - one[last - 1])) > 1e-3
 
 
 def test_between_frames_the_root_goes_straight():

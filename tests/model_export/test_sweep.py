@@ -1,4 +1,4 @@
-"""Models of several recipes are those that each would give alone, wherever they were made."""
+"""Tests of sweeps over recipes: equal models in one process, several processes and a cluster."""
 
 import json
 import re
@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from clusters import started
 from minimal import TOML, small_clip, write_clips
+
+pytestmark = pytest.mark.system
 
 MAIN = "from service.cli import main; main()"
 FRAMES = (12, 16, 20)

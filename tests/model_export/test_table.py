@@ -1,4 +1,4 @@
-"""Every cell of the table is used as it stands, or refused by line and column."""
+"""Tests of the table of clips: valid cells, and errors with line and column."""
 
 import codecs
 
@@ -193,6 +193,28 @@ def test_the_same_clip_twice_is_refused_with_both_lines(rows, refused):
     assert (fault.line, fault.message) == (4, "the same frames of the same file as line 2")
     other_frames = "file,v,from,to\na.bvh,1,0,5\na.bvh,2,1,5\n"
     assert len(rows(other_frames, **FRAMES)) == 2
+
+
+def test_the_number_of_rows_is_bounded(rows, refused):
+    row = "a.bvh,1\n"
+    fault = refused("file,v\n" + row * 1_000_000)
+    message = "found more than 100000 rows, expected at most 100000"
+    assert (fault.line, fault.message) == (100_002, message)
+    among = {"v": {"among": ["2"]}}
+    text = "file,v\n" + row * 99_999 + "b.bvh,2\n"
+    assert len(rows(text, where=among)) == 1
+
+
+def test_the_number_of_columns_is_bounded(refused):
+    names = ",".join(f"c{index}" for index in range(100_000))
+    fault = refused(f"{names}\n")
+    message = "found 100000 columns, expected at most 1000"
+    assert (fault.line, fault.message) == (1, message)
+
+
+def test_the_size_of_a_table_is_bounded(refused):
+    fault = refused("file,v\n" + " " * table.MOST_BYTES)
+    assert fault.message == "found more than 16000 kB, expected a table of at most 16000 kB"
 
 
 def test_a_missing_table_is_refused(tmp_path):

@@ -1,4 +1,4 @@
-"""The motion tensor: its distances are those of bodies, and its numbers lead back to poses."""
+"""Tests of the motion tensor: distances, and reconstruction of poses."""
 
 from dataclasses import replace
 

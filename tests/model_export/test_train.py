@@ -1,4 +1,4 @@
-"""A trained model returns its samples and is near the truth between them."""
+"""Tests of trained models: samples are reproduced, and values between are near the truth."""
 
 from dataclasses import replace
 
@@ -198,6 +198,7 @@ def test_sigma_says_how_far_the_truth_may_lie(trained, examples, rng):
     assert 0.4 < np.median(errors / answer.sigma) < 1.1
 
 
+@pytest.mark.system
 def test_clips_aligned_to_what_others_predict_make_the_better_model(
     trained, small_recipe, examples, rng
 ):

@@ -1,12 +1,13 @@
-"""What training makes of input that is odd: a clear refusal, or a model that says so."""
+"""Tests of training with unusual input: errors, or notes in the model."""
 
 import re
+import zipfile
 
 import numpy as np
 import pytest
-from minimal import SKELETON, recipe_with, small_clip, write_clips
+from minimal import SKELETON, TOML, recipe_with, small_clip, write_clips
 
-from model_export import export, ingest, train
+from model_export import export, ingest, recipe, train
 from service.motion import quat
 from service.motion.clip import assemble
 from service.motion.errors import BvhError, RecipeError, TrainingError
@@ -24,10 +25,10 @@ def model(tmp_path):
         write_clips(tmp_path, motions)
         if rows is not None:
             (tmp_path / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
-        recipe = recipe_with(**sections)
-        examples, notes = ingest.ingest(recipe, tmp_path)
-        trained = train.train(recipe, examples, lambda _: None)
-        return trained, export.export(recipe, trained, notes)
+        own = recipe_with(**sections)
+        examples, notes = ingest.ingest(own, tmp_path)
+        trained = train.train(own, examples, lambda _: None)
+        return trained, export.export(own, trained, notes)
 
     return of
 
@@ -112,6 +113,92 @@ def test_a_motion_file_that_holds_none_is_refused_by_line(tmp_path, old, new, sa
     spoil(tmp_path, old, new)
     with pytest.raises(BvhError, match=said):
         ingest.ingest(recipe_with(), tmp_path)
+
+
+def zipped(folder, spoil):
+    """Recipe beside a takes.zip with its table and motions; `spoil` changes the zip's bytes."""
+    folder.mkdir()
+    write_clips(folder, EIGHT)
+    with zipfile.ZipFile(folder / "takes.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(folder.glob("*.*")):
+            if path.suffix in (".bvh", ".csv"):
+                archive.write(path, path.name)
+                path.unlink()
+    content = (folder / "takes.zip").read_bytes()
+    (folder / "takes.zip").write_bytes(spoil(bytearray(content)))
+    text = TOML.replace('"clips.csv"', '"takes/clips.csv"')
+    (folder / "recipe.toml").write_text(text)
+    return folder / "recipe.toml"
+
+
+def in_the_data(content):
+    content[content.index(b"3.bvh") + 200] ^= 0xFF
+    return content
+
+
+def in_the_headers(offset, value):
+    """Function that changes two bytes behind the signatures of all members' headers."""
+
+    def of(content):
+        for signature, ahead in ((b"PK\3\4", 6), (b"PK\1\2", 8)):
+            at = content.find(signature)
+            while at >= 0:
+                content[at + ahead + offset : at + ahead + offset + 2] = value.to_bytes(2, "little")
+                at = content.find(signature, at + 1)
+        return content
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (in_the_data, r"takes\.zip/3\.bvh: found data that cannot be unpacked \(.*\), expected a "),
+        (in_the_headers(0, 1), r"takes\.zip/clips\.csv: found an encrypted member, expected no "),
+        (in_the_headers(2, 99), r"takes\.zip/clips\.csv: found compression method 99, expected "),
+    ],
+    ids=["damaged", "encrypted", "unknown method"],
+)
+def test_a_zip_that_cannot_be_unpacked_ends_training_with_one_sentence(
+    posefield, tmp_path, spoil, said
+):
+    words = ("train", zipped(tmp_path / "spoiled", spoil), "-o", tmp_path / "x.onnx")
+    code, out, err = posefield(*words)
+    sentence = err.splitlines()[-1]
+    assert (code, out) == (3, "")
+    assert re.search(rf"^posefield: {tmp_path}/spoiled/{said}", sentence), sentence
+    assert "Traceback" not in err
+    assert not (tmp_path / "x.onnx").exists()
+
+
+def test_a_whole_zip_trains_the_model_that_its_folder_trains(tmp_path):
+    """What the test above spoils is right otherwise."""
+    own = zipped(tmp_path / "whole", bytes)
+    found, _ = ingest.ingest(recipe.read(own), own.parent)
+    write_clips(tmp_path, EIGHT)
+    expected, _ = ingest.ingest(recipe_with(), tmp_path)
+    for one, other in zip(found, expected, strict=True):
+        assert np.array_equal(one.clip.rotations, other.clip.rotations)
+        assert np.array_equal(one.controls, other.controls)
+
+
+def test_poses_of_all_files_together_are_bounded(tmp_path):
+    """Each file is within its own bound, and each is a thousandth of what it unpacks to."""
+    joints = "".join(f"JOINT j{index} {{ OFFSET 0 0 0 }}\n" for index in range(1, 1000))
+    head = f"HIERARCHY\nROOT j0 {{ OFFSET 0 0 0 CHANNELS 1 Xrotation\n{joints}}}\n"
+    text = f"{head}MOTION\nFrames: 10000\nFrame Time: 0.1\n" + "0\n" * 10_000
+    rows = []
+    for index in range(4):
+        (tmp_path / f"{index}.bvh").write_text(text)
+        rows.append(f"{index}.bvh,{index}")
+    (tmp_path / "clips.csv").write_text("\n".join(["file,v", *rows]) + "\n")
+    with pytest.raises(RecipeError) as refused:
+        ingest.ingest(recipe_with(), tmp_path)
+    place = tmp_path / "3.bvh"
+    assert refused.value.line == 5
+    assert refused.value.message == (
+        f"found 40000000 poses of a joint in the files up to {place}, expected at most 30000000"
+    )
 
 
 def test_a_clip_of_one_frame_is_refused_by_line(tmp_path, model):

@@ -1,4 +1,4 @@
-"""One and the same file however many threads the machine's linear algebra would take."""
+"""Tests of reproducible training: the file does not depend on the number of BLAS threads."""
 
 import os
 import re
@@ -6,6 +6,8 @@ import subprocess
 import sys
 
 import pytest
+
+pytestmark = pytest.mark.system
 
 RUN = "from service.cli import main; main()"
 SHORT = """\

@@ -1,4 +1,4 @@
-"""Travel: what a cycle does not come back to, taken out and put back."""
+"""Tests of travel: the displacement of a cycle is removed and restored."""
 
 import numpy as np
 

@@ -1,9 +1,9 @@
-"""Scales and nugget by leave-one-out."""
+"""Tests of the tuning of scales and nugget by leave-one-out."""
 
 import numpy as np
 import pytest
 
-from model_export import kriging, tune
+from model_export import kriging, tune, variogram
 from model_export.kriging import Hyper
 from model_export.samples import Samples
 from model_export.tune import LABELS, NUGGETS, SCALES
@@ -21,7 +21,8 @@ def wave(samples):
 
 
 def guess(samples, values, covariance="matern52"):
-    return tune.first_guess(samples, values, covariance, (1,))
+    experimental = variogram.of_residuals(samples, values, 1)
+    return tune.first_guess(experimental, samples.shape[1], covariance, (1,))
 
 
 def alone(samples):
@@ -52,7 +53,7 @@ def test_first_guess_keeps_within_the_bounds(samples, rng):
 
 def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
     values = wave(samples) + 0.2 * rng.normal(size=(50, 2))
-    hyper = Hyper("matern52", (1,), np.array([1.0, 0.5]), 0.1)
+    hyper = Hyper("matern52", (1,), np.array([1.0, 0.5]), 0.1, 0.0)
     found = tune.fixed(hyper, alone(samples), values)
     mean_of_others = (values.sum(axis=0) - values) / 49
     share = left_out(hyper, samples, values) / np.sum((values - mean_of_others) ** 2)
@@ -64,7 +65,7 @@ def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
 
 def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     samples = rng.uniform(-1.0, 1.0, size=(400, 2))
-    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1)
+    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 0.0)
     root = np.linalg.cholesky(kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400))
     values = np.sqrt(2.5) * root @ rng.normal(size=(400, 6))
     found = tune.fixed(hyper, alone(samples), values)
@@ -81,7 +82,7 @@ def test_tuning_leaves_less_than_any_start(samples, rng):
     best = np.sum(np.square(tuned.residuals))
     for scale in (0.2, 0.5, 1.2):
         for nugget in (0.02, 0.3, 2.0):
-            start = Hyper("matern52", (1,), np.full(2, scale), nugget)
+            start = Hyper("matern52", (1,), np.full(2, scale), nugget, 0.0)
             assert best <= np.sum(np.square(tune.fixed(start, alone(samples), values).residuals))
     assert best <= np.sum(np.square(tune.fixed(own, alone(samples), values).residuals))
 
@@ -127,7 +128,7 @@ def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
 
 
 def test_values_that_never_change_count_as_unexplained(samples):
-    hyper = Hyper("matern52", (1,), np.ones(2), 0.1)
+    hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 0.0)
     assert tune.fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
 
 

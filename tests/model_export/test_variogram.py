@@ -1,4 +1,4 @@
-"""The experimental variogram and its fits."""
+"""Tests of the experimental variogram and its fits."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from scipy.optimize import nnls
 
 from model_export import hosvd, variogram
 from model_export.covariance import COVARIANCES
-from model_export.variogram import FAR, FEWEST_PAIRS, LAGS, RANGES, Experimental
+from model_export.variogram import CACHED, FAR, FEWEST_PAIRS, LAGS, RANGES, Experimental
 
 TOLERANCE = 1e-9
 
@@ -47,6 +47,19 @@ def test_lags_hold_the_pairs_of_their_distance(samples, values):
     rows = np.stack([found.distances, found.values, found.pairs], axis=1)
     assert np.max(np.abs(rows - expected)) < TOLERANCE
     assert np.max(np.abs(rows[1:, 1] - np.array(expected)[:-1, 1])) > 1e-2
+
+
+def test_batches_of_pairs_do_not_change_a_distance(samples, rng):
+    # Three pairs at a time, and one at a time.
+    for width in (CACHED // 3, CACHED + 1):
+        wide = np.zeros((40, width))
+        wide[:, [0, -1]] = rng.normal(size=(40, 2))
+        found = variogram.experimental(samples, wide)
+        narrow = variogram.experimental(samples, wide[:, [0, -1]])
+        assert np.max(np.abs(found.values - narrow.values)) < TOLERANCE
+        assert (
+            np.max(np.abs(found.values - variogram.experimental(samples, wide[:, :1]).values)) > 0.1
+        )
 
 
 def test_order_of_samples_does_not_matter(samples, values, rng):

@@ -1,4 +1,4 @@
-"""Warps of a few knots: any numbers make a valid one."""
+"""Tests of warps with a few knots: any parameters give a valid warp."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
-"""Time warping against dtaidistance, whose steps are the classic three.
+"""Comparison of time warping with dtaidistance, which uses the classic three steps.
 
-The two mean different costs: ours limits the slope and pays each step by how far it goes. They
-agree where the best path is the diagonal, and everywhere theirs bounds ours from below.
+The costs differ: ours limits the slope and weights each step by its length. They agree where the
+best path is the diagonal, and elsewhere dtaidistance's is a lower bound.
 """
 
 import numpy as np

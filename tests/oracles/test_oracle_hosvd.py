@@ -1,4 +1,4 @@
-"""The decomposition against pyttb's."""
+"""Comparison of the HOSVD with pyttb's."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Quaternions against scipy.spatial.transform."""
+"""Comparison of quaternion functions with scipy.spatial.transform."""
 
 from itertools import permutations
 

@@ -1,4 +1,4 @@
-"""What is in service/deploy is valid, and its commands do the whole export, part by part."""
+"""Tests of service/deploy: valid manifests and scripts, which run a complete export in parts."""
 
 import copy
 import os
@@ -62,12 +62,12 @@ def container(manifest):
     return own
 
 
-def validate(manifest):
+def assert_valid(manifest):
     kubernetes_validate.validate(manifest, KUBERNETES, strict=True)
 
 
 def test_kubernetes_knows_every_field(manifest):
-    validate(manifest)
+    assert_valid(manifest)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_what_kubernetes_does_not_know_is_found(manifest, spoil):
     """Negative control of the test above."""
     spoil(manifest)
     with pytest.raises(kubernetes_validate.ValidationError):
-        validate(manifest)
+        assert_valid(manifest)
 
 
 def test_pods_share_the_parts(manifest):
@@ -142,6 +142,7 @@ def slurm(*words, **more):
     return run([DEPLOY / "export-slurm.sh", *words], **more)
 
 
+@pytest.mark.system
 def test_tasks_of_an_array_make_the_whole(model_path, queries, whole, tmp_path):
     made = tmp_path / "made"
     for task in range(PARTS):
@@ -152,11 +153,12 @@ def test_tasks_of_an_array_make_the_whole(model_path, queries, whole, tmp_path):
     assert content(made) == whole
 
 
+@pytest.mark.system
 def test_a_task_alone_is_told_how_many_there_were(model_path, queries, tmp_path):
     told = {"SLURM_ARRAY_TASK_ID": "1", "SLURM_ARRAY_TASK_MAX": "1", "PARTS": str(PARTS)}
     done = slurm(model_path, queries, tmp_path / "made", "--chunk", CHUNK, **told)
     assert done.returncode == 0, done.stderr
-    assert "clips of this part: 9, all done; other parts are not yet" in done.stdout
+    assert "clips of this part: 9, all finished; other parts are not" in done.stdout
 
 
 def test_an_array_needs_to_know_what_to_export():
@@ -187,6 +189,7 @@ def test_the_openjd_template_is_valid(tmp_path):
     assert openjd("check", tmp_path / "wrong.yaml").returncode != 0
 
 
+@pytest.mark.system
 def test_tasks_of_a_farm_make_the_whole(model_path, tmp_path):
     # The template's chunks are the usual ones: rows for two of them.
     queries = tmp_path / "queries.csv"
@@ -199,5 +202,5 @@ def test_tasks_of_a_farm_make_the_whole(model_path, tmp_path):
     words = [word for name, value in told.items() for word in ("-p", f"{name}={value}")]
     done = openjd("run", DEPLOY / "export-openjd.yaml", "--step", "Export", *words)
     assert done.returncode == 0, done.stdout
-    assert "clips of this part: 256, all done; other parts are not yet" in done.stdout
+    assert "clips of this part: 256, all finished; other parts are not" in done.stdout
     assert content(made) == content(tmp_path / "whole")

@@ -1,4 +1,4 @@
-"""The service's manifests: Kubernetes knows all of it, and its parts fit each other."""
+"""Tests of the service's manifests: valid for Kubernetes, and mutually consistent."""
 
 import re
 from dataclasses import fields
@@ -10,8 +10,9 @@ import yaml
 
 import service
 from service.motion.errors import InvalidField
-from service.web import contract, draining, settings
+from service.web import contract, request_head, settings
 from service.web.access import keys, policy
+from service.web.problems import RequestFault
 from service.web.settings import PREFIX, Settings
 
 DEPLOY = Path(service.__file__).parent / "deploy"
@@ -50,13 +51,13 @@ def environment(container):
     return {each["name"]: each["value"] for each in container["env"]}
 
 
-def validate(manifest):
+def assert_valid(manifest):
     kubernetes_validate.validate(manifest, KUBERNETES, strict=True)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_kubernetes_knows_every_field(kind, objects):
-    validate(objects[kind])
+    assert_valid(objects[kind])
 
 
 @pytest.mark.parametrize(
@@ -75,7 +76,7 @@ def test_what_kubernetes_does_not_know_is_found(kind, spoil, objects):
     """Negative control of the test above."""
     spoil(objects[kind])
     with pytest.raises(kubernetes_validate.ValidationError):
-        validate(objects[kind])
+        assert_valid(objects[kind])
 
 
 def test_all_of_them_mean_the_same_pods(objects, pod):
@@ -147,7 +148,7 @@ def test_a_pod_that_goes_has_the_time_it_needs(pod, container):
     drain, grace = (int(environment(container)[f"POSEFIELD_{n}"]) for n in ("DRAIN", "GRACE"))
     # Endpoints are forgotten everywhere within some seconds.
     assert drain >= 5
-    assert pod["spec"]["terminationGracePeriodSeconds"] >= drain + draining.LINGER + grace + 4
+    assert pod["spec"]["terminationGracePeriodSeconds"] >= drain + grace + 5
 
 
 def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path):
@@ -164,6 +165,21 @@ def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path)
     open_to_all = settings.read(environ=given)
     with pytest.raises(InvalidField, match="POSEFIELD_KEYS_FILE"):
         policy.check_exposure(open_to_all, policy.of(open_to_all))
+
+
+@pytest.mark.parametrize(
+    "host", ["posefield", "posefield.default", "posefield.b.svc.cluster.local:80", "10.1.2.3:8000"]
+)
+def test_pods_may_use_the_names_of_the_service(host, objects, container):
+    name = objects["Service"]["metadata"]["name"]
+    assert host.startswith((name, "10."))
+    known = request_head.names(environment(container)["POSEFIELD_HOSTS"], "POSEFIELD_HOSTS")
+    limits = request_head.HeadLimits(100, 1000, known)
+    scope = {"raw_path": b"/", "query_string": b"", "http_version": "1.1"}
+    limits.check(scope | {"headers": [(b"host", host.encode())]})
+    # Negative control.
+    with pytest.raises(RequestFault):
+        limits.check(scope | {"headers": [(b"host", b"evil.example")]})
 
 
 def test_what_is_counted_can_be_read(pod, container):

@@ -1,4 +1,4 @@
-"""What of the add-on needs no Blender, and servers that misbehave."""
+"""Fixtures of the add-on's tests without Blender: import path and misbehaving servers."""
 
 import contextlib
 import sys

@@ -1,4 +1,4 @@
-"""A server that answers what it was told to, be it HTTP or not."""
+"""Server that sends scripted bytes, valid HTTP or not."""
 
 import contextlib
 import socket

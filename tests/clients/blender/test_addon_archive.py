@@ -1,4 +1,4 @@
-"""The archive that Blender installs, and what the add-on is made of."""
+"""Tests of the archive that Blender installs, and of the add-on's sources."""
 
 import ast
 import subprocess

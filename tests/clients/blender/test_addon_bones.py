@@ -1,4 +1,4 @@
-"""Channels of bones: composed as Blender composes them, joints lie where the clip says."""
+"""Tests of bone channels: composed as in Blender, they give the clip's joint positions."""
 
 import numpy as np
 import pytest

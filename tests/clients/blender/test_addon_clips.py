@@ -1,4 +1,4 @@
-"""Clips and cards as they are read, and what is no clip."""
+"""Tests of reading clips and cards, and of errors for invalid ones."""
 
 import io
 import json

@@ -1,26 +1,20 @@
-"""The examples beside the contract, of the operations that the add-on asks."""
+"""Tests of the add-on with the contract's examples of its operations."""
 
 import io
 import json
-from pathlib import Path
 
+import contract_examples
 import numpy as np
 import pytest
 from without_blender import axes, cards, clips, service
 from without_blender.clips import Question
 from without_blender.service import Service
 
-EXAMPLES = Path(__file__).parents[3] / "api/examples"
-
-
-def read(name, part):
-    return json.loads((EXAMPLES / name / f"{part}.json").read_bytes())
-
 
 @pytest.mark.parametrize("name", ["getLiveness", "listModels", "getModel"])
 def test_what_is_asked_by_get(name, address):
-    found = json.loads(service.fetch(Service(address), read(name, "request")["path"]))
-    expected = read(name, "response")["body"]
+    found = json.loads(service.fetch(Service(address), contract_examples.request(name)["path"]))
+    expected = contract_examples.response(name)["body"]
     if name == "listModels":
         named = [each["name"] for each in expected["models"]]
         assert [each for each, _ in service.models(Service(address))] == named
@@ -29,16 +23,18 @@ def test_what_is_asked_by_get(name, address):
 
 
 def test_the_card_is_read(address):
-    card = cards.get(Service(address), read("getModel", "request")["path"].rpartition("/")[2])
-    assert list(card.performers) == read("getModel", "response")["body"]["performers"]
+    card = cards.get(
+        Service(address), contract_examples.request("getModel")["path"].rpartition("/")[2]
+    )
+    assert list(card.performers) == contract_examples.response("getModel")["body"]["performers"]
     assert [control.name for control in card.controls] == list(
-        read("queryClipNpz", "request")["body"]["controls"]
+        contract_examples.request("queryClipInFormat", "npz")["body"]["controls"]
     )
 
 
 def test_the_clip_of_the_example_is_the_one_that_the_add_on_asks_for(address):
     """The example asks with Z up in centimetres; the add-on turns what comes with Y up itself."""
-    example = read("queryClipNpz", "request")
+    example = contract_examples.request("queryClipInFormat", "npz")
     content = service.fetch(Service(address), example["path"], example["body"])
     with np.load(io.BytesIO(content), allow_pickle=False) as found:
         path, offsets = found["root_position"] / 100, found["bone_offsets"] / 100

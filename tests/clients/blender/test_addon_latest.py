@@ -1,4 +1,4 @@
-"""The thread that answers the newest question only, and rates as Blender keeps them."""
+"""Tests of the thread that answers only the newest request, and of Blender's frame rates."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Questions for the client under test."""
+"""Fixtures of the Python client's tests."""
 
 import pytest
 

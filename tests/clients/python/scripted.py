@@ -1,4 +1,4 @@
-"""Servers on real sockets that answer from a script, and write down what they were asked."""
+"""Servers on real sockets that send scripted responses and record the requests."""
 
 import socket
 import threading

@@ -1,4 +1,4 @@
-"""What is kept: used unasked only where it cannot have changed, and nobody's but one's own."""
+"""Tests of the client's cache: freshness, revalidation, and separation by credentials."""
 
 import os
 import subprocess
@@ -8,7 +8,17 @@ import time
 import pytest
 import scripted
 import serving
-from posefield_client import NEVER, NOTHING, Client, Disk, Memory, errors, questions, transport
+from posefield_client import (
+    CONTRACT,
+    NEVER,
+    NOTHING,
+    Client,
+    Disk,
+    Memory,
+    errors,
+    questions,
+    transport,
+)
 from posefield_client import cache as caches
 from posefield_client.cache import Kept
 from posefield_client.exchange import Copy
@@ -114,12 +124,11 @@ def test_what_is_kept_and_cannot_be_read_is_asked_for_anew(cache, until):
     assert [h.get("if-none-match") for _, h, _ in server.asked] == [None]
 
 
-def test_what_another_contract_said_is_another_answer(monkeypatch):
+def test_what_another_contract_said_is_another_answer():
     place = transport.place("http://x", None, 1.0)
     scope = transport.core(place, NEVER, NOTHING).scope
-    assert scope == transport.core(place, NEVER, NOTHING).scope
-    monkeypatch.setattr(transport, "CONTRACT", "9.9.9")
-    assert scope != transport.core(place, NEVER, NOTHING).scope
+    assert scope == caches.scope(CONTRACT, place.address, "")
+    assert scope != caches.scope("9.9.9", place.address, "")
 
 
 def test_a_question_by_post_is_not_kept(cache):
@@ -275,6 +284,7 @@ for turn in range(200):
 """
 
 
+@pytest.mark.system
 def test_several_processes_share_a_folder(tmp_path):
     command = [sys.executable, "-W", "error", "-c", WRITERS, str(tmp_path)]
     several = [subprocess.Popen(command, stderr=subprocess.PIPE) for _ in range(4)]
@@ -283,6 +293,7 @@ def test_several_processes_share_a_folder(tmp_path):
     assert sum(file.stat().st_size for file in tmp_path.iterdir()) < 2 * 100_000
 
 
+@pytest.mark.system
 def test_the_real_service_is_asked_once_under_a_hash(models, controls, tmp_path):
     with serving.process(models) as child:
         with Client(serving.address(child), cache=tmp_path, retry=NEVER) as client:
@@ -307,6 +318,7 @@ def test_the_real_service_says_that_nothing_changed(address, controls, tmp_path)
     assert (first.sigma, first.model, first.bytes) == (again.sigma, again.model, again.bytes)
 
 
+@pytest.mark.system
 def test_a_key_of_the_real_service_sees_its_own(models):
     one, two = keys.make(), keys.make()
     told = ";".join([keys.line("one", ["read:*"], one), keys.line("two", ["read:walk"], two)])

@@ -1,4 +1,4 @@
-"""Every problem of the service is an error of its own class, and every fault of the network one."""
+"""Tests of the client's errors: one class per kind of problem, and one for network errors."""
 
 import asyncio
 import gzip
@@ -92,7 +92,7 @@ def test_the_tree_is_drawn_in_the_head_of_the_module():
 
 def test_what_can_help_to_ask_again_is_asked_again():
     again = {each.__name__ for each in subclasses(PosefieldError) if each.again}
-    busy = {kind.name.replace("-", "") for kind in problems.OF_LOAD} | {"noconnectionleft", "busy"}
+    busy = {kind.name.replace("-", "") for kind in problems.OF_LOAD} | {"busy"}
     network = {"unreachable", "timedout", "broken", "incompleteanswer"}
     assert {name.lower() for name in again} == busy | network
 
@@ -129,6 +129,7 @@ def test_the_service_itself_is_understood(ask, kind, address, controls):
     assert fault.errors
 
 
+@pytest.mark.system
 def test_a_service_that_wants_keys(models):
     key, other = keys.make(), keys.make()
     told = keys.line("one", ["read:walk"], key)

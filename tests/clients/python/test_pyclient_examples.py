@@ -1,43 +1,45 @@
-"""The examples beside the contract: the client asks as they do, waiting or not, and is answered."""
+"""Tests of the client with the contract's examples, synchronous and asynchronous."""
 
 import asyncio
 import json
 import re
-from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
+import contract_examples
 import httpx
 import numpy as np
 import pytest
 from asking import contains, listening
-from posefield_client import NOTHING, AsyncClient, Client, asking
+from contract_examples import CASES
+from posefield_client import NOTHING, AsyncClient, Client
 from posefield_client.files import CLIP, CLIPS, CROWD, WALK
-from posefield_client.generated import OPERATIONS
 
 from service.synthesis import library
 from service.web.app import create_app
 from service.web.settings import Settings
 
-EXAMPLES = Path(__file__).parents[3] / "api/examples"
-
 # What the client does not ask for, and why.
-ANY_FORMAT = "negotiates what the paths that end in a format answer with"
+ANY_FORMAT = "negotiates the formats that end other paths"
 WRAPPED = "the same numbers as MessagePack, which is read into arrays"
-ENGINES = "spoken by clients of the Open Inference Protocol"
 NOT_ASKED = {
-    **dict.fromkeys([f"get{what}" for what in ("Pose", "Clip", "Crowd", "Sigma")], ANY_FORMAT),
-    **dict.fromkeys([f"query{what}" for what in ("Pose", "Clip", "Crowd", "Sigma")], ANY_FORMAT),
-    "queryClips": ANY_FORMAT,
     **{
-        f"{ask}{what}{ending}": WRAPPED
+        (f"{ask}{noun}", None): ANY_FORMAT
         for ask in ("get", "query")
-        for what in ("Pose", "Sigma")
-        for ending in ("Json", "Npz", "Arrow")
+        for noun in ("Pose", "Clip", "Crowd", "Sigma")
     },
-    **{name: ENGINES for name, asked in OPERATIONS.items() if asked.path.startswith("/v2")},
-    **dict.fromkeys(["getViewer", "getDocs", "getProblems", "getContract"], "for people to read"),
-    "getMetrics": "for Prometheus",
-    "getContractJson": "asked by itself where an answer is none of the contract",
+    ("queryClips", None): ANY_FORMAT,
+    **{
+        (f"{ask}{noun}InFormat", form): WRAPPED
+        for ask in ("get", "query")
+        for noun in ("Pose", "Sigma")
+        for form in ("json", "npz", "arrow")
+    },
+    **{
+        (name, None): "for people to read"
+        for name in ("getViewer", "getDocs", "getProblems", "getContract")
+    },
+    ("getMetrics", None): "for Prometheus",
+    ("getContractJson", None): "asked by itself where an answer is none of the contract",
 }
 
 
@@ -87,52 +89,92 @@ def walk(ending):
     return ask
 
 
+def pose(client, r):
+    return model(client, r).pose(**words(r))
+
+
+def why(client, r):
+    return model(client, r).why(**words(r))
+
+
+def sigma(client, r):
+    return model(client, r).sigma(**words(r))
+
+
+def crowd(ending):
+    return lambda client, r: model(client, r).crowd(**words(r)).content(ending)
+
+
+def clips(ending):
+    return lambda client, r: model(client, r).clips(**words(r)).content(ending)
+
+
 CALLS = {
-    "listModels": lambda client, r: client.models(),
-    "getLiveness": lambda client, r: client.live(),
-    "getReadiness": lambda client, r: client.ready(),
-    "getModel": lambda client, r: model(client, r).card,
-    "getPoseMsgpack": lambda client, r: model(client, r).pose(**words(r)),
-    "queryPoseMsgpack": lambda client, r: model(client, r).pose(**words(r)),
-    "getWhy": lambda client, r: model(client, r).why(**words(r)),
-    "queryWhy": lambda client, r: model(client, r).why(**words(r)),
-    "getSuggestions": lambda client, r: model(client, r).suggest(**words(r)),
-    "getSigmaMsgpack": lambda client, r: model(client, r).sigma(**words(r)),
-    "querySigmaMsgpack": lambda client, r: model(client, r).sigma(**words(r)),
-    "queryCrowdMsgpack": lambda client, r: model(client, r).crowd(**words(r)).numbers,
-    "queryCrowdArrow": lambda client, r: model(client, r).crowd(**words(r)).table(),
-    "getClipMsgpack": lambda client, r: model(client, r).clip(**words(r)).numbers,
-    **{f"getClip{end.capitalize()}": clip(end) for end in CLIP if end != "msgpack"},
-    **{f"queryClip{end.capitalize()}": clip(end) for end in CLIP},
-    **{f"getCrowd{end.capitalize()}": walk(end) for end in WALK},
-    **{
-        f"queryCrowd{end.capitalize()}": lambda client, r, end=end: (
-            model(client, r).crowd(**words(r)).content(end)
-        )
-        for end in CROWD
-        if end in ("json", "npz")
-    },
-    **{
-        f"queryClips{end.capitalize()}": lambda client, r, end=end: (
-            model(client, r).clips(**words(r)).content(end)
-        )
-        for end in CLIPS
-    },
+    ("listModels", None): lambda client, r: client.models(),
+    ("getLiveness", None): lambda client, r: client.live(),
+    ("getReadiness", None): lambda client, r: client.ready(),
+    ("getModel", None): lambda client, r: model(client, r).card,
+    ("getPoseInFormat", "msgpack"): pose,
+    ("queryPoseInFormat", "msgpack"): pose,
+    ("getWhy", None): why,
+    ("queryWhy", None): why,
+    ("getSuggestions", None): lambda client, r: model(client, r).suggest(**words(r)),
+    ("getSigmaInFormat", "msgpack"): sigma,
+    ("querySigmaInFormat", "msgpack"): sigma,
+    **{("getClipInFormat", form): clip(form) for form in CLIP},
+    **{("queryClipInFormat", form): clip(form) for form in CLIP},
+    **{("getCrowdInFormat", form): walk(form) for form in WALK},
+    **{("queryCrowdInFormat", form): crowd(form) for form in CROWD},
+    **{("queryClipsInFormat", form): clips(form) for form in CLIPS},
+    ("getClipInFormat", "msgpack"): lambda client, r: model(client, r).clip(**words(r)).numbers,
+    ("queryCrowdInFormat", "msgpack"): lambda client, r: model(client, r).crowd(**words(r)).numbers,
+    ("queryCrowdInFormat", "arrow"): lambda client, r: model(client, r).crowd(**words(r)).table(),
 }
+EACH_CALL = pytest.mark.parametrize(
+    ("name", "form"), CALLS, ids=["-".join(filter(None, case)) for case in CALLS]
+)
+
+
+# Controls that make the line of a question too long, so that the client asks by POST.
+PADDING = {f"padding_{number:03}": 0.0 for number in range(300)}
+
+
+def padded(name, request):
+    """The request of an example with padding where the client would ask by GET without it."""
+    if not re.match("query(Pose|Why|Sigma|Clip(?!s))", name):
+        return request
+    body = request["body"]
+    return {**request, "body": {**body, "controls": body.get("controls", {}) | PADDING}}
+
+
+def unpadded(content):
+    """The body of a request as it would be without padding."""
+    if b"padding_" not in content:
+        return content
+    body = json.loads(content)
+    for name in PADDING:
+        del body["controls"][name]
+    return json.dumps(body).encode()
 
 
 class Recorder:
-    """The service, and the requests that it was sent."""
+    """The service, and the requests that it was sent, without their padding."""
 
     def __init__(self, app):
         self.app = app
         self.asked = []
 
     async def __call__(self, scope, receive, send):
-        message = await receive()
+        content, more = b"", True
+        while more:
+            message = await receive()
+            content, more = content + message.get("body", b""), message.get("more_body", False)
+        content = unpadded(content)
         target = (scope["raw_path"] + b"?" + scope["query_string"]).decode().rstrip("?")
-        self.asked.append((scope["method"], target, message.get("body", b"")))
-        queue = [message]
+        self.asked.append((scope["method"], target, content))
+        headers = [each for each in scope["headers"] if each[0] != b"content-length"]
+        scope = {**scope, "headers": [*headers, (b"content-length", b"%d" % len(content))]}
+        queue = [{"type": "http.request", "body": content, "more_body": False}]
 
         async def again():
             return queue.pop() if queue else await receive()
@@ -151,10 +193,6 @@ def place(recorder):
         yield address
 
 
-def read(name, part):
-    return json.loads((EXAMPLES / name / f"{part}.json").read_bytes())
-
-
 def by_waiting(place, call, request):
     with Client(place, cache=NOTHING) as client:
         return call(client, request)
@@ -169,42 +207,42 @@ def by_awaiting(place, call, request):
 
 
 def test_every_operation_is_asked_for_or_there_is_a_reason():
-    assert set(CALLS) | set(NOT_ASKED) == set(OPERATIONS)
+    assert set(CALLS) | set(NOT_ASKED) == set(CASES)
     assert not set(CALLS) & set(NOT_ASKED)
 
 
 @pytest.mark.parametrize("ask", [by_waiting, by_awaiting])
-@pytest.mark.parametrize("name", CALLS)
-def test_it_is_asked_as_in_the_example_and_answered(name, ask, place, recorder, monkeypatch):
-    # The client takes POST where a line would be too long; here any is.
-    if name.startswith("query"):
-        monkeypatch.setattr(asking, "LONGEST", 0)
-    request = read(name, "request")
+@EACH_CALL
+def test_it_is_asked_as_in_the_example_and_answered(name, form, ask, place, recorder):
+    request = contract_examples.request(name, form)
     recorder.asked.clear()
-    found = ask(place, CALLS[name], request)
+    found = ask(place, CALLS[name, form], padded(name, request))
     (sent,) = recorder.asked
     assert alike(*sent) == alike(
         request["method"], request["path"], json.dumps(request.get("body", "")).encode()
     )
 
-    as_promised(name, request, found, place)
+    as_promised(name, form, request, found, place)
 
 
-def as_promised(name, request, found, place):
+def as_promised(name, form, request, found, place):
     """What the client gives is the example's body, or for a file what the service sends."""
     if isinstance(found, bytes):
         sent = httpx.request(request["method"], place + request["path"], json=request.get("body"))
         assert found == sent.content
-    elif name in SHOWN_BY_TABLES:
-        assert table_of(found) == SHOWN_BY_TABLES[name]
+    elif (name, form) in SHOWN_BY_TABLES:
+        assert table_of(found) == SHOWN_BY_TABLES[name, form]
     else:
         # Of arrays the example of the same question in JSON says what is in them.
-        expected = read(name.replace("Msgpack", "Json"), "response")["body"]
+        expected = contract_examples.response(name, form and "json")["body"]
         whole = {"models": plain(found)} if name == "listModels" else plain(found)
         assert contains(whole, expected)
 
 
-SHOWN_BY_TABLES = {"getClipMsgpack": (25.0, 13), "queryCrowdArrow": ["levels", 2]}
+SHOWN_BY_TABLES = {
+    ("getClipInFormat", "msgpack"): (25.0, 13),
+    ("queryCrowdInFormat", "arrow"): ["levels", 2],
+}
 
 
 def table_of(found):
@@ -231,11 +269,11 @@ def alike(method, target, body):
     return method, path, said, content
 
 
-@pytest.mark.parametrize("name", CALLS)
-def test_both_clients_are_told_the_same(name, place):
-    request = read(name, "request")
-    waited = by_waiting(place, CALLS[name], request)
-    awaited = by_awaiting(place, CALLS[name], request)
+@EACH_CALL
+def test_both_clients_are_told_the_same(name, form, place):
+    request = contract_examples.request(name, form)
+    waited = by_waiting(place, CALLS[name, form], request)
+    awaited = by_awaiting(place, CALLS[name, form], request)
     assert plain(waited) == plain(awaited)
 
 

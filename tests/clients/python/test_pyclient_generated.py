@@ -1,4 +1,4 @@
-"""The generated module is what the contract says now."""
+"""Tests of the generated module: it is up to date with the contract."""
 
 import copy
 import importlib.util

@@ -1,4 +1,4 @@
-"""The README's examples run as they stand, one after the other."""
+"""Tests of the README: its examples run in order."""
 
 import re
 from pathlib import Path
@@ -8,6 +8,8 @@ import serving
 from posefield_client import errors
 from posefield_client.errors import Problem
 from posefield_client.files import CLIP
+
+pytestmark = pytest.mark.system
 
 ROOT = Path(__file__).parents[3]
 README = ROOT / "clients/python/README.md"

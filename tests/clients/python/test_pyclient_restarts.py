@@ -1,4 +1,4 @@
-"""The real service goes away while it is asked, and comes back."""
+"""Tests of the client with a service that stops during requests and restarts."""
 
 import threading
 import time
@@ -8,6 +8,8 @@ from contextlib import contextmanager
 import pytest
 import serving
 from posefield_client import NEVER, Client, Retry, errors
+
+pytestmark = pytest.mark.system
 
 PATIENT = Retry(attempts=10_000, first=0.05, longest=0.05, patience=60.0)
 

@@ -1,4 +1,4 @@
-"""What is asked again, when, and when no more."""
+"""Tests of the client's retries: conditions, waiting times and limits."""
 
 import asyncio
 import time

@@ -1,4 +1,4 @@
-"""Files are whole or not there, whatever happens to the network, and say how far they are."""
+"""Tests of saving files: complete or absent after network errors, with progress."""
 
 import asyncio
 import gzip

@@ -1,4 +1,4 @@
-"""The TypeScript client's own tests, types, form and generated source."""
+"""Tests of the TypeScript client: its test suite, types, format and generated source."""
 
 import io
 import json
@@ -18,34 +18,34 @@ CROWD = {"time": [0.0, 0.2, 0.4], "heading": [0.0, 1.0, -2.0], "position": PLACE
 
 
 @pytest.fixture
-def run(in_package):
+def assert_runs(in_package):
     return in_package("typescript")
 
 
-def test_its_own_tests_pass_against_a_real_service(address, kinematics, run):
-    said = run("npm", "test", POSEFIELD_URL=address, POSEFIELD_KINEMATICS=str(kinematics))
+def test_its_own_tests_pass_against_a_real_service(address, kinematics, assert_runs):
+    said = assert_runs("npm", "test", POSEFIELD_URL=address, POSEFIELD_KINEMATICS=str(kinematics))
     assert "\nℹ fail 0\n" in said
     assert "\nℹ skipped 0\n" in said
 
 
-def test_its_types_hold(run):
-    run(f"{TOOLS}/tsc", "--noEmit", "-p", ".")
+def test_its_types_hold(assert_runs):
+    assert_runs(f"{TOOLS}/tsc", "--noEmit", "-p", ".")
 
 
-def test_its_form_holds(run):
-    run(f"{TOOLS}/biome", "ci", ".")
+def test_its_form_holds(assert_runs):
+    assert_runs(f"{TOOLS}/biome", "ci", ".")
 
 
-def test_its_schema_is_what_the_contract_gives(run, tmp_path):
+def test_its_schema_is_what_the_contract_gives(assert_runs, tmp_path):
     anew = tmp_path / "schema.ts"
-    run("node", "generate.ts", str(anew))
+    assert_runs("node", "generate.ts", str(anew))
     assert anew.read_text() == (PACKAGE / "src/schema.ts").read_text()
     assert anew.read_text().startswith("// Generated from api/openapi.yaml by ")
 
 
-def test_a_failure_of_the_tools_is_one_of_this_suite(run):
+def test_a_failure_of_the_tools_is_one_of_this_suite(assert_runs):
     with pytest.raises(AssertionError, match="not of this world"):
-        run("node", "-e", "console.error('not of this world'); process.exit(1)")
+        assert_runs("node", "-e", "console.error('not of this world'); process.exit(1)")
 
 
 @pytest.fixture

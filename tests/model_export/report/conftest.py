@@ -1,37 +1,50 @@
-"""A report of the small procedural model."""
+"""Fixture of the report's tests: a report of the small procedural model."""
+
+from dataclasses import replace
 
 import pytest
-
-from model_export import export
-from model_export.report import detail, render
-from model_export.report.about import Step
 
 
 @pytest.fixture(scope="session")
 def steps():
-    """What training would have been timed at."""
+    """Training steps with their times."""
+    from model_export.report.provenance import Step
+
     return (Step("reading <recipe>", 0.25), Step("fitting the fields", 1.5))
 
 
 @pytest.fixture(scope="session")
 def note():
-    """What HTML would take for markup."""
+    """A note that is markup unless it is escaped."""
     return "line 3: <b>odd</b> & noted"
 
 
 @pytest.fixture(scope="session")
-def exported(small_recipe, trained, note):
-    """The small model as a file."""
-    return export.export(small_recipe, trained, [note])
+def exported(exported, note):
+    """The small model with a note in its card."""
+    diagnostics = {**exported.card.diagnostics, "notes": [note]}
+    return replace(exported, card=replace(exported.card, diagnostics=diagnostics))
 
 
 @pytest.fixture(scope="session")
-def ladder(small_recipe, trained, exported):
-    """Its levels of detail, measured once."""
-    return detail.of(small_recipe, trained, exported)
+def alternatives(small_recipe, trained, exported):
+    """Alternatives to the small model's levels of detail."""
+    from model_export.report import levels_of_detail
+
+    return levels_of_detail.alternatives(small_recipe, trained, exported.card)
 
 
 @pytest.fixture(scope="session")
-def rendered(trained, exported, ladder, steps):
-    """Its report."""
-    return render.render(trained, exported, ladder, steps)
+def levels(exported, alternatives):
+    """The small model's levels of detail, measured once."""
+    from model_export.report import levels_of_detail
+
+    return levels_of_detail.of(exported, alternatives)
+
+
+@pytest.fixture(scope="session")
+def rendered(trained, exported, levels, steps):
+    """The small model's report."""
+    from model_export.report import training_report
+
+    return training_report.render(trained, exported, levels, steps)

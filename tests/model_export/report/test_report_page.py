@@ -1,59 +1,73 @@
-"""The page stands by itself, is the same twice, and shows every part to everyone."""
+"""Tests of the report's page: self-contained, escaped and reproducible."""
 
+import base64
 import re
 from collections import Counter
+from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
 
+import matplotlib
 import numpy as np
 import pytest
 
-from model_export.report import left_out, render
-from model_export.report.about import Step
+from model_export.report import chart, clip_errors, coverage, leave_one_out, training_report
+from model_export.report.html_page import Page, Section, Table
+from model_export.report.provenance import Step
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
 ACTIVE = {"script", "link", "iframe", "object", "embed", "base"}
+SVG, PNG = "data:image/svg+xml;base64,", "data:image/png;base64,"
+# Characters with a meaning in HTML, in SVG, in CSS, in templates or in matplotlib's labels.
+MARKUP = """<script>'&" {{7}} $x^2$"""
 
 
-class Page(HTMLParser):
-    """What a page would load, its names, what refers to them, its pictures and its words."""
+class Parsed(HTMLParser):
+    """Parsed HTML or SVG: what it loads, its ids, references to them, images, text and tags."""
 
     def __init__(self, content):
         super().__init__()
-        self.loads, self.names, self.meant = [], [], []
-        self.pictures, self.words, self.tags = [], [], Counter()
+        self.loads, self.ids, self.references = [], [], []
+        self.images, self.texts, self.tags = [], [], Counter()
         self.feed(content.decode())
 
     def handle_starttag(self, tag, attrs):
         self.tags[tag] += 1
-        for name, value in attrs:
-            if name in LOADING and value.startswith("#"):
-                self.meant.append(value[1:])
-            elif name in LOADING and not value.startswith("data:image/png;base64,"):
-                self.loads.append(value)
-            self.styled(value or "")
         given = dict(attrs)
-        self.names += [given["id"]] if "id" in given else []
-        self.pictures += [given] if tag == "svg" else []
+        self.ids += [given["id"]] if "id" in given else []
+        self.images += [given] if tag == "img" else []
+        for name, value in attrs:
+            if name in LOADING and not value.startswith((SVG, PNG)):
+                (self.references if value.startswith("#") else self.loads).append(value.lstrip("#"))
+            self.find_urls(value or "")
 
     def handle_data(self, data):
-        self.words.append(data)
-        self.styled(data)
+        self.texts.append(data)
+        self.find_urls(data)
 
-    def styled(self, text):
+    def find_urls(self, text):
         for target in re.findall(r"url\(([^)]*)\)", text):
-            (self.meant if target.startswith("#") else self.loads).append(target.lstrip("#"))
+            (self.references if target.startswith("#") else self.loads).append(target.lstrip("#"))
         self.loads += re.findall(r"@import[^;]*", text)
+
+    @property
+    def charts(self):
+        """The decoded SVG files."""
+        return [base64.b64decode(image["src"].removeprefix(SVG)) for image in self.images]
 
 
 @pytest.fixture(scope="module")
 def page(rendered):
-    return Page(rendered.html)
+    return Parsed(rendered.html)
 
 
-def test_the_page_loads_nothing(page):
-    assert page.loads == []
-    assert not ACTIVE & set(page.tags)
+def test_the_page_and_its_charts_load_nothing(page):
+    assert len(page.charts) == 12
+    for part in (page, *map(Parsed, page.charts)):
+        assert part.loads == []
+        assert not ACTIVE & set(part.tags)
 
 
 @pytest.mark.parametrize(
@@ -66,66 +80,142 @@ def test_the_page_loads_nothing(page):
         '<image xlink:href="picture.png"/>',
     ],
 )
-def test_what_a_page_would_load_is_found(rendered, planted):
+def test_a_planted_load_is_found(rendered, page, planted):
     """Negative control of the test above."""
-    assert Page(rendered.html.replace(b"</main>", f"{planted}</main>".encode())).loads
+    assert Parsed(rendered.html.replace(b"</main>", f"{planted}</main>".encode())).loads
+    assert Parsed(page.charts[0].replace(b"</svg>", f"{planted}</svg>".encode())).loads
 
 
-def test_every_name_is_used_once_and_every_reference_meets_one(page):
-    assert [name for name, count in Counter(page.names).items() if count > 1] == []
-    assert set(page.meant) <= set(page.names)
-    assert len(page.meant) > 100
+def test_every_id_is_unique_and_every_reference_has_its_target(page):
+    for part in (page, *map(Parsed, page.charts)):
+        assert [name for name, count in Counter(part.ids).items() if count > 1] == []
+        assert set(part.references) <= set(part.ids)
+        assert len(part.references) > 5
 
 
-def test_names_of_two_pictures_would_meet(rendered):
-    """Negative control: this is what the pictures' names are prefixed for."""
-    plain = re.sub(rb'id="[a-z0-9-]*-(axes_1|figure_1)"', rb'id="\1"', rendered.html)
-    assert max(Counter(Page(plain).names).values()) > 1
+def test_every_chart_has_a_text_alternative_and_a_caption(page):
+    assert len(page.images) == page.tags["figcaption"] == 12
+    assert all(len(image["alt"]) > 30 for image in page.images)
 
 
-def test_every_picture_says_what_it_shows(page):
-    assert len(page.pictures) == page.tags["figcaption"] == 12
-    for given in page.pictures:
-        assert given["role"] == "img" and len(given["aria-label"]) > 30
-        assert "width" not in given and "viewbox" in given
+def test_every_table_has_a_caption_and_scopes(rendered, page):
+    assert page.tags["table"] == page.tags["caption"] > 10
+    text = rendered.html.decode()
+    assert text.count("<th ") == text.count('scope="col"') + text.count('scope="row"')
 
 
-def test_every_section_can_be_reached_from_the_top(rendered, page):
+def test_every_section_is_linked_from_the_top(rendered, page):
     sections = re.findall(r'<section id="([a-z]+)">', rendered.html.decode())
-    assert len(sections) == 12 and set(sections) <= set(page.meant)
+    assert len(sections) == page.tags["section"] == 13
+    assert set(sections) <= set(page.references)
 
 
-def test_what_was_given_is_written_and_not_obeyed(rendered, note):
+def test_columns_of_numbers_are_recognised():
+    rows = (("a", "1,234", "-0.5 %", "3 × 4", ""), ("b", "7", "+12.0 %", "x", "1.5 cm"))
+    assert Table("", ("",) * 5, rows).numeric == (False, True, True, False, True)
+
+
+def test_notes_and_steps_are_escaped(rendered, note):
     assert b"<b>odd" not in rendered.html and b"reading <recipe>" not in rendered.html
     text = unescape(rendered.html.decode())
     assert note in text and "reading <recipe>" in text
 
 
-def test_the_same_model_gives_the_same_bytes(trained, exported, ladder, steps, rendered):
-    assert render.render(trained, exported, ladder, steps) == rendered
+@pytest.fixture(scope="module")
+def hostile(trained, exported):
+    """A model whose user-given texts are markup: description, clips, performer, controls."""
+    first = exported.card.controls[0]
+    controls = (replace(first, description=MARKUP, unit=MARKUP), *exported.card.controls[1:])
+    card = replace(exported.card, name=MARKUP, description=MARKUP, controls=controls)
+    worst = int(np.argmax(trained.missed))
+    examples = list(trained.examples)
+    row = replace(examples[worst].row, place=Path(f"{MARKUP}.bvh"), performer=MARKUP)
+    examples[worst] = replace(examples[worst], row=row)
+    return replace(trained, examples=tuple(examples)), replace(exported, card=card)
 
 
-def test_another_time_gives_other_bytes(trained, exported, ladder, steps, rendered):
-    """Negative control; and times are all that differs between two trainings of one recipe."""
+def test_user_given_text_is_shown_and_not_interpreted(hostile, levels, steps, page):
+    trained, exported = hostile
+    found = Parsed(training_report.render(trained, exported, levels, steps).html)
+    assert found.tags["script"] == 0 and found.tags["img"] == page.tags["img"]
+    assert found.loads == []
+    # Title, heading and lead; unit and description of the control; performer; and the clip.
+    assert found.texts.count(MARKUP) >= 6
+    assert f"{MARKUP} (line {trained.examples[int(np.argmax(trained.missed))].row.line})" in (
+        found.texts
+    )
+    for svg in found.charts:
+        assert b"<script>" not in svg
+    drawn = [element.text for svg in found.charts for element in ElementTree.fromstring(svg).iter()]
+    assert MARKUP in drawn
+    assert f"stature ({MARKUP})" in drawn
+
+
+def test_names_of_controls_are_shown_and_not_interpreted(trained, exported):
+    first, *others = exported.card.controls
+    controls = (replace(first, name=MARKUP), *others)
+    chapters = coverage.of(trained, controls), clip_errors.of(trained, controls)
+    page = Page("", "", "", (), [chapter.section() for chapter in chapters])
+    found = Parsed(page.html())
+    assert found.tags["script"] == 0 and found.tags["img"] == 2
+    assert found.texts.count(MARKUP) >= 2
+    assert f"{MARKUP} (m)".encode() in unescape(found.charts[0].decode()).encode()
+
+
+def test_a_long_name_leaves_space_for_the_charts(trained, exported):
+    """matplotlib warns, which is an error here, where a label leaves no space."""
+    long = "a" * 200
+    first, *others = exported.card.controls
+    chapter = coverage.of(trained, (replace(first, name=long), *others)).section()
+    (svg,) = (drawn.svg.decode() for drawn in chapter.charts)
+    assert f"{'a' * (chart.LABEL - 1)}… (m)" in svg and long not in svg
+    assert long in chapter.tables[0].rows[0]
+    examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
+    bars = clip_errors.of(replace(trained, examples=tuple(examples)), exported.card.controls)
+    assert "a…" in bars.section().charts[0].svg.decode()
+
+
+def test_unescaped_text_would_be_found():
+    """Negative control of the tests above."""
+    page = Page("", "", "", (), [Section("a", "", (MARKUP,))]).html()
+    assert Parsed(page).tags["script"] == 0
+    assert Parsed(unescape(page.decode()).encode()).tags["script"] > 0
+
+
+def test_charts_do_not_depend_on_the_users_matplotlib_settings():
+    def paint(figure):
+        figure.subplots().plot([1, 2], [3, 4])
+
+    expected = chart.draw(1.0, paint, "", "")
+    with matplotlib.rc_context({"lines.linewidth": 9.0, "svg.fonttype": "path"}):
+        assert chart.draw(1.0, paint, "", "") == expected
+    # Negative control: another curve gives another file.
+    assert chart.draw(1.0, lambda figure: figure.subplots().plot([1, 3]), "", "") != expected
+
+
+def test_two_reports_of_a_model_differ_only_in_the_times(
+    trained, exported, levels, steps, rendered
+):
     late = [*steps[:1], Step(steps[1].name, 9.75)]
-    slower = render.render(trained, exported, ladder, late)
+    slower = training_report.render(trained, exported, levels, late)
     assert slower.html != rendered.html and slower.json != rendered.json
-    # The step's own, and both sums of them: at the top, and below the steps.
+    # The step's own time, and its sums at the top and below the steps.
     kept = slower.html.replace(b">9.75<", b">1.50<").replace(b">10.00<", b">1.75<")
     assert kept.replace(b">10.0 s<", b">1.8 s<") == rendered.html
+    assert slower.json.replace(b"9.75", b"1.5") == rendered.json
 
 
-def test_no_date_and_no_path_is_told(rendered, trained):
+def test_no_date_and_no_path_is_in_the_report(rendered, page, trained):
     folder = str(trained.examples[0].row.place.parent)
-    for content in (rendered.html.decode(), rendered.json.decode()):
-        assert not re.search(r"20\d\d-\d\d-\d\d", content)
-        assert folder not in content
-    assert not re.search(r"matplotlib v|<metadata|dc:date", rendered.html.decode())
+    for content in (rendered.html, rendered.json, *page.charts):
+        assert not re.search(rb"20\d\d-\d\d-\d\d", content)
+        assert folder.encode() not in content
+        assert not re.search(rb"matplotlib v|<metadata|dc:date", content)
 
 
-def test_the_worst_clip_is_named_first(rendered, trained):
+def test_the_clip_with_the_largest_error_is_named_first(rendered, trained):
     order = np.argsort(-trained.missed)
-    worst, best = (left_out.label(trained.examples[order[i]]) for i in (0, -1))
-    said = re.search(r"The worst is (.*?), ([0-9.]+) cm away", rendered.html.decode())
-    assert said.group(1) == worst != best
-    assert float(said.group(2)) == pytest.approx(100 * np.sqrt(trained.missed.max()), abs=0.005)
+    worst, best = (leave_one_out.label(trained.examples[order[i]]) for i in (0, -1))
+    found = re.search(r"largest error is ([0-9.]+) cm, of (.*?)\.<", rendered.html.decode())
+    assert found.group(2) == worst != best
+    assert float(found.group(1)) == pytest.approx(100 * np.sqrt(trained.missed.max()), abs=0.005)

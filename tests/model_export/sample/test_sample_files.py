@@ -1,4 +1,4 @@
-"""The family on disk: 92 files that say what the generator meant, byte for byte every time."""
+"""Tests of the generated family's 92 files: content and reproducible bytes."""
 
 import csv
 import hashlib
@@ -91,6 +91,7 @@ def meant(clip):
     return np.concatenate([places, tips], axis=1)
 
 
+@pytest.mark.system
 def test_files_are_the_same_in_every_process(folder, tmp_path):
     script = "import sys, pathlib; from model_export.sample import write; "
     script += "write.family(pathlib.Path(sys.argv[1]))"
@@ -192,7 +193,7 @@ def test_trials_scatter_about_the_truth(samples):
 
 def test_noise_has_the_size_it_claims_and_keeps_hinges_and_feet(samples):
     rng = np.random.Generator(np.random.PCG64(0))
-    noise = family._wander(rng, 200, (40, 3))
+    noise = family.smooth_noise(rng, 200, (40, 3))
     assert np.sqrt(np.mean(noise**2)) == pytest.approx(family.NOISE, rel=0.2)
     for sample in samples[::9]:
         hinges = sample.clip.rotations[:, [body.INDEX[name] for name in body.HINGES]]
@@ -217,15 +218,15 @@ def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
 
 
 @pytest.fixture
-def small(tmp_path, monkeypatch):
-    """A family of two files in a folder that was empty."""
-    monkeypatch.setattr(write, "_files", lambda _: {"bvh/a.bvh": b"a", "recipe.toml": b"r"})
+def small(tmp_path, samples):
+    """A family of one clip in a folder that was empty."""
     (tmp_path / "small").mkdir()
-    return write.family(tmp_path / "small").parent
+    return write.family(tmp_path / "small", samples[:1]).parent
 
 
 def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
-    assert (small / "recipe.toml").read_bytes() == b"r"
+    found = {path.relative_to(small).as_posix() for path in small.rglob("*") if path.is_file()}
+    assert found == {"bvh/reach_001.bvh", "clips.csv", "recipe.toml"}
     assert [path.name for path in small.parent.iterdir()] == ["small"]
 
 
@@ -233,16 +234,16 @@ def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
     ("spoil", "message"),
     [
         (lambda folder: (folder / "bvh" / "mine.txt").touch(), r"bvh/mine\.txt is in the way"),
-        (lambda folder: (folder / "bvh" / "a.bvh").write_text("b"), r"bvh/a\.bvh differs"),
+        (lambda folder: (folder / "bvh" / "reach_001.bvh").write_text("b"), r"001\.bvh differs"),
         (lambda folder: (folder / "recipe.toml").unlink(), r"recipe\.toml is missing"),
     ],
 )
-def test_a_folder_with_anything_else_is_refused(small, spoil, message):
+def test_a_folder_with_anything_else_is_refused(small, samples, spoil, message):
     spoil(small)
     with pytest.raises(FileError, match=message):
-        write.family(small)
+        write.family(small, samples[:1])
 
 
-def test_a_file_in_the_way_is_refused(small):
+def test_a_file_in_the_way_is_refused(small, samples):
     with pytest.raises(FileError, match="found a file"):
-        write.family(small / "recipe.toml")
+        write.family(small / "recipe.toml", samples[:1])

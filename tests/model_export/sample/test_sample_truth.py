@@ -1,4 +1,4 @@
-"""The truth reaches, stands still where it should, and is smooth."""
+"""Tests of the generator's true motions: targets, standing feet and smoothness."""
 
 from itertools import pairwise
 

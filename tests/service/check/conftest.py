@@ -1,4 +1,4 @@
-"""A good file of a small hand-made clip, to be damaged on purpose."""
+"""Fixture of the checker's tests: a valid file of a small hand-made clip."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Hand-made answers: a person with awkward joint names, as a clip and as a single pose."""
+"""Fixtures of hand-made answers: a person with unusual joint names, as a clip and as a pose."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Crowds of any size whose motions all differ, and where their joints have to be."""
+"""Crowds of any size with different motions, and the expected joint positions."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What USD's own composition and skinning make of a crowd, against our own kinematics."""
+"""Tests of USD composition and skinning of crowds against the project's kinematics."""
 
 import conftest
 import crowds
@@ -8,6 +8,7 @@ from pxr import Kind, Usd, UsdGeom, UsdSkel
 
 from service.check import check
 from service.encode import crowd, names
+from service.encode.crowd import writer
 
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
 FRAMES = 12
@@ -35,7 +36,7 @@ def instancing(request):
 @pytest.fixture(scope="module", params=crowd.FILES)
 def path(request, made, instancing, tmp_path_factory):
     found = tmp_path_factory.mktemp(instancing) / f"crowd.{request.param}"
-    crowd.write(crowds.crowd(conftest.person(), made, MOTION), found, instancing)
+    writer.write(crowds.crowd(conftest.person(), made, MOTION), found, instancing)
     return found
 
 
@@ -244,7 +245,7 @@ def test_our_own_check_and_the_official_ones_find_nothing(path):
 @pytest.mark.parametrize("ending", ["usd", "usdz"])
 def test_a_crowd_that_is_not_loaded_still_says_how_large_it_is(ending, made, clip, tmp_path):
     path = tmp_path / f"crowd.{ending}"
-    crowd.write(crowds.crowd(conftest.person(), made, MOTION), path)
+    writer.write(crowds.crowd(conftest.person(), made, MOTION), path)
     stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     unloaded = stage.GetPrimAtPath("/Crowd/Characters").GetAllChildren()
     assert len(unloaded) == len(MOTION)
@@ -278,5 +279,5 @@ class TestNegativeControls:
     def error(self, made, clip, expected, folder, instancing, **wrong):
         path = folder / "wrong.usdc"
         given = vars(clip) | {"batches": crowds.cut(made, 2)} | wrong
-        crowd.write(type(clip)(**given), path, instancing)
+        writer.write(type(clip)(**given), path, instancing)
         return error(Usd.Stage.Open(str(path)), expected)

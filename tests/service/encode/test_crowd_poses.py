@@ -1,4 +1,4 @@
-"""Crowd poses in every format, read back by what clients read them with."""
+"""Tests of crowd poses in every format, with the clients' readers."""
 
 import dataclasses
 import io

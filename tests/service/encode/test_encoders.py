@@ -6,9 +6,10 @@ import numpy as np
 import orjson
 import pytest
 
+from model_export import bvh
 from service.encode import ENCODERS, axes, convention
 from service.encode.convention import CENTIMETRES, METRES, Convention
-from service.motion import bvh, skeleton
+from service.motion import skeleton
 
 
 def test_the_table_names_each_format_once():

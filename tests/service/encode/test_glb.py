@@ -1,5 +1,4 @@
-"""glTF files read back by another library and moved by rules of their own: the joints, and the body
-that is skinned to them, are where our kinematics have them."""
+"""Tests of glTF files with another library: positions of the joints and the skinned body."""
 
 import dataclasses
 import struct

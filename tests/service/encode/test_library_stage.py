@@ -1,4 +1,4 @@
-"""Library stages, by UsdSkel: every clip moves the one character as it moves its own."""
+"""Tests of library stages with UsdSkel: every clip animates the shared character."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Archives are what others read: the standard library, GNU tar and Info-ZIP."""
+"""Tests of archives with other readers: the standard library, GNU tar and Info-ZIP."""
 
 import io
 import shutil
@@ -8,7 +8,7 @@ import zipfile
 
 import pytest
 
-from service.encode import usdz
+from service.encode import zip_archive
 from service.encode.packs import PACKS
 
 CONTENTS = {
@@ -124,10 +124,10 @@ def test_a_zip_may_have_more_files_than_sixteen_bits_count(count):
 def test_a_zip_may_be_larger_than_thirty_two_bits_count(tmp_path):
     path, gap = tmp_path / "large.zip", 2200 * 1024 * 1024
     # Gaps in the file stand for two members of 2.2 GiB, whose checksums nobody looks at here.
-    holes = [usdz.Member(f"hole{i}", gap, 0, (None,)) for i in range(2)]
-    members = [usdz.whole("first", b"start"), *holes, usdz.whole("last", b"beyond")]
+    holes = [zip_archive.Member(f"hole{i}", gap, 0, (None,)) for i in range(2)]
+    members = [zip_archive.whole("first", b"start"), *holes, zip_archive.whole("last", b"beyond")]
     with path.open("wb") as out:
-        for piece in usdz.archive(members):
+        for piece in zip_archive.archive(members):
             out.seek(gap, 1) if piece is None else out.write(piece)
     with zipfile.ZipFile(path) as found:
         assert [e.header_offset > 2**32 for e in found.infolist()] == [False, False, False, True]

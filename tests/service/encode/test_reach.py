@@ -1,4 +1,4 @@
-"""Boxes of many motions against every joint and every end that is drawn, in float64."""
+"""Tests of bounding boxes of motions against all joints and drawn ends, in float64."""
 
 from dataclasses import replace
 
@@ -114,6 +114,17 @@ def test_boxes_of_clips_are_exact(seed):
         every = places(person, clip).reshape(-1, 3)
         for ours, theirs in ((low, every.min(axis=0)), (-high, -every.max(axis=0))):
             assert np.all(ours <= theirs) and np.all(theirs - ours < 1e-4)
+
+
+def test_motions_too_many_to_be_placed_at_once_have_the_boxes_that_each_has_alone():
+    person, made = ragged(3)
+    rig = character.rig(person)
+    many = moves.of_clips(made * (2 * exact.FRAMES // sum(map(len, made))))
+    assert len(list(many.parts(exact.FRAMES))) > 1
+    balls = np.zeros((len(many), len(person) + len(person.tip_joints)))
+    found = exact.boxes(rig.tree, many, balls)
+    alone = [exact.boxes(rig.tree, one, balls[:1])[0] for one in many.parts(1)]
+    assert np.array_equal(found, alone)
 
 
 def test_a_turn_in_the_wrong_order_would_be_seen():

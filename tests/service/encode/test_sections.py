@@ -1,4 +1,4 @@
-"""What is no binary layer as it is known here is refused, whatever it is."""
+"""Tests of the parser of binary layers: unknown structures are refused."""
 
 import random
 import struct

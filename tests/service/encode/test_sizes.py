@@ -1,13 +1,13 @@
-"""What a file takes is known before it is made: bytes for each joint and frame, at most."""
+"""Tests of the predicted sizes of files: upper bounds per joint and frame."""
 
 import numpy as np
 import pytest
 
 from service.encode import CROWD_ENCODERS, ENCODERS, poses_within
 from service.motion.crowd import Placement
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips, crowd, session
 from service.synthesis.crowd_question import CrowdQuestion
-from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 SHARES = np.linspace(0.03, 0.97, 7)
@@ -30,7 +30,9 @@ def test_no_clip_takes_more_than_was_reckoned(name, model):
     joints, encoder = len(model.session.card.skeleton) + 1, ENCODERS[name]
     for share in SHARES:
         question = controls(model, share)
-        long, short = (clips.clip(model, ClipQuestion(question, fps=f)) for f in (400.0, 200.0))
+        long, short = (
+            clips.clip(model, ClipQuestion(controls=question, fps=f)) for f in (400.0, 200.0)
+        )
         more = len(encoder.encode(long)) - len(encoder.encode(short))
         per_joint = more / (len(long.clip) - len(short.clip)) / joints
         assert encoder.per_joint / 3 < per_joint < encoder.per_joint

@@ -1,8 +1,9 @@
-"""Poses and clips as tables, read back by the readers that clients have."""
+"""Tests of poses and clips as tables, with the clients' readers."""
 
 import dataclasses
 import io
 import json
+from contextvars import copy_context
 
 import msgpack
 import numpy as np
@@ -13,7 +14,9 @@ import pytest
 from service.encode import ENCODERS, POSE_ENCODERS, tables
 from service.encode.arrow import arrow
 from service.encode.tables import Table
+from service.motion import cancel
 from service.motion.answer import PoseAnswer
+from service.motion.cancel import Cancellation, Cancelled
 
 ROWS = ("times", "rotations", "root_position")
 
@@ -117,3 +120,31 @@ def test_truths_are_truths(extension):
 def test_binary_is_smaller_than_json(posed):
     sizes = {name: len(encoder.encode(posed)) for name, encoder in POSE_ENCODERS.items()}
     assert max(sizes["msgpack"], sizes["npz"], sizes["arrow"]) < sizes["json"]
+
+
+def test_large_arrays_are_written_in_pieces_that_do_not_show():
+    rng = np.random.default_rng(4)
+    content = {
+        "long": rng.standard_normal(3 * tables.BLOCK + 1).astype(np.float32),
+        "deep": rng.standard_normal((tables.BLOCK // 8, 5, 4)),
+        "wide": rng.standard_normal((3, tables.BLOCK)),
+        "whole": rng.integers(0, 9, tables.BLOCK + 7, dtype=np.int8),
+        "true": rng.random(tables.BLOCK + 1) < 0.5,
+        "empty": np.zeros((0, 4)),
+        "name": '"quoted"',
+    }
+    expected = orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+    assert tables.document(content) == expected
+    assert tables.document({}) == b"{}"
+
+
+def test_writing_large_arrays_stops_when_it_is_cancelled():
+    own = Cancellation()
+    context = copy_context()
+    context.run(cancel.current.set, own)
+    small, large = {"a": np.zeros(4)}, {"a": np.zeros(tables.BLOCK + 1)}
+    assert context.run(tables.document, large)
+    own.cancel()
+    assert context.run(tables.document, small)
+    with pytest.raises(Cancelled):
+        context.run(tables.document, large)

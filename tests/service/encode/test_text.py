@@ -1,4 +1,4 @@
-"""Spelling of numbers and whole layers against usd-core's own text."""
+"""Comparison of number formatting and whole text layers with usd-core."""
 
 import re
 

@@ -203,6 +203,7 @@ for encoder in ENCODERS.values():
 """
 
 
+@pytest.mark.system
 def test_other_processes_write_the_same_bytes():
     command = [sys.executable, "-c", PRINT_DIGESTS, str(FOLDER)]
     runs = {
@@ -212,14 +213,18 @@ def test_other_processes_write_the_same_bytes():
     assert len(runs.pop().splitlines()) == len(ENCODERS)
 
 
-def test_no_temporary_file_is_left(walk, tmp_path, monkeypatch):
-    monkeypatch.setattr(layers, "MEMORY", tmp_path)
-    assert ENCODERS["usdc"].encode(walk).startswith(b"PXR-USDC")
+@pytest.fixture
+def layer(walk):
+    made = Sdf.Layer.CreateAnonymous("walk.usda")
+    made.ImportFromString(ENCODERS["usda"].encode(walk).decode())
+    return made
+
+
+def test_no_temporary_file_is_left(layer, tmp_path):
+    assert layers.crate(layer, tmp_path).startswith(b"PXR-USDC")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("place", ["none", "/proc"])
-def test_a_machine_without_a_folder_in_memory_will_do(walk, place, tmp_path, monkeypatch):
-    expected = ENCODERS["usdc"].encode(walk)
-    monkeypatch.setattr(layers, "MEMORY", tmp_path / place)
-    assert ENCODERS["usdc"].encode(walk) == expected
+def test_a_machine_without_a_folder_in_memory_will_do(layer, place, tmp_path):
+    assert layers.crate(layer, tmp_path / place) == layers.crate(layer)

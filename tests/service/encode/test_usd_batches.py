@@ -1,4 +1,4 @@
-"""Clips written together against the ordinary way through usd-core, byte for byte."""
+"""Comparison of clips encoded in batches with usd-core's files, byte for byte."""
 
 import math
 from dataclasses import replace
@@ -6,8 +6,9 @@ from dataclasses import replace
 import conftest
 import numpy as np
 import pytest
+from counted import Counted
 
-from service.encode import ENCODERS, METRES, crate, press, text, usd
+from service.encode import ENCODERS, METRES, crate, press, takes, text, usd
 from service.encode.convention import CENTIMETRES, Convention
 from service.motion import clip as clips
 from service.motion import quat
@@ -37,7 +38,7 @@ def _answer(rng, frames, person, said):
 
 
 def ordinary(given, convention=METRES, form=crate):
-    return [form.ordinary(*each) for one in given for each in usd._authored([one], convention)]
+    return [form.ordinary(*each) for one in given for each in usd.authored([one], convention)]
 
 
 def written(given, convention=METRES, write=usd.usdc):
@@ -93,12 +94,12 @@ def test_clips_of_several_skeletons_are_written_in_their_order():
     assert written(mixed) == [one for pair in apart for one in pair]
 
 
-def test_clips_too_long_to_be_made_together_are_written(monkeypatch):
-    given = answers(4)
-    expected = written(given)
-    monkeypatch.setattr("service.encode.takes.TOGETHER", 45)
-    monkeypatch.setattr("service.encode.reach.FRAMES", 7)
-    assert written(given) == expected
+def test_clips_too_long_to_be_made_together_are_written():
+    """Two that are too long together, and one that is too long by itself."""
+    given = [*answers(2, 1700), *answers(1, 3300, seed=1)]
+    lengths = [len(answer.clip) for answer in given]
+    assert max(lengths[:2]) < takes.TOGETHER < min(sum(lengths[:2]), lengths[2])
+    assert written(given) == ordinary(given)
 
 
 def closed(answer):
@@ -181,17 +182,23 @@ def test_what_clips_were_held_to_is_written_as_usd_does(reached):
         assert both(list(held(4, 23, reached)), convention)
 
 
-def test_clips_that_are_held_to_different_places_share_a_template(monkeypatch):
+def pressed(form, given):
+    """How clips are written by a new press: by usd-core, and templates that are made."""
+    counted = Counted(form)
+    own = press.Press(counted, 64_000_000)
+    for author, content in usd.authored(given, METRES):
+        own.write(author, content)
+    return counted.calls
+
+
+@pytest.mark.parametrize("form", [crate, text])
+def test_clips_that_are_held_to_different_places_share_a_template(form):
     given = list(held(7, 39))
-    for form, write in ((crate, usd.usdc), (text, usd.usda)):
-        write(given[:2], METRES)
-        with monkeypatch.context() as patch:
-            patch.setattr(form, "ordinary", lambda *each: b"the ordinary way")
-            assert b"the ordinary way" not in write(given[2:], METRES)
-            fewer = replace(given[3].trust, targets=given[3].trust.targets[:2])
-            other = write([replace(given[3], trust=fewer)], METRES)
-        # Text says facts in its head, which is no part of a template.
-        assert (other == [b"the ordinary way"]) == (form is crate)
+    assert pressed(form, given) == {"ordinary": 1, "template": 1}
+    fewer = replace(given[3].trust, targets=given[3].trust.targets[:2])
+    found = pressed(form, [*given, replace(given[3], trust=fewer)])
+    # Text says facts in its head, which is no part of a template.
+    assert found == {"ordinary": 2 if form is crate else 1, "template": 1}
 
 
 def chain(joints):
@@ -232,14 +239,10 @@ def test_awkward_numbers_are_written_as_usd_does():
     assert both(given, INCHES)
 
 
-def test_templates_are_used(monkeypatch):
+@pytest.mark.parametrize("form", [crate, text])
+def test_templates_are_used(form):
     """Else all that is above would hold without them."""
     given = answers(3, 37)
-    for form, write in ((crate, usd.usdc), (text, usd.usda)):
-        write(given, METRES)
-        with monkeypatch.context() as patch:
-            patch.setattr(form, "ordinary", lambda *each: b"the ordinary way")
-            assert b"the ordinary way" not in write(given, METRES)
-            longer = write(answers(1, 38), METRES)
-        assert longer == [b"the ordinary way"]
-    assert press.TEXTS._taken <= press.TEXTS.limit
+    assert pressed(form, given) == {"ordinary": 1, "template": 1}
+    assert pressed(form, [*given, *answers(1, 38)]) == {"ordinary": 2, "template": 1}
+    assert press.TEXTS.taken <= press.TEXTS.limit

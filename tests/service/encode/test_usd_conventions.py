@@ -1,4 +1,4 @@
-"""Units and axes of USD files, by UsdSkel: the same character stands in the same place."""
+"""Tests of units and axes of USD files with UsdSkel: equal positions."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,11 @@
-"""The first layers of a process may be made by several threads at once."""
+"""Test of a process's first layers from several threads at once."""
 
 import subprocess
 import sys
 
 import pytest
+
+pytestmark = pytest.mark.system
 
 # Half of such processes hung for ever where nothing had made a layer before.
 FIRST = """
@@ -25,8 +27,8 @@ for thread in threads:
 """
 
 
-@pytest.mark.parametrize("module", ["usd", "usdz", "animation", "library", "crowd.scene"])
+@pytest.mark.parametrize("module", ["usd", "animation", "library", "crowd.scene"])
 def test_threads_do_not_wait_for_each_other(module):
     words = [sys.executable, "-c", FIRST.format(module=module)]
     for _ in range(4):
-        subprocess.run(words, check=True)
+        assert subprocess.run(words, check=False).returncode == 0

@@ -5,7 +5,7 @@ import zipfile
 import pytest
 from pxr import Usd, UsdSkel
 
-from service.encode import ENCODERS, usdz
+from service.encode import ENCODERS, zip_archive
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +26,13 @@ def test_the_data_are_aligned(archive, walk):
     assert archive.index(ENCODERS["usdc"].encode(walk)) % 64 == 0
 
 
-@pytest.mark.parametrize("before", range(64))
-def test_any_name_can_be_padded(before):
-    padding = usdz._padding(before)
-    assert (before + len(padding)) % 64 == 0
+@pytest.mark.parametrize("length", range(1, 65))
+def test_data_are_aligned_after_a_name_of_any_length(length):
+    data = b"".join(zip_archive.archive([zip_archive.whole("n" * length, b"data")]))
+    start = data.index(b"data")
+    # A local header has 30 bytes, then come the name and the padding, an extra field.
+    padding = data[30 + length : start]
+    assert start % 64 == 0
     assert len(padding) == 4 + int.from_bytes(padding[2:4], "little")
 
 
@@ -45,8 +48,8 @@ def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):
     contents = {"root.usdc": b"r" * 1000, "folder/a.usdc": b"", "folder/long name.usdc": b"z" * 65}
     lying = tmp_path / "lying"
     lying.write_bytes(b"on disk" * 300_000)
-    members = [usdz.whole(name, data) for name, data in contents.items()]
-    data = b"".join(usdz.archive([*members, usdz.lying("last.usdc", lying)]))
+    members = [zip_archive.whole(name, data) for name, data in contents.items()]
+    data = b"".join(zip_archive.archive([*members, zip_archive.lying("last.usdc", lying)]))
     with zipfile.ZipFile(io.BytesIO(data)) as found:
         assert found.testzip() is None
         assert found.namelist() == [*contents, "last.usdc"]

@@ -1,4 +1,4 @@
-"""Small exports for tests: queries held in memory, a watch that looks on, a folder's content."""
+"""Helpers for small exports: queries in memory, a recording monitor, and folder contents."""
 
 import hashlib
 from dataclasses import replace
@@ -7,7 +7,7 @@ import orjson
 
 from service.export.job import Job, Work
 from service.export.query import KEPT, Fault, Query, Survey
-from service.synthesis.question import ClipQuestion
+from service.question.motion_question import ClipQuestion
 
 CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 
@@ -17,7 +17,6 @@ class Listed:
 
     def __init__(self, rows):
         self.listed = list(rows)
-        self.count = len(self.listed)
         self.digest = hashlib.sha256(repr(self.listed).encode()).hexdigest()
 
     def survey(self):
@@ -28,11 +27,11 @@ class Listed:
         return iter(self.listed)
 
 
-class Watching:
-    """Watch that remembers what it was told, and stops after some chunks if it should."""
+class Recorder:
+    """Monitor that records its calls, and stops the run after `most` chunks."""
 
     def __init__(self, most=10**9):
-        self.most, self.begun, self.parts = most, None, []
+        self.most, self.begun, self.parts, self.notes = most, None, [], []
 
     def begin(self, total, done):
         self.begun = (total, done)
@@ -40,13 +39,16 @@ class Watching:
     def advance(self, part):
         self.parts.append(part)
 
+    def note(self, message):
+        self.notes.append(message)
+
     def stopped(self):
         return len(self.parts) >= self.most
 
 
 def question(**more):
     """What is asked of the small model, with more said of it."""
-    return ClipQuestion(CONTROLS, **more)
+    return ClipQuestion(controls=CONTROLS, **more)
 
 
 def queries(count, form="json", fps=30.0):
@@ -55,7 +57,7 @@ def queries(count, form="json", fps=30.0):
         Query(
             f"clip-{n:04d}",
             form,
-            ClipQuestion({**CONTROLS, "turn": 30.0 * n / count}, fps=fps),
+            ClipQuestion(controls={**CONTROLS, "turn": 30.0 * n / count}, fps=fps),
             f"line {n + 2}",
         )
         for n in range(count)
@@ -77,6 +79,11 @@ def content(folder):
         for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
+
+
+def checksum(content):
+    """Size and SHA-256 of a file's content."""
+    return len(content), hashlib.sha256(content).hexdigest()
 
 
 def lines(path):

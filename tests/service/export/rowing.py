@@ -1,4 +1,4 @@
-"""Tables of queries as files, and what a source makes of them."""
+"""Helpers for tables of queries: files of them, and the queries that a source reads."""
 
 import csv
 import json

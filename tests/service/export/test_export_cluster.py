@@ -1,4 +1,4 @@
-"""An export on a Dask cluster: the same bytes, whoever dies on the way."""
+"""Tests of exports on a Dask cluster: equal bytes despite lost workers."""
 
 import os
 import re
@@ -16,6 +16,8 @@ from typer.testing import CliRunner
 
 import service
 from service import cli
+
+pytestmark = pytest.mark.system
 
 CLIPS, CHUNK = 480, 4
 POSEFIELD = Path(sys.executable).parent / "posefield"
@@ -127,7 +129,7 @@ def test_told_to_stop_its_workers_stop_too(words, undisturbed, cluster, tmp_path
     process.send_signal(signal.SIGINT)
     code, said = ended(process)
     assert code == 128 + signal.SIGINT
-    assert "the same command goes on" in said
+    assert "the same command resumes" in said
     time.sleep(1.0)
     done = parts(target)
     time.sleep(1.0)
@@ -151,7 +153,7 @@ def test_a_scheduler_that_dies_is_said(words, undisturbed, mortal, tmp_path):
     os.kill(mortal.running[0].pid, signal.SIGKILL)
     code, said = ended(process)
     assert code == 2
-    assert f"posefield: {mortal.address}: the scheduler has gone; what is done stays" in said
+    assert f"posefield: {mortal.address}: the scheduler has gone; finished chunks are kept" in said
     go_on(words(target))
     assert exporting.content(target) == undisturbed
 
@@ -181,7 +183,7 @@ def test_a_chunk_that_takes_its_workers_with_it_ends_it(words, undisturbed, monk
         code, said = ended(process)
     assert code == 2
     assert f"posefield: {cluster.address}: workers died at the same job 1 times" in said
-    assert "out of memory? What is done stays, and the same command goes on" in said
+    assert "out of memory? Finished chunks are kept, and the same command resumes" in said
     go_on(words(target))
     assert exporting.content(target) == undisturbed
 
@@ -197,9 +199,9 @@ from service.export.chunks import Task
 from service.motion.errors import FileError
 source = exporting.queries(4)
 work = exporting.work(Path(sys.argv[2]), source, sys.argv[3])
-with cluster.crew(sys.argv[4]) as by:
+with cluster.runner(sys.argv[4]) as run:
     try:
-        list(by(work, iter([Task(0, 0, tuple(source.rows()))]), lambda: False))
+        list(run(work, iter([Task(0, 0, tuple(source.rows()))]), lambda: False))
     except FileError as fault:
         print(fault)
 """

@@ -1,4 +1,4 @@
-"""`posefield export`: what it takes, what it says, and the code it ends with."""
+"""Tests of `posefield export`: arguments, output and exit codes."""
 
 import json
 import os
@@ -49,6 +49,32 @@ def test_what_is_done_is_said_to_be(export, table, tmp_path):
     export(table, "-o", tmp_path / "made")
     code, out, _ = export(table, "-o", tmp_path / "made")
     assert code == 0 and out.strip().endswith("; it was complete before")
+
+
+def test_damage_is_told_and_mended_to_verify(export, table, tmp_path):
+    export(table, "-o", tmp_path / "made")
+    code, out, err = export(table, "-o", tmp_path / "made", "--verify")
+    assert (code, err) == (0, "")
+    assert out.strip().endswith("; it was complete before, and all checksums agree")
+    clip = tmp_path / "made/clips/000/low.usdc"
+    content = clip.read_bytes()
+    clip.write_bytes(content[::-1])
+    assert "it was complete before" in export(table, "-o", tmp_path / "made")[1]
+    code, out, err = export(table, "-o", tmp_path / "made", "--verify")
+    assert (code, err) == (0, f"{clip}: missing or damaged; the export is made again\n")
+    assert ": 3 clips, " in out and "complete before" not in out
+    assert clip.read_bytes() == content
+
+
+def test_lines_tell_of_a_resumed_export_where_there_is_no_terminal(export, tmp_path, monkeypatch):
+    """And no control sequences, though a CI system asks for colours."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    words = ("--sample", "9", "--chunk", "3", "-o", tmp_path / "made")
+    (tmp_path / "made").mkdir()
+    assert export(*words, "--shard", "0/3")[0] == 0
+    code, out, err = export(*words)
+    assert (code, err) == (0, "resumed: 3 of 9 clips were finished\n")
+    assert ": 9 clips, " in out
 
 
 def test_its_facts_as_json(export, table, tmp_path):
@@ -118,7 +144,7 @@ def test_a_part_says_that_others_are_missing(export, table, tmp_path):
     code, out, _ = export(*words, "1/2")
     assert (code, out) == (
         0,
-        f"{tmp_path}/made: clips of this part: 1, all done; other parts are not yet\n",
+        f"{tmp_path}/made: clips of this part: 1, all finished; other parts are not\n",
     )
     code, out, _ = export(*words, "0/2")
     assert code == 0 and ": 3 clips, " in out
@@ -161,9 +187,10 @@ def test_the_scheme_of_a_url_may_be_in_capitals(export, table, tmp_path, monkeyp
 def test_a_target_of_something_else_is_a_file_that_cannot_be_used(export, table, tmp_path):
     code, _, err = export(table, "-o", tmp_path)
     assert code == 3
-    assert "holds files that are no export's, expected an empty place" in err
+    assert "is not empty and has no manifest of an export" in err
 
 
+@pytest.mark.system
 def test_a_terminal_sees_a_bar(model_path, tmp_path):
     ours, its = pty.openpty()
     words = [

@@ -1,6 +1,6 @@
-"""Exports that are killed, interrupted or out of room: whole files only, and the same bytes after.
+"""Tests of exports that are killed, interrupted or out of space: complete files, and a rerun.
 
-Each runs as a process of its own, by the command that a user types.
+Each export runs as a process of its own, by the user's command.
 """
 
 import os
@@ -19,6 +19,8 @@ import pytest
 from typer.testing import CliRunner
 
 from service import cli
+
+pytestmark = pytest.mark.system
 
 CLIPS, CHUNK = 600, 4
 POSEFIELD = Path(sys.executable).parent / "posefield"
@@ -122,7 +124,7 @@ def test_told_to_stop_it_says_how_to_go_on(told, workers, after, command, undist
     assert process.returncode == 128 + told, err
     done = CHUNK * parts(tmp_path)
     told_of = re.search(
-        rf"stopped when (\d+) of {CLIPS} clips were done; the same command goes", out
+        rf"stopped when (\d+) of {CLIPS} clips were finished; the same command resumes", out
     )
     # Each worker may have ended one more chunk after they were counted.
     assert told_of and done - workers * CHUNK <= int(told_of[1]) <= done, out
@@ -133,14 +135,20 @@ def test_told_to_stop_it_says_how_to_go_on(told, workers, after, command, undist
     assert exporting.content(tmp_path) == undisturbed
 
 
-def test_a_worker_that_dies_ends_it_clearly(command, undisturbed, tmp_path):
+@pytest.mark.parametrize("after", [0, 5])
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_worker_that_dies_ends_it_clearly(place, after, command, undisturbed, tmp_path):
     process = begun(command(tmp_path, "--workers", 2))
-    wait_for_parts(tmp_path, 5, process)
-    os.kill(workers_of(process)[0], signal.SIGKILL)
+    wait_for_parts(tmp_path, after, process)
+    # After none, the worker is killed as it starts.
+    while len(workers_of(process)) <= place:
+        assert process.poll() is None
+        time.sleep(0.001)
+    os.kill(workers_of(process)[place], signal.SIGKILL)
     out, err = process.communicate(timeout=30)
     assert (process.returncode, out) == (5, "")
     last = err.strip().splitlines()[-1]
-    assert last.startswith("posefield: a process of the export has died; what is done stays")
+    assert last.startswith("posefield: a worker process has died; finished chunks are kept")
     assert "Traceback" not in err
     assert whole(tmp_path, undisturbed) < CLIPS
     go_on(command(tmp_path))
@@ -178,6 +186,21 @@ def test_where_no_more_can_be_written_it_names_the_file(workers, command, undist
     assert 0 < whole(tmp_path, undisturbed) < CLIPS
     go_on(command(tmp_path))
     assert exporting.content(tmp_path) == undisturbed
+
+
+def test_where_usd_core_can_write_no_temporary_file_it_says_so(model_path, tmp_path):
+    """usd-core writes the first clip of a pattern to a temporary file."""
+    words = [POSEFIELD, "export", model_path, "--sample", "4", "-o", tmp_path, "--workers", "1"]
+    process = begun(
+        [*map(str, words)],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)),
+    )
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (3, "")
+    (line,) = err.splitlines()
+    assert "a temporary file of usd-core cannot be written: " in line
+    assert "File too large" in line
+    assert not (tmp_path / "clips").exists()
 
 
 def test_two_at_once_do_each_other_no_harm(command, undisturbed, tmp_path):

@@ -1,4 +1,4 @@
-"""Archives hold what folders would, and every reader opens them."""
+"""Tests of archive layouts: content equal to that of folders, and other readers."""
 
 import hashlib
 import subprocess
@@ -10,6 +10,7 @@ import exporting
 import numpy as np
 import orjson
 import pytest
+from msgspec import structs
 from pxr import Usd, UsdSkel
 
 from service import check
@@ -33,7 +34,7 @@ def made(source, model_path, tmp_path_factory):
     def of(layout):
         folder = tmp_path_factory.mktemp(layout)
         work = exporting.work(model_path, source, folder, CHUNK, layout)
-        run.run(work, source, exporting.Watching())
+        run.run(work, source, exporting.Recorder())
         return folder
 
     return {layout: of(layout) for layout in ("folder", "tar", "zip", "library")}
@@ -98,10 +99,10 @@ def test_gnu_tar_unpacks_them(made, tmp_path):
 @pytest.mark.parametrize("layout", ["tar", "zip"])
 def test_an_archive_that_was_cut_short_is_made_again(layout, made, source, model_path, tmp_path):
     work = exporting.work(model_path, source, tmp_path, CHUNK, layout)
-    run.run(work, source, exporting.Watching(2))
+    run.run(work, source, exporting.Recorder(2))
     archive = tmp_path / f"clips-000001.{layout}"
     archive.write_bytes(archive.read_bytes()[:-1])
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     run.run(work, source, watch)
     assert watch.begun == (ROWS, CHUNK)
     assert exporting.content(tmp_path) == exporting.content(made[layout])
@@ -158,13 +159,13 @@ def test_what_has_no_place_in_a_library_is_found_before_anything_is_written(
 ):
     rows = list(source.rows())
     rows[3] = replace(rows[3], format="bvh")
-    rows[5] = replace(rows[5], question=replace(rows[5].question, names="vrm"))
+    rows[5] = replace(rows[5], question=structs.replace(rows[5].question, names="vrm"))
     bad = exporting.Listed(rows)
     work = exporting.work(model_path, bad, tmp_path / "made", layout="library")
     with pytest.raises(InvalidField, match="answered: 2") as refused:
-        run.run(work, bad, exporting.Watching())
+        run.run(work, bad, exporting.Recorder())
     assert "line 5: format: 'bvh', expected 'usdc' in a library" in str(refused.value)
     assert "line 7: names: 'vrm', expected 'own'" in str(refused.value)
     assert not (tmp_path / "made").exists()
-    outcome = run.run(replace(work, skip=True), bad, exporting.Watching())
+    outcome = run.run(replace(work, skip=True), bad, exporting.Recorder())
     assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 2)

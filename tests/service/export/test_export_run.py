@@ -1,4 +1,4 @@
-"""An export comes to the same bytes however it is done, and says what it did."""
+"""Tests of export runs: equal bytes for all ways to run, and their reports."""
 
 import hashlib
 import json
@@ -8,7 +8,7 @@ import exporting
 import pytest
 
 from service.encode import ENCODERS
-from service.export import crew, run
+from service.export import pool, run
 from service.export.layouts import path
 from service.export.query import Fault, Query
 from service.export.run import Shard
@@ -27,7 +27,7 @@ def source():
 def undisturbed(source, model_path, tmp_path_factory):
     """Folder of a whole export, done in one go."""
     target = tmp_path_factory.mktemp("undisturbed") / "made" / "here"
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     outcome = run.run(exporting.work(model_path, source, target), source, watch)
     assert (outcome.rows, outcome.done, outcome.before) == (ROWS, ROWS, False)
     assert watch.begun == (ROWS, 0)
@@ -77,10 +77,11 @@ def test_folders_hold_a_thousand_files_at_most():
     assert path(1_234_567, "c", "glb") == "clips/1234/c.glb"
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("workers", [2, 3])
 def test_processes_make_the_same_bytes(workers, undisturbed, source, model_path, tmp_path):
     work = exporting.work(model_path, source, tmp_path)
-    outcome = run.run(work, source, exporting.Watching(), crew.of(workers))
+    outcome = run.run(work, source, exporting.Recorder(), pool.runner(workers))
     assert outcome.done == ROWS
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
@@ -89,7 +90,7 @@ def test_processes_make_the_same_bytes(workers, undisturbed, source, model_path,
 def test_shards_in_any_order_make_the_whole(order, undisturbed, source, model_path, tmp_path):
     work = exporting.work(model_path, source, tmp_path)
     outcomes = [
-        run.run(work, source, exporting.Watching(), shard=Shard(index, 3)) for index in order
+        run.run(work, source, exporting.Recorder(), shard=Shard(index, 3)) for index in order
     ]
     assert [outcome.facts is None for outcome in outcomes] == [True, True, False]
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
@@ -97,7 +98,7 @@ def test_shards_in_any_order_make_the_whole(order, undisturbed, source, model_pa
 
 def test_what_is_complete_is_left_as_it_is(undisturbed, source, model_path):
     before = {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")}
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     outcome = run.run(exporting.work(model_path, source, undisturbed), source, watch)
     assert (outcome.before, outcome.done, watch.begun) == (True, ROWS, None)
     assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")} == before
@@ -114,7 +115,7 @@ def test_what_was_complete_and_lost_a_file_is_made_again(
     else:
         (clip if lost == "a clip" else target / lost).unlink()
     work = exporting.work(model_path, source, target)
-    outcome = run.run(work, source, exporting.Watching())
+    outcome = run.run(work, source, exporting.Recorder())
     assert (outcome.before, outcome.done) == (False, ROWS)
     assert exporting.content(target) == exporting.content(undisturbed)
 
@@ -124,7 +125,7 @@ def test_what_was_killed_as_it_ended_is_tidied(undisturbed, source, model_path, 
     (tmp_path / ".posefield/parts").mkdir(parents=True)
     (tmp_path / ".posefield/parts/000001.jsonl").write_bytes(b"{}")
     work = exporting.work(model_path, source, tmp_path)
-    assert run.run(work, source, exporting.Watching()).before
+    assert run.run(work, source, exporting.Recorder()).before
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
 
@@ -132,19 +133,19 @@ def test_what_was_killed_as_its_manifest_was_written_is_ended(
     undisturbed, source, model_path, tmp_path
 ):
     work = exporting.work(model_path, source, tmp_path)
-    run.run(work, source, exporting.Watching(3))
+    run.run(work, source, exporting.Recorder(3))
     # As far as it gets before the file that makes an export complete.
     (tmp_path / "manifest.jsonl").write_bytes(b"the first line")
-    assert run.run(work, source, exporting.Watching()).facts is not None
+    assert run.run(work, source, exporting.Recorder()).facts is not None
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
 
 @pytest.mark.parametrize("stop", [1, 2, 3])
 def test_what_was_stopped_goes_on(stop, undisturbed, source, model_path, tmp_path):
     work = exporting.work(model_path, source, tmp_path)
-    outcome = run.run(work, source, exporting.Watching(stop))
+    outcome = run.run(work, source, exporting.Recorder(stop))
     assert (outcome.done, outcome.facts) == (8 * stop, None)
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     assert run.run(work, source, watch).facts is not None
     assert watch.begun == (ROWS, 8 * stop)
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
@@ -155,35 +156,35 @@ def test_a_chunk_whose_files_have_gone_is_done_again(
     harm, undisturbed, source, model_path, tmp_path
 ):
     work = exporting.work(model_path, source, tmp_path)
-    run.run(work, source, exporting.Watching(2))
+    run.run(work, source, exporting.Recorder(2))
     harm(tmp_path / "clips/000/clip-0003.json")
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     run.run(work, source, watch)
     assert watch.begun == (ROWS, 8)
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
 
 def test_another_export_is_refused_and_left(source, model_path, tmp_path):
-    run.run(exporting.work(model_path, source, tmp_path), source, exporting.Watching(1))
+    run.run(exporting.work(model_path, source, tmp_path), source, exporting.Recorder(1))
     before, others = exporting.content(tmp_path), exporting.queries(ROWS - 1)
     with pytest.raises(FileError, match="holds another export, whose queries differ"):
-        run.run(exporting.work(model_path, others, tmp_path), others, exporting.Watching())
+        run.run(exporting.work(model_path, others, tmp_path), others, exporting.Recorder())
     with pytest.raises(FileError, match="holds another export, whose chunk differ"):
-        run.run(exporting.work(model_path, source, tmp_path, 9), source, exporting.Watching())
+        run.run(exporting.work(model_path, source, tmp_path, 9), source, exporting.Recorder())
     assert exporting.content(tmp_path) == before
 
 
 def test_a_complete_export_of_another_job_is_refused(undisturbed, model_path):
     others = exporting.queries(ROWS - 1)
     with pytest.raises(FileError, match="holds another export, whose queries differ"):
-        run.run(exporting.work(model_path, others, undisturbed), others, exporting.Watching())
+        run.run(exporting.work(model_path, others, undisturbed), others, exporting.Recorder())
 
 
 @pytest.mark.parametrize("name", ["mine.txt", "export.json"])
 def test_a_folder_of_something_else_is_refused_and_left(name, source, model_path, tmp_path):
     (tmp_path / name).write_text("{}")
-    with pytest.raises(FileError, match=r"no export's|facts cannot be read"):
-        run.run(exporting.work(model_path, source, tmp_path), source, exporting.Watching())
+    with pytest.raises(FileError, match=r"has no manifest|facts cannot be read"):
+        run.run(exporting.work(model_path, source, tmp_path), source, exporting.Recorder())
     assert exporting.content(tmp_path) == {name: b"{}"}
 
 
@@ -191,7 +192,7 @@ def test_a_file_is_no_target(source, model_path, tmp_path):
     place = tmp_path / "file"
     place.write_text("mine")
     with pytest.raises(FileError, match="Not a directory"):
-        run.run(exporting.work(model_path, source, place), source, exporting.Watching())
+        run.run(exporting.work(model_path, source, place), source, exporting.Recorder())
     assert place.read_text() == "mine"
 
 
@@ -209,14 +210,14 @@ def test_rows_at_fault_end_it_before_anything_is_written(source, model_path, tmp
     with pytest.raises(
         InvalidField, match=r"rows that cannot be answered: 1 .*:\n  line 6: fps: 'often'"
     ):
-        run.run(exporting.work(model_path, bad, tmp_path / "t"), bad, exporting.Watching())
+        run.run(exporting.work(model_path, bad, tmp_path / "t"), bad, exporting.Recorder())
     assert not (tmp_path / "t").exists()
 
 
 def test_rows_at_fault_are_skipped_and_listed(source, model_path, tmp_path):
     bad = spoilt(source)
     work = exporting.work(model_path, bad, tmp_path, skip=True)
-    outcome = run.run(work, bad, exporting.Watching(), crew.of(2))
+    outcome = run.run(work, bad, exporting.Recorder(), pool.runner(2))
     assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 2)
     skipped = exporting.lines(tmp_path / "skipped.jsonl")
     assert [fault["place"] for fault in skipped] == ["line 6", "line 13"]
@@ -229,13 +230,13 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
     rows = [row for row in spoilt(source).rows() if not isinstance(row, Fault)]
     bad = exporting.Listed(rows)
     work = exporting.work(model_path, bad, tmp_path)
-    for by in (crew.alone, crew.of(2)):
+    for by in (pool.run_here, pool.runner(2)):
         with pytest.raises(
             InvalidField, match=r"rows that cannot be answered: 1 .*\n  line 13: end: 50"
         ):
-            run.run(work, bad, exporting.Watching(), by)
+            run.run(work, bad, exporting.Recorder(), by)
         assert not (tmp_path / "manifest.jsonl").exists()
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     outcome = run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, watch)
     assert watch.begun[1] >= 8
     assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 1)
@@ -244,15 +245,16 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
 def test_queries_of_which_none_can_be_answered_are_refused(model_path, tmp_path):
     bad = exporting.Listed([Fault("line 2", "no")])
     with pytest.raises(InvalidField, match="no row that can be answered"):
-        run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, exporting.Watching())
+        run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, exporting.Recorder())
 
 
+@pytest.mark.system
 def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_path, tmp_path):
     model = shutil.copy(model_path, tmp_path / "reaching.onnx")
     work = exporting.work(model, source, tmp_path / "target")
-    watch = exporting.Watching()
+    watch = exporting.Recorder()
     watch.advance = lambda part: model.write_bytes(b"another")
-    assert run.run(work, source, watch, crew.of(2)).facts is not None
+    assert run.run(work, source, watch, pool.runner(2)).facts is not None
     assert model.read_bytes() == b"another"
     assert exporting.content(tmp_path / "target") == exporting.content(undisturbed)
 
@@ -270,10 +272,10 @@ def test_it_may_be_completed_by_another_while_its_queries_are_looked_at(
 
     class Slow(exporting.Listed):
         def survey(self):
-            run.run(work, source, exporting.Watching())
+            run.run(work, source, exporting.Recorder())
             return super().survey()
 
-    outcome = run.run(work, Slow(source.rows()), exporting.Watching())
+    outcome = run.run(work, Slow(source.rows()), exporting.Recorder())
     assert (outcome.rows, outcome.done) == (ROWS, ROWS)
     assert outcome.facts["clips"] == ROWS
     assert exporting.content(tmp_path / "made") == exporting.content(undisturbed)

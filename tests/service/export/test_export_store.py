@@ -1,4 +1,4 @@
-"""Exports to an object store: a real server that speaks S3, in a process of its own."""
+"""Tests of exports to an S3 object store in a separate process."""
 
 import os
 
@@ -6,11 +6,14 @@ import exporting
 import pytest
 import stores
 
-from service.export import crew, run
+from service.export import pool, run
 from service.export.run import Shard
 from service.export.store import Store
 from service.export.target import open_target
 from service.motion.errors import FileError
+from service.synthesis import objects
+
+pytestmark = pytest.mark.system
 
 ROWS = 30
 
@@ -35,7 +38,7 @@ def local(source, model_path, tmp_path_factory):
     def of(layout):
         folder = tmp_path_factory.mktemp(layout)
         work = exporting.work(model_path, source, folder, layout=layout)
-        run.run(work, source, exporting.Watching())
+        run.run(work, source, exporting.Recorder())
         return exporting.content(folder)
 
     return {layout: of(layout) for layout in ("folder", "tar")}
@@ -44,28 +47,29 @@ def local(source, model_path, tmp_path_factory):
 def content(url):
     """Bytes of every object under a URL, by path."""
     store = Store(url)
-    return {path: store.read(path) for path in paths(store)}
+    return {path: store.read(path) for path in paths(url)}
 
 
-def paths(store):
+def paths(url):
+    """Path of every object under a URL."""
     import obstore
 
-    return [meta["path"] for batch in obstore.list(store._store) for meta in batch]
+    return [meta["path"] for batch in obstore.list(objects.connect(url)) for meta in batch]
 
 
 @pytest.mark.parametrize("layout", ["folder", "tar"])
 def test_a_store_gets_what_a_folder_would(layout, source, model_path, bucket, local):
     work = exporting.work(model_path, source, bucket, layout=layout)
-    outcome = run.run(work, source, exporting.Watching(), crew.of(2))
+    outcome = run.run(work, source, exporting.Recorder(), pool.runner(2))
     assert outcome.done == ROWS
     assert content(bucket) == local[layout]
 
 
 def test_what_was_stopped_goes_on_in_a_store(source, model_path, bucket, local):
     work = exporting.work(model_path, source, bucket)
-    run.run(work, source, exporting.Watching(2))
-    assert "manifest.jsonl" not in paths(Store(bucket))
-    watch = exporting.Watching()
+    run.run(work, source, exporting.Recorder(2))
+    assert "manifest.jsonl" not in paths(bucket)
+    watch = exporting.Recorder()
     run.run(work, source, watch)
     assert watch.begun == (ROWS, 16)
     assert content(bucket) == local["folder"]
@@ -75,35 +79,48 @@ def test_what_was_stopped_goes_on_in_a_store(source, model_path, bucket, local):
 def test_shards_meet_in_a_store(source, model_path, bucket, local):
     work = exporting.work(model_path, source, bucket)
     for index in (1, 0):
-        run.run(work, source, exporting.Watching(), shard=Shard(index, 2))
+        run.run(work, source, exporting.Recorder(), shard=Shard(index, 2))
     assert content(bucket) == local["folder"]
 
 
 def test_a_store_of_something_else_is_refused_and_left(source, model_path, bucket):
     Store(bucket).write([("mine.txt", b"mine")])
-    with pytest.raises(FileError, match="no export's"):
-        run.run(exporting.work(model_path, source, bucket), source, exporting.Watching())
+    with pytest.raises(FileError, match="has no manifest of an export"):
+        run.run(exporting.work(model_path, source, bucket), source, exporting.Recorder())
     assert content(bucket) == {"mine.txt": b"mine"}
 
 
 def test_a_bucket_that_there_is_not_is_named(source, model_path):
     work = exporting.work(model_path, source, "s3://nowhere/at/all")
     with pytest.raises(FileError, match=r"^s3://nowhere/at/all: cannot be written or read"):
-        run.run(work, source, exporting.Watching())
+        run.run(work, source, exporting.Recorder())
 
 
 def test_what_was_complete_and_lost_its_manifest_is_made_again_in_a_store(
     source, model_path, bucket, local
 ):
     work = exporting.work(model_path, source, bucket)
-    run.run(work, source, exporting.Watching())
+    run.run(work, source, exporting.Recorder())
     whole = content(bucket)
     target = open_target(bucket)
     target.drop("manifest.jsonl")
     target.drop("manifest.jsonl")
     assert content(bucket) != whole
-    assert not run.run(work, source, exporting.Watching()).before
+    assert not run.run(work, source, exporting.Recorder()).before
     assert content(bucket) == whole
+
+
+def test_an_object_with_a_flipped_bit_is_found_to_verify(source, model_path, bucket, local):
+    work = exporting.work(model_path, source, bucket)
+    run.run(work, source, exporting.Recorder())
+    assert run.run(work, source, exporting.Recorder(), verify=True).before
+    store, path = Store(bucket), "clips/000/clip-0003.json"
+    store.write([(path, store.read(path).replace(b"0", b"1", 1))])
+    assert run.run(work, source, exporting.Recorder()).before
+    recorder = exporting.Recorder()
+    assert not run.run(work, source, recorder, verify=True).before
+    assert recorder.notes == [f"{bucket}/{path}: missing or damaged; the export is made again"]
+    assert content(bucket) == local["folder"]
 
 
 def test_a_file_is_created_once(bucket):
@@ -115,7 +132,7 @@ def test_a_file_is_created_once(bucket):
 
 def test_a_large_file_goes_in_pieces_and_what_breaks_off_is_not_there(bucket):
     store = Store(bucket)
-    assert store.stream("large", (bytes([n]) * 1_000_000 for n in range(20))) == 20_000_000
+    store.stream("large", (bytes([n]) * 1_000_000 for n in range(20)))
     assert store.read("large")[::1_000_000] == bytes(range(20))
 
     def broken():
@@ -134,7 +151,7 @@ def test_an_address_of_no_store_is_refused():
 
 def test_the_address_of_a_folder_is_the_folder(source, model_path, tmp_path, local):
     work = exporting.work(model_path, source, f"file://{tmp_path}/with%20space")
-    run.run(work, source, exporting.Watching())
+    run.run(work, source, exporting.Recorder())
     assert exporting.content(tmp_path / "with space") == local["folder"]
 
 

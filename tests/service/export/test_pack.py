@@ -1,4 +1,4 @@
-"""Many clips are made a few at a time, and the manifest lists all of them."""
+"""Tests of archives of many clips: generation in batches, and the manifest."""
 
 import dataclasses
 import hashlib
@@ -11,8 +11,9 @@ from service.encode.convention import METRES
 from service.export import pack
 from service.export.pack import CLIPS, POSES, Order
 from service.export.query import Query
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips, session
-from service.synthesis.question import ClipQuestion, Prospect
+from service.synthesis.clips import Prospect
 from service.synthesis.synthesizer import Synthesizer
 
 
@@ -32,7 +33,7 @@ def order(model):
 
     def ordered(rates):
         middle = {control.name: control.default for control in model.session.card.controls}
-        questions = [ClipQuestion(middle, fps=rate) for rate in rates]
+        questions = [ClipQuestion(controls=middle, fps=rate) for rate in rates]
         queries = [Query(f"c{i}", "json", q, f"/clips/{i}") for i, q in enumerate(questions)]
         encoder = dataclasses.replace(ENCODERS["json"], write=write)
         prospects = [clips.prospect(model, question) for question in questions]

@@ -1,24 +1,28 @@
-"""The same rows are the same queries in every kind of file, and what the model's door makes of
-each of them alone."""
+"""Tests of query sources: equal rows give equal queries in all file types, and equal validation."""
 
-from dataclasses import replace
 from itertools import product
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 from rowing import POINT, faults, rows, source, write_csv, write_jsonl, write_parquet
 
 from service.encode import ENCODERS
 from service.export.queries import Defaults
 from service.export.query import Fault
 from service.motion.errors import QueryError
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips, library
-from service.synthesis.question import ClipQuestion
 
 WRITERS = {"csv": write_csv, "jsonl": write_jsonl, "parquet": write_parquet}
 PERFORMERS = ("middle", "short", "tall")
-USUAL = Defaults("bvh", ClipQuestion({}, 24.0, "warn", 0.1, 0.9, "short", 1))
+USUAL = Defaults(
+    "bvh",
+    ClipQuestion(
+        controls={}, fps=24.0, extrapolate="warn", start=0.1, end=0.9, performer="short", level=1
+    ),
+)
 # Half of the numbers can be asked for; the others lie near an edge of what can, or far outside.
 NUMBERS = st.one_of(
     st.sampled_from([1.7, 0.9, 10.0, 1.0]),
@@ -78,7 +82,7 @@ def plainly(model, table, usual=USUAL):
         found.append(None)
         if form not in ENCODERS or name in (".x", "a b") or said.get("extrapolate") == "no":
             continue
-        question = replace(usual.question, controls=controls, **said)
+        question = structs.replace(usual.question, controls=controls, **said)
         try:
             clips.check(model, question)
         except QueryError:
@@ -169,7 +173,7 @@ def test_what_is_read_together_ends_where_the_door_does(model, tmp_path, policy,
     found = rows(model, write_jsonl(tmp_path / "q.jsonl", table))
     let_in = []
     for row in table:
-        question = ClipQuestion({name: row[name] for name in POINT}, extrapolate=policy)
+        question = ClipQuestion(controls={name: row[name] for name in POINT}, extrapolate=policy)
         try:
             clips.check(model, question)
         except QueryError:

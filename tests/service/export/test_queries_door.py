@@ -1,13 +1,13 @@
-"""One of a file, a grid and a sampling is asked for; what cannot be is refused before a row is."""
+"""Tests of the choice of a query source (file, grid or sampling), and of early errors."""
 
 import pytest
 from rowing import POINT, rows, source, write_csv
 
-from service.export.columns import HELD, OPTIONS
+from service.export.columns import OPTIONS
 from service.export.queries import Defaults
 from service.motion.errors import FileError, InvalidField, OutsideSamples, UnknownFormat
+from service.question.motion_question import ClipQuestion, NamedClipQuestion
 from service.synthesis import clips, library
-from service.synthesis.question import ClipQuestion, Hold
 
 
 @pytest.fixture(scope="module")
@@ -64,10 +64,10 @@ def test_a_sampling_that_cannot_be_drawn_is_refused(model, asked, said):
     ("usual", "fault"),
     [
         (Defaults("fbx"), UnknownFormat),
-        (Defaults("usdc", ClipQuestion({}, level=9)), InvalidField),
-        (Defaults("usdc", ClipQuestion({}, performer="nobody")), InvalidField),
-        (Defaults("usdc", ClipQuestion({}, fps=0.0)), InvalidField),
-        (Defaults("usdc", ClipQuestion({}, start=2.0, end=1.0)), InvalidField),
+        (Defaults("usdc", ClipQuestion(controls={}, level=9)), InvalidField),
+        (Defaults("usdc", ClipQuestion(controls={}, performer="nobody")), InvalidField),
+        (Defaults("usdc", ClipQuestion(controls={}, fps=0.0)), InvalidField),
+        (Defaults("usdc", ClipQuestion(controls={}, start=2.0, end=1.0)), InvalidField),
     ],
 )
 def test_what_rows_do_not_say_is_checked_once(model, table, usual, fault):
@@ -90,16 +90,16 @@ def test_a_file_that_cannot_be_read_is_refused(model, tmp_path, name, said):
 
 
 def test_every_option_but_name_and_format_is_a_field_of_a_question():
-    fields = {*vars(ClipQuestion({})), *HELD}
-    assert set(OPTIONS) - {"name", "format"} <= fields
-    assert set(HELD) == set(vars(Hold()))
+    fields = {*NamedClipQuestion.__struct_fields__, "format"}
+    assert fields - set(OPTIONS) == {"controls", "joint_sigma"}
+    assert set(OPTIONS) <= fields
 
 
 def test_a_refusal_before_a_row_is_the_same_as_in_one(model, table):
     """What the command line says holds for rows as if they said it."""
-    usual = Defaults("usdc", ClipQuestion({}, extrapolate="refuse"))
+    usual = Defaults("usdc", ClipQuestion(controls={}, extrapolate="refuse"))
     beyond = write_csv(table, [{**POINT, "turn": 99.0}])
     (fault,) = rows(model, beyond, usual)
     with pytest.raises(OutsideSamples) as caught:
-        clips.check(model, ClipQuestion({**POINT, "turn": 99.0}, extrapolate="refuse"))
+        clips.check(model, ClipQuestion(controls={**POINT, "turn": 99.0}, extrapolate="refuse"))
     assert fault.message == str(caught.value)

@@ -1,4 +1,4 @@
-"""A grid is every combination of its values, the last axis the fastest."""
+"""Tests of grids: all combinations of values, the last axis fastest."""
 
 from itertools import product
 
@@ -9,8 +9,8 @@ from rowing import asked, rows, source
 from service.export.queries import Defaults
 from service.export.query import Fault
 from service.motion.errors import InvalidField
+from service.question.motion_question import ClipQuestion
 from service.synthesis import library
-from service.synthesis.question import ClipQuestion
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +27,8 @@ def test_a_grid_is_the_product_in_the_order_it_is_given(model):
         {"stature": stature, "hip_height": 0.9, "turn": turn, "target_height": height}
         for turn, stature in product(np.linspace(0, 80, 17).tolist(), (1.7, 1.75))
     ]
-    assert [row.question for row in found] == [ClipQuestion(point) for point in expected]
-    assert opened.count == opened.survey().total == len(found) == 34
+    assert [row.question for row in found] == [ClipQuestion(controls=point) for point in expected]
+    assert opened.survey().total == len(found) == 34
     assert [row.place for row in found[:2]] == ["grid point 1", "grid point 2"]
     assert found[33].name == "clip-000033"
 
@@ -55,7 +55,7 @@ def test_blocks_of_a_grid_leave_no_seam(model):
 
 
 def test_a_point_that_cannot_be_asked_for_is_a_fault(model):
-    usual = Defaults("usdc", ClipQuestion({}, extrapolate="refuse"))
+    usual = Defaults("usdc", ClipQuestion(controls={}, extrapolate="refuse"))
     found = rows(model, usual=usual, grid=("turn=80:90:3",))
     assert [isinstance(row, Fault) for row in found] == [False, False, True]
     assert found[2].place == "grid point 3"

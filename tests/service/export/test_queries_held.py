@@ -1,19 +1,24 @@
-"""What rows say that clips are held to."""
+"""Tests of targets and exact controls in query rows."""
 
 import json
 import re
 
 import pytest
+from msgspec import structs
 from rowing import POINT, faults, rows, source, text, write_csv, write_jsonl, write_parquet
 
 from service.export.queries import Defaults
 from service.motion.errors import InvalidField
+from service.question.motion_question import ClipQuestion, Target
 from service.synthesis import library
-from service.synthesis.question import ClipQuestion, Hold, Target
 
+HELD = ("exact", "targets", "pin_feet")
 HAND = {"joint": "RightHand", "position": [-0.2, 1.1, 0.5], "at": "end"}
 FOOT = {"joint": "LeftFoot", "position": [0.1, 0, 0.5], "time": 0.25}
-BOTH = (Target("RightHand", (-0.2, 1.1, 0.5), "end"), Target("LeftFoot", (0.1, 0.0, 0.5), 0.25))
+BOTH = (
+    Target("RightHand", (-0.2, 1.1, 0.5), at="end"),
+    Target("LeftFoot", (0.1, 0.0, 0.5), time=0.25),
+)
 WORDS = "RightHand@end:-0.2,1.1,0.5; LeftFoot@0.25:0.1,0,0.5"
 
 
@@ -23,7 +28,10 @@ def model(labelled_path):
 
 
 def holds(model, path, usual=None):
-    return [each.question.hold for each in rows(model, path, usual)]
+    """What the questions of rows say beyond a plain one's, by field."""
+    plain = structs.asdict(ClipQuestion(controls={}))
+    asked = [structs.asdict(each.question) for each in rows(model, path, usual)]
+    return [{k: one[k] for k in HELD if one[k] != plain[k]} for one in asked]
 
 
 def test_lines_are_held_each_to_its_own(model, tmp_path):
@@ -34,19 +42,22 @@ def test_lines_are_held_each_to_its_own(model, tmp_path):
         {**POINT, "targets": None, "exact": None},
     ]
     path = write_jsonl(tmp_path / "q.jsonl", lines)
-    assert holds(model, path) == [Hold(targets=BOTH), Hold(), Hold("none"), Hold()]
+    assert holds(model, path) == [{"targets": BOTH}, {}, {"exact": "none"}, {}]
 
 
 def test_what_a_row_does_not_say_is_as_usual(model, tmp_path):
-    usual = Defaults("usdc", ClipQuestion({}, hold=Hold("none", BOTH[1:])))
+    usual = Defaults("usdc", ClipQuestion(controls={}, exact="none", targets=BOTH[1:]))
     path = write_jsonl(tmp_path / "q.jsonl", [POINT, {**POINT, "exact": "auto", "targets": [HAND]}])
-    assert holds(model, path, usual) == [Hold("none", BOTH[1:]), Hold("auto", BOTH[:1])]
+    assert holds(model, path, usual) == [
+        {"exact": "none", "targets": BOTH[1:]},
+        {"targets": BOTH[:1]},
+    ]
 
 
 @pytest.mark.parametrize(("write", "name"), [(write_csv, "q.csv"), (write_parquet, "q.parquet")])
 def test_targets_of_tables_are_text(model, tmp_path, write, name):
     said = [{**POINT, "exact": "none", "targets": WORDS}, {**POINT, "exact": None, "targets": None}]
-    assert holds(model, write(tmp_path / name, said)) == [Hold("none", BOTH), Hold()]
+    assert holds(model, write(tmp_path / name, said)) == [{"exact": "none", "targets": BOTH}, {}]
 
 
 @pytest.mark.parametrize(
@@ -74,14 +85,15 @@ def test_rows_that_no_clip_can_be_held_to(model, tmp_path, said, message):
 def test_what_holds_for_all_rows_is_looked_at_first(model, tmp_path):
     path = write_jsonl(tmp_path / "q.jsonl", [POINT])
     with pytest.raises(InvalidField, match="exact: 'turn' is not measured on a motion"):
-        source(model, path, Defaults("usdc", ClipQuestion({}, hold=Hold(("turn",)))))
+        source(model, path, Defaults("usdc", ClipQuestion(controls={}, exact=("turn",))))
 
 
 def test_what_clips_are_held_to_is_part_of_the_job(model, tmp_path):
     path = write_jsonl(tmp_path / "q.jsonl", [POINT])
-    every = [Hold(), Hold("none"), Hold(targets=BOTH), Hold(targets=BOTH[:1])]
+    every = [{}, {"exact": "none"}, {"targets": BOTH}, {"targets": BOTH[:1]}]
     digests = [
-        source(model, path, Defaults("usdc", ClipQuestion({}, hold=hold))).digest for hold in every
+        source(model, path, Defaults("usdc", ClipQuestion(controls={}, **hold))).digest
+        for hold in every
     ]
     assert len(set(digests)) == len(every)
     other = write_jsonl(tmp_path / "r.jsonl", [{**POINT, "targets": [HAND]}])
@@ -91,7 +103,7 @@ def test_what_clips_are_held_to_is_part_of_the_job(model, tmp_path):
 
 def test_a_grid_of_what_is_exact(model):
     found = rows(model, grid=("exact=auto,none",))
-    assert [each.question.hold.exact for each in found] == ["auto", "none"]
+    assert [each.question.exact for each in found] == ["auto", "none"]
     with pytest.raises(InvalidField, match="column 'targets', expected one whose values have no"):
         source(model, grid=("targets=RightHand@end:0,1,0",))
 
@@ -99,11 +111,11 @@ def test_a_grid_of_what_is_exact(model):
 def test_a_cell_that_is_empty_says_nothing(model, tmp_path):
     line = ",".join(f"{value}" for value in POINT.values())
     path = text(tmp_path / "q.csv", ",".join([*POINT, "exact", "targets"]), f"{line},,")
-    assert holds(model, path) == [Hold()]
+    assert holds(model, path) == [{}]
 
 
 def test_lines_are_json(model, tmp_path):
     """What is nested is no key that is there twice."""
     path = tmp_path / "q.jsonl"
     path.write_text(json.dumps({"controls": POINT, "targets": [HAND, FOOT]}) + "\n")
-    assert holds(model, path) == [Hold(targets=BOTH)]
+    assert holds(model, path) == [{"targets": BOTH}]

@@ -1,4 +1,4 @@
-"""JSON Lines: one object a line, controls in it or in an object of their own."""
+"""Tests of JSON Lines: one object per line, with controls inline or nested."""
 
 import json
 
@@ -6,8 +6,8 @@ import pytest
 from rowing import POINT, asked, faults, rows, source
 
 from service.motion.errors import FileError
+from service.question.motion_question import ClipQuestion
 from service.synthesis import library
-from service.synthesis.question import ClipQuestion
 
 OK = json.dumps(POINT)
 
@@ -47,7 +47,7 @@ def wrong(model, tmp_path):
 def test_a_line_asks_for_a_clip(model, tmp_path, line):
     path = tmp_path / "q.jsonl"
     path.write_text(line, newline="")
-    assert asked(rows(model, path)) == [("clip-000000", "usdc", ClipQuestion(POINT))]
+    assert asked(rows(model, path)) == [("clip-000000", "usdc", ClipQuestion(controls=POINT))]
 
 
 def test_lines_may_say_different_things(model, tmp_path):
@@ -55,9 +55,9 @@ def test_lines_may_say_different_things(model, tmp_path):
     path = tmp_path / "q.ndjson"
     path.write_text("\n".join(map(json.dumps, lines)))
     assert asked(rows(model, path)) == [
-        ("clip-000000", "usdc", ClipQuestion(POINT, 60.0)),
-        ("a", "usdc", ClipQuestion(POINT)),
-        ("clip-000002", "usdc", ClipQuestion(POINT, level=1)),
+        ("clip-000000", "usdc", ClipQuestion(controls=POINT, fps=60.0)),
+        ("a", "usdc", ClipQuestion(controls=POINT)),
+        ("clip-000002", "usdc", ClipQuestion(controls=POINT, level=1)),
     ]
 
 

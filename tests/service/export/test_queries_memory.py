@@ -1,4 +1,4 @@
-"""However many rows there are, a block of them is held."""
+"""Tests of memory: one block of rows is in memory at a time."""
 
 import tracemalloc
 
@@ -7,6 +7,8 @@ from rowing import POINT, source, text, write_csv
 
 from service.export.queries import Defaults
 from service.synthesis import library
+
+pytestmark = pytest.mark.system
 
 # Bytes of a block of 4096 rows as lines, cells and values; names take 8 each beside it.
 BOUND = 12e6

@@ -1,4 +1,4 @@
-"""Parquet: columns have types, and pyarrow is not there everywhere."""
+"""Tests of Parquet: column types, and the error without pyarrow."""
 
 import subprocess
 import sys
@@ -9,8 +9,8 @@ import pytest
 from rowing import POINT, asked, faults, rows, source, write_parquet
 
 from service.motion.errors import FileError
+from service.question.motion_question import ClipQuestion
 from service.synthesis import library
-from service.synthesis.question import ClipQuestion
 
 HIDDEN = """
 import sys
@@ -54,10 +54,10 @@ def test_a_row_asks_for_a_clip(model, table):
         end=pa.array([None]),
         fps=pa.array([None], pa.float64()),
     )
-    question = ClipQuestion({**POINT, "stature": 1.75}, performer="tall", level=2)
+    question = ClipQuestion(controls={**POINT, "stature": 1.75}, performer="tall", level=2)
     opened = source(model, path)
     assert asked(opened.rows()) == [("a", "usdc", question)]
-    assert opened.count == opened.survey().total == 1
+    assert opened.survey().total == 1
 
 
 @pytest.mark.parametrize(

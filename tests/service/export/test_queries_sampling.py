@@ -1,4 +1,4 @@
-"""Samplings keep what their names promise: strata hit once, points in the hull, equal bytes."""
+"""Tests of samplings: stratification, points in the hull and reproducible bytes."""
 
 import subprocess
 import sys
@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 from rowing import rows, source
 from scipy.optimize import linprog
 from scipy.stats import chisquare, qmc
 
-from service.export import permutation, sampling
+from service.export import sampling
 from service.export.blocks import SIZE
 from service.synthesis import library
 
@@ -75,20 +76,20 @@ def strata_hit_once(points):
 @given(count=st.integers(1, 3000), seed=st.integers(0, 2**63))
 @settings(max_examples=60, deadline=None)
 def test_a_permutation_sends_every_place_to_another(count, seed):
-    sent = permutation.of(np.arange(count, dtype=np.uint64), count, (seed,))
+    sent = sampling.permuted(np.arange(count, dtype=np.uint64), count, (seed,))
     assert sorted(sent.tolist()) == list(range(count))
 
 
 def test_a_permutation_is_the_same_whatever_is_asked_together():
     places = np.arange(1000, dtype=np.uint64)
-    whole = permutation.of(places, 1000, (5,))
-    parts = [permutation.of(part, 1000, (5,)) for part in np.array_split(places, 7)]
+    whole = sampling.permuted(places, 1000, (5,))
+    parts = [sampling.permuted(part, 1000, (5,)) for part in np.array_split(places, 7)]
     assert np.concatenate(parts).tolist() == whole.tolist()
 
 
 def test_permutations_of_four_are_all_equally_likely():
     places = np.arange(4, dtype=np.uint64)
-    found = Counter(tuple(permutation.of(places, 4, (s,)).tolist()) for s in range(4800))
+    found = Counter(tuple(sampling.permuted(places, 4, (s,)).tolist()) for s in range(4800))
     assert chisquare([found[order] for order in permutations(range(4))]).pvalue > UNLIKELY
 
 
@@ -169,7 +170,7 @@ def test_weights_are_even_in_the_simplex(card):
 @pytest.mark.parametrize("method", sampling.METHODS)
 def test_every_point_can_be_asked_for_where_it_was_sampled(model, method):
     usual = source(model, sample=1).usual
-    strict = replace(usual, question=replace(usual.question, extrapolate="refuse"))
+    strict = replace(usual, question=structs.replace(usual.question, extrapolate="refuse"))
     survey = source(model, usual=strict, sample=10_000, method=method).survey()
     assert survey.total == 10_000
     # What was sampled has gaps, in which a box's points fall more often than those of the hull.
@@ -189,6 +190,7 @@ def test_a_sampling_is_latin_by_seed_0_unless_it_is_said(model):
     assert rows(model, sample=50)[7].place == "sample 8"
 
 
+@pytest.mark.system
 def test_a_sampling_is_the_same_in_every_process(labelled_path):
     def printed():
         command = [sys.executable, "-c", PRINTED, labelled_path]
@@ -204,7 +206,7 @@ def test_numbers_of_a_seed_are_those_of_ever(card):
     plain = [replace(c, minimum=0.0, maximum=1.0, values=()) for c in card.controls[:2]]
     square = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
     plain_card = replace(card, controls=tuple(plain), examples=square)
-    sent = permutation.of(np.arange(10, dtype=np.uint64), 10, (0,))
+    sent = sampling.permuted(np.arange(10, dtype=np.uint64), 10, (0,))
     assert sent.tolist() == [4, 6, 8, 9, 0, 2, 5, 7, 3, 1]
     assert drawn(plain_card, "latin", 2, 7).tolist() == LATIN
     assert drawn(plain_card, "hull", 2, 7).tolist() == HULL

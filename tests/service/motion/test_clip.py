@@ -1,4 +1,4 @@
-"""One motion: what it refuses, its times, and how it is put together."""
+"""Tests of clips: validation, times and composition."""
 
 import numpy as np
 import pytest

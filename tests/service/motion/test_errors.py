@@ -1,4 +1,4 @@
-"""Errors cross from one process to another with all that they say."""
+"""Tests of errors: pickling between processes keeps all fields."""
 
 import pickle
 

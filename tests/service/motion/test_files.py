@@ -1,4 +1,4 @@
-"""Files are whole or not there."""
+"""Tests of file writing: files are complete or absent."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Feet on the ground: one that slides does so at its speed, one in the air may move as it likes."""
+"""Tests of foot skate: speeds of feet on the ground, and none in the air."""
 
 import numpy as np
 import pytest

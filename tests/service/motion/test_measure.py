@@ -1,4 +1,4 @@
-"""What is measured of a motion is what was put into it."""
+"""Tests of measures on motions with known values."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Unit quaternions: what must hold of rotations, whatever their numbers."""
+"""Tests of unit quaternions: properties of rotations."""
 
 from itertools import permutations
 

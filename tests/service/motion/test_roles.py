@@ -1,4 +1,4 @@
-"""Joints are called as a convention calls them, uniquely, and nothing else changes."""
+"""Tests of joint names of conventions: unique names, with all else unchanged."""
 
 from typing import get_args
 

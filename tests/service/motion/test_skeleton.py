@@ -1,4 +1,4 @@
-"""A tree of joints: what it refuses, and forward kinematics against plain matrices."""
+"""Tests of skeletons: validation, and forward kinematics against plain matrices."""
 
 import numpy as np
 import pytest
@@ -64,12 +64,39 @@ def test_rotations_broadcast_against_bone_offsets(pose):
     assert broadcast[1].shape == (7, 6, 4)
 
 
+def test_positions_are_those_of_forward(pose):
+    positions = skeleton.positions(PARENTS, *pose)
+    assert np.array_equal(positions, skeleton.forward(PARENTS, *pose)[0])
+    assert not np.array_equal(positions, skeleton.positions((-1, 0, 1, 2, 3, 4), *pose))
+
+
+def test_poses_in_several_blocks_are_those_one_by_one(rng):
+    count = 2 * skeleton.BLOCK + 1
+    rotations = quat.normalize(rng.normal(size=(count, 1, 6, 4)))
+    translations = rng.normal(size=(count, 1, 6, 3))
+    positions, orientations = skeleton.forward(PARENTS, rotations, translations)
+    assert positions.shape == (count, 1, 6, 3)
+    for pose in (0, skeleton.BLOCK - 1, skeleton.BLOCK, count - 1):
+        alone = skeleton.forward(PARENTS, rotations[pose], translations[pose])
+        assert np.array_equal(positions[pose], alone[0])
+        assert np.array_equal(orientations[pose], alone[1])
+    assert not np.array_equal(positions[0], positions[skeleton.BLOCK])
+
+
 def test_bones_keep_their_lengths(pose):
     rotations, translations = pose
     positions, _ = skeleton.forward(PARENTS, rotations, translations)
     bones = positions[:, 1:] - positions[:, list(PARENTS[1:])]
     lengths = np.linalg.norm(translations[:, 1:], axis=-1)
     assert np.max(np.abs(np.linalg.norm(bones, axis=-1) - lengths)) < TOLERANCE
+
+
+def test_a_chain_leads_from_the_root_to_its_joint():
+    assert [skeleton.chain(PARENTS, joint) for joint in (0, 2, 4)] == [
+        (0,),
+        (0, 1, 2),
+        (0, 1, 3, 4),
+    ]
 
 
 def test_descendants_are_the_joints_whose_way_up_passes_by():

@@ -1,4 +1,4 @@
-"""Whether anything like some controls was captured: what the box and the plain field say."""
+"""Tests of the support flag: control ranges and kriging variance."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What one more captured clip would be worth: against variances computed anew."""
+"""Tests of the expected variance reduction against recomputed variances."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Clips in place and loops: what is taken out, and that a loop ends in its first pose."""
+"""Tests of clips in place and of loops, which end in their first pose."""
 
 import dataclasses
 
@@ -8,8 +8,8 @@ import pytest
 from service.motion import quat
 from service.motion.conventions import UP
 from service.motion.errors import InvalidField
+from service.question.motion_question import ClipQuestion, PoseQuestion
 from service.synthesis import clips, library, poses
-from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.walk import plane, stride
 
@@ -30,13 +30,13 @@ def reacher(model_path):
 
 
 def clip(model, controls, **asked):
-    return clips.clip(model, ClipQuestion(controls, **asked)).clip
+    return clips.clip(model, ClipQuestion(controls=controls, **asked)).clip
 
 
 def end_of(model, controls):
     """The pose at the end of the clip, s, and when that is."""
-    duration = poses.pose(model, PoseQuestion(controls, [0.0])).trust.duration
-    return poses.pose(model, PoseQuestion(controls, [duration])), duration
+    duration = poses.pose(model, PoseQuestion(controls=controls, times=[0.0])).trust.duration
+    return poses.pose(model, PoseQuestion(controls=controls, times=[duration])), duration
 
 
 def apart(a, b):
@@ -46,21 +46,21 @@ def apart(a, b):
 
 @pytest.mark.parametrize("fps", [1.0, 24.0, 29.97, 120.0])
 def test_a_loop_is_the_whole_cycle_in_even_steps(walker, fps):
-    found = clips.clip(walker, ClipQuestion(STROLL, fps, loop=True))
+    found = clips.clip(walker, ClipQuestion(controls=STROLL, fps=fps, loop=True))
     _, duration = end_of(walker, STROLL)
     steps = max(1, round(duration * fps))
     assert len(found.clip) == steps + 1
     assert (found.clip.rate, found.clip.duration) == (fps, steps / fps)
     assert found.trust.duration == duration
     middle = steps // 2
-    there = poses.pose(walker, PoseQuestion(STROLL, [middle * duration / steps]))
+    there = poses.pose(walker, PoseQuestion(controls=STROLL, times=[middle * duration / steps]))
     assert np.abs(found.clip.rotations[middle] - there.rotations[0]).max() < FLOAT32
     assert np.abs(found.clip.root_path[middle] - there.root_position[0]).max() < FLOAT32
 
 
 @pytest.mark.parametrize("fps", [7.0, 30.0, 1.0])
 def test_the_frames_of_a_loop_are_known_before_it_is_made(walker, fps):
-    asked = ClipQuestion(STROLL, fps, loop=True)
+    asked = ClipQuestion(controls=STROLL, fps=fps, loop=True)
     assert clips.prospect(walker, asked).frames == len(clips.clip(walker, asked).clip)
 
 
@@ -156,7 +156,7 @@ def test_every_level_of_detail_closes(walker, level):
 def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
     for ask in (clips.clip, clips.check):
         with pytest.raises(InvalidField, match=r"^loop: true, expected false: this model's last"):
-            ask(reacher, ClipQuestion(POINT, loop=True))
+            ask(reacher, ClipQuestion(controls=POINT, loop=True))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
 def test_a_part_of_a_loop_is_refused(walker, span, said):
     for ask in (clips.clip, clips.check):
         with pytest.raises(InvalidField) as caught:
-            ask(walker, ClipQuestion(STROLL, loop=True, **span))
+            ask(walker, ClipQuestion(controls=STROLL, loop=True, **span))
         assert str(caught.value) == said
 
 
@@ -190,4 +190,4 @@ def test_joints_are_called_as_asked_for_and_stay_where_they_are(reacher):
 def test_names_of_a_convention_need_roles(walker):
     for ask in (clips.clip, clips.check):
         with pytest.raises(InvalidField, match=r"^names: 'ue5', expected 'own'"):
-            ask(walker, ClipQuestion(STROLL, names="ue5"))
+            ask(walker, ClipQuestion(controls=STROLL, names="ue5"))

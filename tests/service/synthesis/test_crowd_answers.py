@@ -1,4 +1,4 @@
-"""Crowds: what each character would be answered alone, where it stands, at its level."""
+"""Tests of crowds: each character's pose, placement and level, as in single requests."""
 
 import math
 from dataclasses import replace
@@ -10,9 +10,9 @@ from service.motion import quat, skeleton
 from service.motion.conventions import UP
 from service.motion.crowd import Placement
 from service.motion.errors import InvalidField, OutsideSamples
+from service.question.motion_question import PoseQuestion
 from service.synthesis import crowd, library, poses
 from service.synthesis.crowd_question import Blending, CrowdQuestion
-from service.synthesis.question import PoseQuestion
 from service.synthesis.view import Camera, View
 
 COUNT = 60
@@ -66,7 +66,9 @@ def alone(model, question, row):
     controls = {name: float(values[row]) for name, values in question.controls.items()}
     time, level = float(question.times[row]), int(question.detail[row])
     who = question.performers[question.performer[row]]
-    answer = poses.pose(model, PoseQuestion(controls, [time], performer=who, level=level))
+    answer = poses.pose(
+        model, PoseQuestion(controls=controls, times=[time], performer=who, level=level)
+    )
     parents = model.session.card.skeleton.parents
     found = joints(answer.rotations, answer.root_position, answer.bone_offsets[None], parents)
     turn = quat.about(UP, question.placement.headings[row])
@@ -264,7 +266,7 @@ def broken(model, field, row, value):
     ("field", "value", "said"),
     [
         ("time", -0.1, "expected 0 s or later"),
-        ("time", 60.0, "later than the end of the clip"),
+        ("time", 60.0, "60 s, expected 0 to 1"),
         ("level", 4, "expected 0 to 3"),
         ("level", -1, "expected 0 to 3"),
         ("controls/stature", 1e9, "expected -"),
@@ -339,9 +341,9 @@ def test_who_lets_the_camera_choose_need_not_know_the_levels_end(model):
     late = 1.05 * crowd.poses(model, seen).duration.astype(float)
     assert set(crowd.poses(model, replace(seen, times=late)).levels) == {0}
     numbered = replace(seen, times=late, detail=np.zeros(COUNT, dtype=int))
-    with pytest.raises(InvalidField, match="later than the end"):
+    with pytest.raises(InvalidField, match="s, expected 0 to"):
         crowd.poses(model, numbered)
-    with pytest.raises(InvalidField, match="later than the end"):
+    with pytest.raises(InvalidField, match="s, expected 0 to"):
         crowd.poses(model, replace(seen, times=1.2 * late))
 
 

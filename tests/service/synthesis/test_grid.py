@@ -1,16 +1,24 @@
-"""Sigma on a grid is what each answer of its points says of itself."""
-
-import dataclasses
+"""Tests of grids of sigma: equal to sigma of single answers."""
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from service.motion.errors import InvalidField
+from service.question.model_question import SigmaQuestion
+from service.question.motion_question import PoseQuestion
 from service.synthesis import library, poses
-from service.synthesis.grid import BATCH, GridQuestion, grid
-from service.synthesis.question import PoseQuestion
+from service.synthesis.grid import BATCH, grid
 
-ASKED = GridQuestion("turn", "target_height", 7, 5, {"stature": 1.7}, "tall", 0.3)
+ASKED = SigmaQuestion(
+    across="turn",
+    along="target_height",
+    columns=7,
+    rows=5,
+    controls={"stature": 1.7},
+    performer="tall",
+    margin=0.3,
+)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +32,9 @@ def test_each_point_is_the_sigma_of_an_answer(model):
     for row, along in enumerate(found.along.values):
         for column, across in enumerate(found.across.values):
             controls = {**fixed, "turn": across, "target_height": along}
-            trust = poses.pose(model, PoseQuestion(controls, [0.0], performer="tall")).trust
+            trust = poses.pose(
+                model, PoseQuestion(controls=controls, times=[0.0], performer="tall")
+            ).trust
             # One row of a product is summed in another order than many.
             assert abs(found.sigma[row, column] - trust.sigma) < 1e-6
             assert found.supported[row, column] == trust.supported
@@ -37,7 +47,7 @@ def test_each_point_is_the_sigma_of_an_answer(model):
 
 @pytest.mark.parametrize("stature", [1.62, 1.75])
 def test_support_is_what_an_answer_says_of_itself(model, stature):
-    asked = dataclasses.replace(ASKED, columns=25, rows=21, controls={"stature": stature})
+    asked = structs.replace(ASKED, columns=25, rows=21, controls={"stature": stature})
     found = grid(model, asked)
     told = [
         [supported(model, found, across, along) for across in found.across.values]
@@ -47,17 +57,19 @@ def test_support_is_what_an_answer_says_of_itself(model, stature):
     # Negative control: gaps inside, and a little beyond, where the box alone would say otherwise;
     # and with another stature it would not be.
     assert (found.inside & ~found.supported).any() and (found.supported & ~found.inside).any()
-    other = grid(model, dataclasses.replace(asked, controls={"stature": 1.88}))
+    other = grid(model, structs.replace(asked, controls={"stature": 1.88}))
     assert other.supported.tolist() != told
 
 
 def supported(model, found, across, along):
     controls = {**found.controls, "turn": across, "target_height": along}
-    return poses.pose(model, PoseQuestion(controls, [0.0], "ok")).trust.supported
+    return poses.pose(
+        model, PoseQuestion(controls=controls, times=[0.0], extrapolate="ok")
+    ).trust.supported
 
 
 def test_the_whole_graph_says_the_same(model):
-    asked = dataclasses.replace(ASKED, columns=60, rows=40)
+    asked = structs.replace(ASKED, columns=60, rows=40)
     assert len(asked) > 2 * BATCH
     found, card = grid(model, asked), model.session.card
     points = np.zeros((len(asked), len(card.controls)))
@@ -74,7 +86,7 @@ def test_the_whole_graph_says_the_same(model):
 
 
 def test_axes_go_as_far_as_was_sampled_and_no_farther(model):
-    found = grid(model, dataclasses.replace(ASKED, margin=0.0))
+    found = grid(model, structs.replace(ASKED, margin=0.0))
     for axis in (found.across, found.along):
         ends = axis.control.minimum, axis.control.maximum
         assert (axis.values[0], axis.values[-1]) == ends
@@ -89,7 +101,7 @@ def test_what_is_not_said_is_the_default(model):
 
 def test_nobody_is_surer_of_who_was_never_seen(model):
     """A performer who is known is nearer to his own clips."""
-    known, nobody = (grid(model, dataclasses.replace(ASKED, performer=p)) for p in ("tall", None))
+    known, nobody = (grid(model, structs.replace(ASKED, performer=p)) for p in ("tall", None))
     assert known.sigma.mean() < nobody.sigma.mean()
 
 
@@ -112,6 +124,6 @@ def test_nobody_is_surer_of_who_was_never_seen(model):
 )
 def test_a_grid_that_cannot_be_is_refused_by_field(change, field, words, model):
     with pytest.raises(InvalidField) as caught:
-        grid(model, dataclasses.replace(ASKED, **change))
+        grid(model, structs.replace(ASKED, **change))
     assert caught.value.field == field
     assert words in caught.value.message

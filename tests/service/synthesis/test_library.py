@@ -1,4 +1,4 @@
-"""The models of files and folders, by name and by name and content."""
+"""Tests of the model library: files and folders, by name and by hash."""
 
 import shutil
 

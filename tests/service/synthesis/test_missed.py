@@ -1,4 +1,4 @@
-"""What is said of goals that a motion does not meet."""
+"""Tests of the report of constraints that a motion does not satisfy."""
 
 import pytest
 
@@ -39,4 +39,4 @@ def test_the_first_miss_is_named(met, field):
 
 
 def test_what_is_met_is_not_refused():
-    missed.refuse(GOALS, [Met("speed", 0.0, "m/s", True), FINE])
+    assert missed.refuse(GOALS, [Met("speed", 0.0, "m/s", True), FINE]) is None

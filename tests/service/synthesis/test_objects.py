@@ -1,10 +1,11 @@
-"""Models in an object store: a real server that speaks S3, in a process of its own."""
+"""Tests of models in an S3 object store in a separate process."""
 
 import pytest
 import stores
+from model_files import numbered
 
 from service.motion.errors import ModelError
-from service.synthesis import library, session
+from service.synthesis import library, model_file
 from service.synthesis.library import Bounds
 from service.synthesis.objects import connect
 from service.synthesis.shelf import Shelf
@@ -24,9 +25,9 @@ def put(url, model_path):
     store, plain = connect(url), model_path.read_bytes()
 
     def at(name, number):
-        content = plain + b"\x32\x02" + b"%02d" % number
+        content = numbered(plain, number)
         store.put(name, content)
-        return session.digest(content)
+        return model_file.digest(content)
 
     return at
 

@@ -1,5 +1,6 @@
-"""The measured cost of a pose: of each level, and in an order that a ladder takes."""
+"""Tests of the measured cost of a pose: per level, and monotonic."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +32,7 @@ class Slow:
 def paced(opened, monkeypatch):
     """Session whose levels take given milliseconds a call by a clock of its own."""
     clock = [0.0]
-    monkeypatch.setattr(pace.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
 
     def build(*milliseconds):
         return replace(opened, runtimes=tuple(Slow(clock, m / 1e3) for m in milliseconds))

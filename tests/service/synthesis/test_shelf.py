@@ -1,15 +1,23 @@
-"""Models that follow their files: versions side by side, swapped whole, the old where new fail."""
+"""Tests of reload: versions side by side, atomic replacement, and the old version on errors."""
 
+import gc
 import os
+import resource
 import shutil
 import time
+import weakref
+from pathlib import Path
 
+import model_files
 import pytest
+from model_files import numbered
 
 from service.motion.errors import ModelError, UnknownModel
-from service.synthesis import session
+from service.synthesis import model_file
+from service.synthesis.intake import Intake
 from service.synthesis.library import Bounds
 from service.synthesis.shelf import SETTLING, Fixed, Shelf
+from service.synthesis.trial import Limits
 
 ROOM = Bounds()
 
@@ -18,8 +26,7 @@ ROOM = Bounds()
 def content(model_path):
     """Function that gives a model file of a number: each other bytes, and all the same answers."""
     plain = model_path.read_bytes()
-    # The field doc_string of the model, once more.
-    return lambda number: plain + b"\x32\x02" + b"%02d" % number
+    return lambda number: numbered(plain, number)
 
 
 @pytest.fixture
@@ -31,7 +38,7 @@ def put(content, tmp_path):
         path.parent.mkdir(parents=True, exist_ok=True)
         aside.write_bytes(content(number))
         aside.rename(path)
-        return session.digest(content(number))
+        return model_file.digest(content(number))
 
     return at
 
@@ -86,7 +93,7 @@ def test_a_file_is_read_only_when_two_looks_find_it_the_same(put, content, tmp_p
         assert not shelf.look()
         assert not shelf.reloads.faults
     assert shelf.look()
-    assert shelf.library.find("walk").session.digest == session.digest(whole)
+    assert shelf.library.find("walk").session.digest == model_file.digest(whole)
     assert shelf.reloads.failed == 0
 
 
@@ -157,12 +164,13 @@ def test_older_versions_are_bounded_by_memory_the_furthest_from_newest_first(put
 def test_what_is_held_no_longer_is_freed(put, tmp_path):
     put("walk.onnx", 1)
     shelf = Shelf([tmp_path], Bounds(older=0))
-    alive = shelf._intake._alive
-    assert len(alive) == 1
+    models = [weakref.ref(shelf.library.find("walk"))]
     for number in (2, 3, 4):
         put("walk.onnx", number)
         followed(shelf)
-    assert len(alive) == 1
+        models.append(weakref.ref(shelf.library.find("walk")))
+    gc.collect()
+    assert [model() is None for model in models] == [True, True, True, False]
 
 
 def test_a_version_that_had_no_room_is_opened_when_it_is_the_newest(put, tmp_path):
@@ -319,3 +327,109 @@ def test_fixed_models_are_a_library_that_stays(put, tmp_path):
     library = Shelf([tmp_path], ROOM).library
     assert Fixed(library).library is library
     assert Fixed(library).reloads.looks == 0
+
+
+# --- files that are meant to do harm --------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def hostile(content):
+    """Contents of files that cannot be served, and what is said of each."""
+    good = content(1)
+    return {
+        "slow": (model_files.slow(good), "takes more than 1 s of CPU time to open"),
+        "large": (model_files.large(good), "takes more than 512 MB of memory to open"),
+        "loop": (model_files.loop(good), "it has a field 7.1.5.6 of onnx.proto"),
+        "fill": (model_files.fill(good), "its graph has an operator 'ConstantOfShape'"),
+        "deep": (model_files.deep(good), "its card's entry 'diagnostics' is wrong: Expected `str`"),
+        "bytes": (b"half a mod", "does not end with its checksum"),
+    }
+
+
+def test_files_that_cannot_be_served_do_not_keep_others_from_being_taken(
+    put, hostile, tmp_path, caplog
+):
+    put("a.onnx", 1)
+    shelf = Shelf([tmp_path], ROOM, Limits(cpu=1))
+    for name, (own, _) in hostile.items():
+        (tmp_path / f"b_{name}.onnx").write_bytes(own)
+    # In the order of their names it is the last.
+    new = put("c.onnx", 2)
+    followed(shelf)
+    assert f"c@{new}" in identities(shelf)
+    found = {fault.name: fault.error.message for fault in shelf.reloads.faults}
+    assert found.keys() == {f"b_{name}" for name in hostile}
+    for name, (_, said) in hostile.items():
+        assert found[f"b_{name}"].startswith(said)
+        assert f"b_{name}.onnx: {said}" in caplog.text
+    assert shelf.reloads.failed == len(hostile)
+    # Nor at the looks that follow, and none of them is tried again.
+    before, start = len(caplog.records), time.process_time()
+    newer = put("c.onnx", 3)
+    followed(shelf)
+    assert f"c@{newer}" in identities(shelf)
+    assert (shelf.reloads.failed, len(caplog.records)) == (len(hostile), before)
+    assert len(shelf.reloads.faults) == len(hostile)
+    assert time.process_time() - start < 60
+
+
+def test_a_file_that_was_refused_is_tried_again_when_it_changes(put, hostile, tmp_path):
+    put("a.onnx", 1)
+    (tmp_path / "b.onnx").write_bytes(hostile["large"][0])
+    shelf = Shelf([tmp_path], ROOM)
+    assert [fault.name for fault in shelf.reloads.faults] == ["b"]
+    new = put("b.onnx", 2)
+    assert followed(shelf).find("b").identity == f"b@{new}"
+    assert not shelf.reloads.faults
+
+
+def test_a_fault_of_the_start_is_logged_at_the_next_look_and_then_no_more(put, tmp_path, caplog):
+    """A process that takes the place of another one starts with the models that are left."""
+    put("a.onnx", 1)
+    (tmp_path / "b.onnx").write_bytes(b"broken")
+    shelf = Shelf([tmp_path], ROOM)
+    assert not caplog.records
+    shelf.look()
+    shelf.look()
+    (record,) = caplog.records
+    assert "b.onnx: does not end with its checksum" in record.getMessage()
+
+
+def test_an_error_that_no_check_foresees_is_a_fault_too(put, tmp_path, caplog):
+    with (tmp_path / "a.onnx").open("wb") as file:
+        file.truncate(model_file.MOST_BYTES)
+    good = put("b.onnx", 1)
+    intake = Intake([tmp_path], most=1)
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    # There is room for one file, and not for the other.
+    resource.setrlimit(resource.RLIMIT_AS, (used + model_file.MOST_BYTES // 2, before[1]))
+    try:
+        for _ in range(3):
+            intake.look()
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+    (fault,) = intake.faults.values()
+    assert fault.error.message == "cannot be used: MemoryError: MemoryError"
+    assert [m.identity for models in intake.versions().values() for m in models] == [f"b@{good}"]
+    # With its traceback, and once.
+    assert [record.exc_info[0] for record in caplog.records] == [MemoryError]
+    assert intake.failed == 1
+
+
+def test_a_machine_without_a_process_to_spare_tries_again(put, tmp_path):
+    put("a.onnx", 1)
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    intake = Intake([tmp_path], most=1)
+    with Path(os.devnull).open(), Path(os.devnull).open() as second:
+        limit = second.fileno()
+    # One descriptor is left to list and read files by, and not two for a pair of sockets.
+    resource.setrlimit(resource.RLIMIT_NOFILE, (limit, before[1]))
+    try:
+        intake.look()
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    (fault,) = intake.faults.values()
+    assert fault.error.message == "no process to try it in: Too many open files"
+    intake.look()
+    assert not intake.faults and intake.opened == 1

@@ -1,12 +1,13 @@
-"""Which clips to capture next: points that can be asked for, ranked, and what is lacking there."""
+"""Tests of suggested captures: valid ranked points, with their nearest clip."""
 
 import numpy as np
 import pytest
 
 from service.encode import suggestions
 from service.motion.errors import InvalidField
+from service.question.model_question import SuggestQuestion
 from service.synthesis import library
-from service.synthesis.suggest import DRAWN, SuggestQuestion, suggest
+from service.synthesis.suggest import DRAWN, suggest
 
 
 @pytest.fixture(scope="module")
@@ -15,19 +16,19 @@ def model(labelled_path):
 
 
 def test_points_lie_in_the_box_and_the_first_is_worth_most(model):
-    found = suggest(model, SuggestQuestion(20))
+    found = suggest(model, SuggestQuestion(count=20))
     assert (found.model, found.candidates, len(found.suggestions)) == (model.identity, DRAWN, 20)
     for control in model.session.card.controls:
         values = [each.controls[control.name] for each in found.suggestions]
         assert control.minimum <= min(values) < max(values) <= control.maximum
     assert found.suggestions[0].gain > found.suggestions[-1].gain > 0.0
-    assert found == suggest(model, SuggestQuestion(20))
+    assert found == suggest(model, SuggestQuestion(count=20))
 
 
 def test_the_nearest_clip_and_what_it_lacks_are_named(model):
     card = model.session.card
     width = np.array([c.maximum - c.minimum for c in card.controls])
-    for each in suggest(model, SuggestQuestion(5)).suggestions:
+    for each in suggest(model, SuggestQuestion(count=5)).suggestions:
         gaps = np.abs(np.array(card.examples) - list(each.controls.values())) / width
         nearest = int(np.argmin(np.linalg.norm(gaps, axis=1)))
         assert each.nearest == card.sources[nearest]
@@ -41,7 +42,7 @@ def test_candidates_that_are_given_are_ranked_and_no_others(model):
     given = [dict(zip(names, map(float, example), strict=True)) for example in card.examples[:5]]
     # In the middle of the box, where nobody half sits.
     given.append({c.name: 0.5 * (c.minimum + c.maximum) for c in card.controls})
-    found = suggest(model, SuggestQuestion(6, None, given))
+    found = suggest(model, SuggestQuestion(count=6), given)
     assert found.candidates == 6
     assert {tuple(each.controls.values()) for each in found.suggestions} == {
         tuple(each.values()) for each in given
@@ -50,7 +51,9 @@ def test_candidates_that_are_given_are_ranked_and_no_others(model):
 
 
 def test_of_a_performer_little_was_captured(model):
-    everybody, tall = (suggest(model, SuggestQuestion(1, who)) for who in (None, "tall"))
+    everybody, tall = (
+        suggest(model, SuggestQuestion(count=1, performer=who)) for who in (None, "tall")
+    )
     assert tall.performer == "tall"
     assert tall.suggestions[0].variance > everybody.suggestions[0].variance
     card = model.session.card
@@ -62,11 +65,9 @@ def test_of_a_performer_little_was_captured(model):
 @pytest.mark.parametrize(
     ("asked", "field"),
     [
-        (lambda: SuggestQuestion(0), "count"),
-        (lambda: SuggestQuestion(5, None, ()), "candidates"),
-        (lambda: SuggestQuestion(201), "count"),
-        (lambda: SuggestQuestion(1, "somebody"), "performer"),
-        (lambda: SuggestQuestion(1, None, [{"turn": 1.0}]), "candidates/0/controls/stature"),
+        (lambda: SuggestQuestion(count=0), "count"),
+        (lambda: SuggestQuestion(count=201), "count"),
+        (lambda: SuggestQuestion(count=1, performer="somebody"), "performer"),
     ],
 )
 def test_what_cannot_be_ranked_is_named(model, asked, field):
@@ -76,8 +77,18 @@ def test_what_cannot_be_ranked_is_named(model, asked, field):
 
 
 def test_they_are_said_in_a_line_each(model):
-    found = suggest(model, SuggestQuestion(3))
+    found = suggest(model, SuggestQuestion(count=3))
     heading, *lines = suggestions.text(found).splitlines()
     assert heading.split()[:2] == ["gain", "variance"] and len(lines) == 3
     assert lines[0].startswith(f"{100 * found.suggestions[0].gain:.1f} %")
     assert suggestions.plain(found)["suggestions"][0]["lacking"] in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("candidates", "field"),
+    [([], "candidates"), ([{"turn": 1.0}], "candidates/0/controls/stature")],
+)
+def test_candidates_that_cannot_be_ranked_are_named(model, candidates, field):
+    with pytest.raises(InvalidField) as caught:
+        suggest(model, SuggestQuestion(count=1), candidates)
+    assert caught.value.field == field

@@ -1,13 +1,14 @@
-"""Questions asked together get the bytes that each gets alone, at every level of every model."""
+"""Tests of batches: equal bytes as single evaluation, at every level of every model."""
 
 import numpy as np
 import onnx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_files import written
 
+from service.question.motion_question import PoseQuestion
 from service.synthesis import poses, session
-from service.synthesis.question import PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 
 KINDS = ("model_path", "labelled_path", "walk_path")
@@ -27,7 +28,10 @@ def question(model, place, level):
     names = (None, *card.performers)
     time *= card.durations[0]
     return poses.moments(
-        model, PoseQuestion(controls, [time], performer=names[who % len(names)], level=level)
+        model,
+        PoseQuestion(
+            controls=controls, times=[time], performer=names[who % len(names)], level=level
+        ),
     )
 
 
@@ -60,7 +64,7 @@ def test_a_graph_that_sums_by_place_is_found_out(model_path, tmp_path):
         node.op_type = "ReduceSum"
         node.input[1] = "last_axis"
     path = tmp_path / "reaching.onnx"
-    onnx.save(graph, path)
+    path.write_bytes(written(graph))
     model = Synthesizer("reaching", session.load(path))
     assert len(columns) == 1
     assert not poses.exact(model, 0)

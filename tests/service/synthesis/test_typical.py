@@ -1,16 +1,18 @@
-"""What is left out of a question is the most typical for what is in it."""
+"""Tests of the conditional mean of controls that a question omits."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from service.motion.errors import InvalidField
+from service.question.model_question import WhyQuestion
+from service.question.motion_question import ClipQuestion, PoseQuestion
 from service.synthesis import clips, poses, session, typical
-from service.synthesis.question import ClipQuestion, PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.synthesis.typical import Chooser, fit
-from service.synthesis.why import WhyQuestion, why
+from service.synthesis.why import why
 
 # A solve of numbers near one.
 ROUNDING = 1e-9
@@ -119,14 +121,14 @@ def test_a_performer_who_is_named_is_typical_of_himself(card):
 def left_out(model, asked):
     """A question's answer, and that of the whole question with what was chosen."""
     part = clips.clip(model, asked)
-    whole = clips.clip(model, replace(asked, controls=part.trust.controls))
+    whole = clips.clip(model, structs.replace(asked, controls=part.trust.controls))
     return part, whole
 
 
 @pytest.mark.parametrize("given", [{}, {"turn": 20.0}, {"turn": 20.0, "stature": 1.7}])
 @pytest.mark.parametrize("performer", [None, "tall"])
 def test_the_answer_is_that_of_the_whole_question(model, given, performer):
-    asked = ClipQuestion(given, performer=performer)
+    asked = ClipQuestion(controls=given, performer=performer)
     part, whole = left_out(model, asked)
     names = [control.name for control in model.session.card.controls]
     assert part.trust.inferred == tuple(name for name in names if name not in given)
@@ -134,42 +136,48 @@ def test_the_answer_is_that_of_the_whole_question(model, given, performer):
     assert replace(part.trust, inferred=()) == whole.trust
     for field in ("rotations", "translations"):
         assert getattr(part.clip, field).tobytes() == getattr(whole.clip, field).tobytes()
-    other = clips.clip(model, replace(asked, controls={**part.trust.controls, "turn": -20.0}))
+    turned = structs.replace(asked, controls={**part.trust.controls, "turn": -20.0})
+    other = clips.clip(model, turned)
     assert other.clip.rotations.tobytes() != whole.clip.rotations.tobytes(), "negative control"
 
 
 def test_poses_and_reasons_choose_alike(model):
     given = {"target_height": 1.2}
-    clip = clips.clip(model, ClipQuestion(given)).trust
-    pose = poses.pose(model, PoseQuestion(given, [0.1])).trust
-    reasons = why(model, WhyQuestion(given, "warn"))
+    clip = clips.clip(model, ClipQuestion(controls=given)).trust
+    pose = poses.pose(model, PoseQuestion(controls=given, times=[0.1])).trust
+    reasons = why(model, WhyQuestion(controls=given, extrapolate="warn"))
     assert clip.controls == pose.controls == reasons.controls
     assert clip.inferred == pose.inferred == reasons.inferred
     assert clip.inferred == ("stature", "hip_height", "turn")
-    whole = why(model, WhyQuestion(clip.controls, "warn"))
+    whole = why(model, WhyQuestion(controls=clip.controls, extrapolate="warn"))
     assert replace(reasons, inferred=()) == whole
 
 
 def test_another_process_would_choose_the_same(model, labelled_path):
     again = Synthesizer("labelled", session.load(labelled_path))
     given = {"turn": -3.0}
-    asked = PoseQuestion(given, [0.0])
+    asked = PoseQuestion(controls=given, times=[0.0])
     assert poses.pose(again, asked).trust == poses.pose(model, asked).trust
 
 
 def test_only_what_is_given_is_warned_of(model, card):
     high = card.control("target_height").maximum + 0.2
-    trust = poses.pose(model, PoseQuestion({"target_height": high}, [0.0])).trust
+    trust = poses.pose(model, PoseQuestion(controls={"target_height": high}, times=[0.0])).trust
     assert len(trust.warnings) == 1 and trust.warnings[0].startswith("target_height")
     # All that was given is sampled: nothing that was chosen makes it refused.
     for turn in (card.control("turn").minimum, card.control("turn").maximum):
-        assert poses.pose(model, PoseQuestion({"turn": turn}, [0.0], "refuse")).trust.warnings == ()
+        assert (
+            poses.pose(
+                model, PoseQuestion(controls={"turn": turn}, times=[0.0], extrapolate="refuse")
+            ).trust.warnings
+            == ()
+        )
 
 
 def test_what_is_unknown_or_no_number_is_refused_all_the_same(model):
     with pytest.raises(InvalidField, match="no such control; this model has stature"):
-        poses.pose(model, PoseQuestion({"speed": 1.0}, [0.0]))
+        poses.pose(model, PoseQuestion(controls={"speed": 1.0}, times=[0.0]))
     with pytest.raises(InvalidField, match="nan, expected a finite number"):
-        poses.pose(model, PoseQuestion({"turn": float("nan")}, [0.0]))
+        poses.pose(model, PoseQuestion(controls={"turn": float("nan")}, times=[0.0]))
     with pytest.raises(InvalidField, match="expected one of middle, short, tall"):
-        poses.pose(model, PoseQuestion({}, [0.0], performer="eve"))
+        poses.pose(model, PoseQuestion(controls={}, times=[0.0], performer="eve"))

@@ -1,4 +1,4 @@
-"""Levels by what is seen: the vectorised choice is the one that a loop over characters makes."""
+"""Tests of levels by view: the vectorised choice equals a loop over characters."""
 
 import math
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Crowds of walkers: the same from the same seed, in their own frames, made some at a time."""
+"""Tests of walking crowds: reproducible from a seed, generated in batches."""
 
 import re
 
@@ -70,13 +70,27 @@ def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
 
 
 def test_motions_are_made_some_at_a_time(own):
-    crowd, motions = made(own, company.TOGETHER + 3, seconds=0.1)
-    assert [len(some) for some in motions] == [company.TOGETHER, 3]
+    together = company.TOGETHER // 4
+    crowd, motions = made(own, together + 3, seconds=0.1)
+    assert [len(some) for some in motions] == [together, 3]
     assert not crowd.shared
     assert crowd.frames == 4
     assert motions[0].rotations.dtype == np.float32
     assert motions[1].levels.shape == (3, 4)
     assert np.linalg.norm(motions[0].rotations, axis=-1) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
+    seconds = (company.POSED + 500) / RATE
+    _, motions = made(own, 1, seed=0, seconds=seconds)
+    plan = company.wandering(own, 1, seconds, RATE, 0)
+    frames = np.arange(company.POSED - 2, company.POSED + 3)
+    near = march.pose(own.session, plan, np.zeros_like(frames), frames)
+    assert len(motions) == 1
+    found = motions[0].rotations[0, frames, 1:]
+    assert np.abs(found - near.rotations[:, 1:]).max() < 1e-6
+    # Another frame's pose is another.
+    assert np.abs(found[:-1] - near.rotations[1:, 1:]).max() > 1e-4
 
 
 def test_phases_and_walkers_differ(own):

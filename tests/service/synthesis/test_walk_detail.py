@@ -1,4 +1,4 @@
-"""Levels of walkers over time: nobody is coarser than may be seen, flickers or pops."""
+"""Tests of walkers' levels over time: error limits, and no flicker or popping."""
 
 import numpy as np
 import pytest

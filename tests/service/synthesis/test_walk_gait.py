@@ -1,4 +1,4 @@
-"""What a model can walk is asked of the model, and what is wanted of it is done."""
+"""Tests of gaits: the model's range of speed and turning, and control by these."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def test_what_speed_and_turning_leave_open_is_typical(rng):
     line = np.array([[0.5], [0.6], [0.0]])
     loose = np.column_stack([np.ones(40), rates]) @ line
     who = np.repeat([0, 1], 20)
-    manners = gait._manners(loose - loose + np.where(who[:, None], 0.1, -0.1), who, 3)
+    manners = gait.mean_residuals(loose - loose + np.where(who[:, None], 0.1, -0.1), who, 3)
     # As one clip more at the usual would have it: 20 of 21.
     assert manners[:, 0] == pytest.approx([-0.1 * 20 / 21, 0.1 * 20 / 21, 0.0, 0.0])
 

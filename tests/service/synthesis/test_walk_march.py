@@ -1,4 +1,4 @@
-"""Walkers over time: what the model makes of controls, without a jump, on their ways."""
+"""Tests of walkers over time: continuous motion, along their paths."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The floor as the complex plane: arcs are the exponential map of rigid motion."""
+"""Tests of the floor as the complex plane: arcs are the exponential map of rigid motion."""
 
 import numpy as np
 import pytest

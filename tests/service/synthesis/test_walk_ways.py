@@ -1,4 +1,4 @@
-"""Ways over the floor: through waypoints, or each character's own from a seed."""
+"""Tests of paths over the floor: through waypoints, or random from a seed."""
 
 import re
 

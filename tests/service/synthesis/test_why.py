@@ -1,18 +1,17 @@
-"""The weights that are told are those that made the answer."""
+"""Tests of `why`: the reported weights reproduce the answer."""
 
 from dataclasses import replace
 
 import numpy as np
-import onnx
 import pytest
+from msgspec import structs
 
 from service.motion.answer import Reasons
 from service.motion.errors import InvalidField, OutsideSamples
 from service.motion.field import Weigher
-from service.synthesis import library, poses, session
-from service.synthesis.question import PoseQuestion
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.why import WhyQuestion, why
+from service.question.model_question import WhyQuestion
+from service.synthesis import library, session
+from service.synthesis.why import why
 
 EVERYTHING = 10_000
 
@@ -33,7 +32,7 @@ def drawn(card, rng, count=20):
 
 def asked(card, point, performer=None, nearest=EVERYTHING):
     controls = {c.name: float(v) for c, v in zip(card.controls, point, strict=True)}
-    return WhyQuestion(controls, "warn", performer, nearest)
+    return WhyQuestion(controls=controls, extrapolate="warn", performer=performer, nearest=nearest)
 
 
 def in_the_card_s_order(card, found: Reasons):
@@ -127,32 +126,14 @@ def test_what_cannot_be_answered_is_refused(case):
     card = model.session.card
     question = asked(card, card.examples[0])
     outside = {**question.controls, "turn": 1e3}
-    assert len(why(model, replace(question, controls=outside)).warnings) == 1
+    assert len(why(model, structs.replace(question, controls=outside)).warnings) == 1
     with pytest.raises(OutsideSamples, match="turn = 1000"):
-        why(model, replace(question, controls=outside, extrapolate="refuse"))
+        why(model, structs.replace(question, controls=outside, extrapolate="refuse"))
     for change, field in (
         ({"nearest": 0}, "nearest"),
         ({"performer": "nobody"}, "performer"),
         ({"controls": {**question.controls, "spin": 1.0}}, "controls/spin"),
     ):
         with pytest.raises(InvalidField) as caught:
-            why(model, replace(question, **change))
+            why(model, structs.replace(question, **change))
         assert caught.value.field == field
-
-
-def test_a_model_older_than_sources_still_loads_and_says_that_it_cannot_say(model_path):
-    graph = onnx.load(model_path)
-    kept = [p for p in graph.metadata_props if p.key not in ("posefield.sources", KRIGING)]
-    assert len(kept) == len(graph.metadata_props) - 2
-    del graph.metadata_props[:]
-    graph.metadata_props.extend(kept)
-    old = Synthesizer("old", session.open_bytes(graph.SerializeToString(), "old"))
-    point = [c.default for c in old.session.card.controls]
-    controls = asked(old.session.card, point).controls
-    assert poses.pose(old, PoseQuestion(controls, [0.0])).trust.sigma > 0.0
-    with pytest.raises(InvalidField, match="train it again") as caught:
-        why(old, asked(old.session.card, point))
-    assert caught.value.field == "model"
-
-
-KRIGING = "posefield.kriging"

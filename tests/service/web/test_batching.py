@@ -1,13 +1,14 @@
-"""Questions that arrive together are answered by one call, and as each would be alone."""
+"""Tests of batched pose requests: one inference call, with the bytes of single ones."""
 
 import asyncio
 
 import numpy as np
 import pytest
+import recorded
 
 from service.motion.errors import InvalidField
+from service.question.motion_question import PoseQuestion
 from service.synthesis import poses, session
-from service.synthesis.question import PoseQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web.batching import MOST, Batcher
 
@@ -19,22 +20,26 @@ def model(walk_path):
     return Synthesizer("walk", session.load(walk_path))
 
 
-@pytest.fixture
-def calls(model, monkeypatch):
-    """How many questions each call of the graph answered."""
-    made, rows = [], poses.rows
+def counted(model, check=lambda feed: None):
+    """A model like it whose levels are known to be exact, and the feeds of its graph's calls.
 
-    def counted(model, asked):
-        made.append(len(asked))
-        return rows(model, asked)
+    A question that is asked alone fills two rows of a feed.
+    """
+    session, feeds = recorded.session(model.session, check)
+    own = Synthesizer(model.name, session)
+    for level in range(len(session.card.levels)):
+        assert poses.exact(own, level)
+    feeds.clear()
+    return own, feeds
 
-    monkeypatch.setattr(poses, "rows", counted)
-    return made
+
+def rows(feeds):
+    return [len(feed["controls"]) for feed in feeds]
 
 
 def question(model, haste, time=0.1, level=0):
     controls = {c.name: c.default for c in model.session.card.controls} | {"haste": haste}
-    return poses.moments(model, PoseQuestion(controls, [time], level=level))
+    return poses.moments(model, PoseQuestion(controls=controls, times=[time], level=level))
 
 
 def together(model, asked, rounds=1):
@@ -51,12 +56,12 @@ def together(model, asked, rounds=1):
     return asyncio.run(ask())
 
 
-def test_one_call_answers_all_of_a_turn(model, calls):
-    asked = [question(model, haste) for haste in HASTE]
-    poses.exact(model, 0)
-    calls.clear()
-    together(model, asked)
-    assert calls == [1, 1, MOST, MOST, 7]
+def test_one_call_answers_all_of_a_turn(model):
+    own, feeds = counted(model)
+    asked = [question(own, haste) for haste in HASTE]
+    feeds.clear()
+    together(own, asked)
+    assert rows(feeds) == [2, 2, MOST, MOST, 7]
 
 
 def test_each_gets_the_bytes_that_it_gets_alone(model):
@@ -66,13 +71,13 @@ def test_each_gets_the_bytes_that_it_gets_alone(model):
         assert all(np.array_equal(a, b) for a, b in zip(row, own, strict=True))
 
 
-def test_levels_are_not_mixed(model, calls):
-    levels = range(len(model.session.card.levels))
-    asked = [question(model, 4.0, level=level) for level in levels for _ in range(3)]
-    [poses.exact(model, level) for level in levels]
-    calls.clear()
-    together(model, asked)
-    assert calls[2:] == [3] * len(levels)
+def test_levels_are_not_mixed(model):
+    own, feeds = counted(model)
+    levels = range(len(own.session.card.levels))
+    asked = [question(own, 4.0, level=level) for level in levels for _ in range(3)]
+    feeds.clear()
+    together(own, asked)
+    assert rows(feeds)[2:] == [3] * len(levels)
 
 
 def test_whoever_asks_alone_is_answered_at_once(model):
@@ -97,17 +102,14 @@ def test_one_that_has_no_answer_harms_no_other(model):
         np.testing.assert_array_equal(poses.posed(model, each, row).rotations, row[0])
 
 
-def test_a_fault_of_the_graph_reaches_everybody(model, monkeypatch):
-    def broken(model, asked):
-        if len(asked) > 1:
+def test_a_fault_of_the_graph_reaches_everybody(model):
+    def refuse_three(feed):
+        if len(feed["controls"]) == 3:
             raise RuntimeError("broken")
-        return original(model, asked)
 
-    original = poses.rows
-    poses.exact(model, 0)
-    monkeypatch.setattr(poses, "rows", broken)
+    own, _ = counted(model, refuse_three)
     with pytest.raises(RuntimeError, match="broken"):
-        together(model, [question(model, 4.0)] * 3)
+        together(own, [question(own, 4.0)] * 3)
 
 
 def test_a_client_that_went_away_is_passed_over(model):
@@ -126,7 +128,10 @@ def test_a_client_that_went_away_is_passed_over(model):
     assert all(np.array_equal(a, b) for a, b in zip(first, last, strict=True))
 
 
-def test_a_model_that_sums_by_place_is_asked_one_by_one(model, calls, monkeypatch):
-    monkeypatch.setattr(poses, "exact", lambda model, level: False)
-    together(model, [question(model, 4.0)] * 5)
-    assert set(calls) == {1}
+def test_a_model_that_sums_by_place_is_asked_one_by_one(model):
+    own, feeds = counted(model)
+    own.exact_levels[0] = False
+    asked = [question(own, 4.0)] * 5
+    feeds.clear()
+    together(own, asked)
+    assert set(rows(feeds)) == {2}

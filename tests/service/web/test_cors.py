@@ -1,4 +1,4 @@
-"""Pages of other origins: who may read answers, and what their browsers are told."""
+"""Tests of CORS: allowed origins and headers."""
 
 import re
 

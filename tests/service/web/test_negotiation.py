@@ -1,4 +1,4 @@
-"""Which format a header Accept prefers, RFC 9110, 12.5.1."""
+"""Tests of content negotiation by Accept (RFC 9110, 12.5.1)."""
 
 import pytest
 from hypothesis import given

@@ -1,11 +1,11 @@
-"""Every error of the domain that a client can cause has a status, and no two kinds one name."""
+"""Tests of problem kinds: every client error has a status, and names are unique."""
 
 import json
 
 import pytest
 from starlette.requests import Request
 
-from service.motion.errors import InvalidField, QueryError
+from service.motion.errors import FormError, InvalidField, QueryError
 from service.web import problems
 
 
@@ -14,7 +14,8 @@ def descendants(error):
 
 
 def test_every_query_error_is_in_the_table():
-    assert set(problems.TABLE) == descendants(QueryError) - {QueryError}
+    # A FormError is a bad parameter or a bad body.
+    assert {*problems.TABLE, FormError} == descendants(QueryError) - {QueryError}
 
 
 def test_every_kind_is_a_client_error_but_one():

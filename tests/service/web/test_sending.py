@@ -1,4 +1,4 @@
-"""Pieces of an answer are gathered until they are worth sending, and none is empty."""
+"""Tests of streamed pieces: minimum size, and none is empty."""
 
 import pytest
 

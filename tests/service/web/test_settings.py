@@ -1,4 +1,4 @@
-"""Settings come from the environment, whole or not at all."""
+"""Tests of settings from the environment: valid values, and errors."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -24,8 +24,6 @@ def test_each_setting_has_a_variable():
         "POSEFIELD_CLIPS_BODY_LIMIT": "40",
         "POSEFIELD_CLIPS_LIMIT": "3",
         "POSEFIELD_CLIPS_POSES": "50",
-        "POSEFIELD_INFERENCE_BODY_LIMIT": "60",
-        "POSEFIELD_INFERENCE_POSES": "7",
         "POSEFIELD_GRACE": "0",
         "POSEFIELD_OPEN": "1",
         "POSEFIELD_KEYS_FILE": "keys",
@@ -41,8 +39,7 @@ def test_each_setting_has_a_variable():
     ends = {"grace": 0, "drain": 5, "workers": 4}
     follows = {"reload": 0, "versions": 7, "versions_memory": 1000}
     access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
-    tensors = {"inference_body_limit": 60, "inference_poses": 7}
-    others = {**crowds, **clips, **tensors, **ends, **follows, **access}
+    others = {**crowds, **clips, **ends, **follows, **access}
     expected = Settings("::1", 9000, body_limit=10, **others)
     assert settings.read(environ=given) == expected
 

@@ -1,14 +1,17 @@
-"""Files that are wanted at once are written together, and as each would be alone."""
+"""Tests of batched encodings: files equal to those of single encodings."""
 
 import asyncio
+import gc
+import weakref
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from service.encode import ENCODERS
 from service.encode.convention import CENTIMETRES, METRES
+from service.question.motion_question import ClipQuestion
 from service.synthesis import clips, session
-from service.synthesis.question import ClipQuestion
 from service.synthesis.synthesizer import Synthesizer
 from service.web import writing
 from service.web.writing import Desk
@@ -21,7 +24,7 @@ def answers(walk_path):
     model = Synthesizer("walk", session.load(walk_path))
     controls = {c.name: c.default for c in model.session.card.controls}
     questions = (controls | {"haste": 3.0 + 0.1 * number} for number in range(40))
-    return [clips.clip(model, ClipQuestion(question)) for question in questions]
+    return [clips.clip(model, ClipQuestion(controls=question)) for question in questions]
 
 
 @pytest.fixture
@@ -39,9 +42,19 @@ def calls():
 def written(encoder, wanted):
     async def ask():
         desk = Desk()
-        files = await asyncio.gather(*(desk.file(encoder, c, a) for c, a in wanted))
+        own = [(convention, replace(answer)) for convention, answer in wanted]
+        held = [weakref.ref(answer) for _, answer in own]
+        files = await asyncio.gather(*(desk.file(encoder, c, a) for c, a in own))
+        del own
         await asyncio.sleep(0)
-        assert not desk._waiting and not desk._tasks
+        gc.collect()
+        # A thread lets its arguments go a moment after it has told its result.
+        for _ in range(1000):
+            if any(answer() for answer in held):
+                await asyncio.sleep(0.01)
+        # The desk holds no answer and no task any more.
+        assert not any(answer() for answer in held)
+        assert asyncio.all_tasks() == {asyncio.current_task()}
         return files
 
     return asyncio.run(ask())
@@ -61,10 +74,13 @@ def test_conventions_are_not_mixed(calls, answers):
     assert files == [USDC.encode(answers[0], c) for c in (METRES, CENTIMETRES)]
 
 
-def test_a_long_clip_keeps_nobody_waiting(calls, answers, monkeypatch):
+def test_a_long_clip_keeps_nobody_waiting(calls, answers):
     encoder, made = calls
-    monkeypatch.setattr(writing, "LONG", len(answers[0].clip) - 1)
-    written(encoder, [(METRES, answers[0])] * 3)
+    clip = answers[0].clip
+    times = -(-writing.LONG // len(clip)) + 1
+    turns, moves = (np.tile(a, (times, 1, 1)) for a in (clip.rotations, clip.translations))
+    long = replace(answers[0], clip=replace(clip, rotations=turns, translations=moves))
+    written(encoder, [(METRES, long)] * 3)
     assert made == [1, 1, 1]
 
 

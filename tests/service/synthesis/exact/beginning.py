@@ -1,4 +1,4 @@
-"""A motion as a model predicts it, with what corrects it."""
+"""A predicted motion, and the constraint solver for it."""
 
 from dataclasses import dataclass
 

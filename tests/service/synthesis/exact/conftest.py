@@ -1,4 +1,4 @@
-"""Motions that can be corrected: a reach and a walk, as the model predicts them."""
+"""Fixtures of predicted motions for corrections: a reach and a walk."""
 
 import pytest
 from beginning import Begun, begin

@@ -1,4 +1,4 @@
-"""What counts as out of reach, and how much of the way there is gone."""
+"""Tests of reachability: its limit, and the partial correction beyond it."""
 
 import numpy as np
 import pytest

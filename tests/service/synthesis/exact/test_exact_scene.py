@@ -1,4 +1,4 @@
-"""What is seen of a reduced motion is what its poses show, and gradients are derivatives."""
+"""Tests of reduced motions: values equal to those of poses, and gradients."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a file lets be known of how captured motions stray is what training had."""
+"""Tests of the residual covariance: from the model file, equal to that of training."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from model_export import export, train
-from service.motion import field
+from service.motion import cross_validation
 from service.synthesis import freeze, session
 from service.synthesis.exact import holding, spread
 
@@ -14,7 +14,7 @@ from service.synthesis.exact import holding, spread
 def strays(trained) -> np.ndarray:
     """What training's leave-one-out misses of each clip's coefficients (n, r3), standardised."""
     pose, laid, model = trained.pose, trained.laid, trained.model
-    left_out = field.leave_out(pose.hyper, laid.points, laid.groups)
+    left_out = cross_validation.leave_out(pose.hyper, laid.points, laid.groups)
     sigmas = np.sqrt(model.bank.sill * pose.variances * len(laid.points))
     return left_out @ model.decoder.reduced.bases[2] / sigmas[:, None]
 
@@ -34,7 +34,7 @@ def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_ex
     opened = session.open_bytes(labelled_exported.content, "labelled.onnx")
     weights = freeze.weights(opened.content)
     samples = opened.weigher.samples
-    found = spread._coefficients(opened.card, weights, samples)
+    found = spread.coefficients(opened.card, weights, samples)
     bases = labelled.model.decoder.reduced.bases[2]
     order = spread.order_of(opened.card, weights, samples)
     assert np.abs(found - bases).max() < 1e-5

@@ -1,4 +1,4 @@
-"""What a question can be held to: what is refused, and what a query means."""
+"""Tests of the constraints of questions: defaults and errors."""
 
 import math
 from dataclasses import replace
@@ -8,10 +8,10 @@ import pytest
 from service.motion.card import Event
 from service.motion.errors import InvalidField
 from service.motion.measure import Measure
+from service.question.motion_question import MotionQuestion, Target
 from service.synthesis import session
 from service.synthesis.door import Door
 from service.synthesis.exact import goals
-from service.synthesis.question import Hold, Target
 
 PLACE = (0.3, 1.2, 0.4)
 
@@ -32,7 +32,7 @@ def question(card, **changed):
 
 
 def found(card, *targets, exact="auto"):
-    return goals.of(card, question(card), Hold(exact, targets), correctable=True)
+    return goals.of(card, question(card), MotionQuestion(controls={}, exact=exact, targets=targets))
 
 
 def test_auto_holds_to_what_is_measured_on_the_motion(card):
@@ -43,7 +43,7 @@ def test_auto_holds_to_what_is_measured_on_the_motion(card):
 
 def test_auto_does_not_hold_to_what_nobody_gave(card):
     inferred = question(card, inferred=("target_height",))
-    assert not goals.of(card, inferred, Hold(), correctable=True)
+    assert not goals.of(card, inferred, MotionQuestion(controls={}))
 
 
 @pytest.mark.parametrize(
@@ -63,19 +63,31 @@ def test_a_control_that_cannot_be_exact_is_named(card, exact, said):
 def test_a_control_that_was_not_given_cannot_be_exact(card):
     inferred = question(card, inferred=("target_height",))
     with pytest.raises(InvalidField, match="was not given"):
-        goals.of(card, inferred, Hold(("target_height",)), correctable=True)
+        goals.of(card, inferred, MotionQuestion(controls={}, exact=("target_height",)))
 
 
 @pytest.mark.parametrize(
     ("target", "field", "said"),
     [
-        (Target("Tail", PLACE, "end"), "targets/0/joint", "'Tail', expected one of Hips"),
-        (Target("LeftHand", (0.0, math.nan, 1.0), "end"), "targets/0/position/1", "nan, expected"),
-        (Target("LeftHand", (0.0, math.inf, 1.0), "end"), "targets/0/position/1", "inf, expected"),
-        (Target("LeftHand", (0.0, 1.0, 1e4), "end"), "targets/0/position/2", "-100 to 100 m"),
-        (Target("LeftHand", (0.0, 1.0), "end"), "targets/0/position", "2 numbers, expected three"),
+        (Target("Tail", PLACE, at="end"), "targets/0/joint", "'Tail', expected one of Hips"),
+        (
+            Target("LeftHand", (0.0, math.nan, 1.0), at="end"),
+            "targets/0/position/1",
+            "nan, expected",
+        ),
+        (
+            Target("LeftHand", (0.0, math.inf, 1.0), at="end"),
+            "targets/0/position/1",
+            "inf, expected",
+        ),
+        (Target("LeftHand", (0.0, 1.0, 1e4), at="end"), "targets/0/position/2", "-100 to 100 m"),
+        (
+            Target("LeftHand", (0.0, 1.0), at="end"),
+            "targets/0/position",
+            "2 numbers, expected three",
+        ),
         (Target("LeftHand", PLACE, -0.1), "targets/0/time", "-0.1 s, expected 0 to"),
-        (Target("LeftHand", PLACE, 1e9), "targets/0/time", "1e.09 s, expected 0 to"),
+        (Target("LeftHand", PLACE, time=1e9), "targets/0/time", "1e.09 s, expected 0 to"),
         (Target("LeftHand", PLACE, math.nan), "targets/0/time", "nan, expected"),
     ],
 )
@@ -102,29 +114,22 @@ def test_more_targets_than_anybody_has_joints_for_are_refused(card):
 
 
 def test_a_target_counts_before_the_control_of_the_same_joint(card):
-    held = found(card, Target("RightHand", PLACE, "end"))
+    held = found(card, Target("RightHand", PLACE, at="end"))
     assert held.controls == () and len(held.targets) == 1
-    assert len(found(card, Target("RightHand", PLACE, "start")).controls) == 1
+    assert len(found(card, Target("RightHand", PLACE, at="start")).controls) == 1
     with pytest.raises(InvalidField, match="for whose joint there is a target"):
-        found(card, Target("RightHand", PLACE, "end"), exact=("target_height",))
+        found(card, Target("RightHand", PLACE, at="end"), exact=("target_height",))
 
 
 def test_the_event_is_the_cards_own(card):
     middle = replace(card, event=Event(card.skeleton.names.index("RightHand"), 0.4))
-    asked = Target("LeftHand", PLACE, "event")
+    asked = Target("LeftHand", PLACE, at="event")
     assert found(middle, asked).targets[0].moment.share == 0.4
     ends = replace(card, event=Event(0, 1.0))
     assert found(ends, asked).targets[0].moment.at == "end"
     with pytest.raises(InvalidField, match="names none") as fault:
         found(replace(card, event=None), asked)
     assert fault.value.field == "targets/0/at"
-
-
-def test_an_old_file_is_held_to_nothing(card):
-    assert not goals.of(card, question(card), Hold(), correctable=False)
-    for hold in (Hold(("target_height",)), Hold(targets=(Target("LeftHand", PLACE, "end"),))):
-        with pytest.raises(InvalidField, match="older than exact controls"):
-            goals.of(card, question(card), hold, correctable=False)
 
 
 def test_a_target_at_a_time_leaves_a_landmarks_control_alone(card):
@@ -134,5 +139,5 @@ def test_a_target_at_a_time_leaves_a_landmarks_control_alone(card):
         replace(c, measure=marked) if c.name == "target_height" else c for c in card.controls
     )
     own = replace(card, controls=controls, event=Event(hand, 0.6))
-    assert len(found(own, Target("RightHand", PLACE, 0.05)).controls) == 1
-    assert len(found(own, Target("RightHand", PLACE, "event")).controls) == 0
+    assert len(found(own, Target("RightHand", PLACE, time=0.05)).controls) == 1
+    assert len(found(own, Target("RightHand", PLACE, at="event")).controls) == 0

@@ -1,4 +1,4 @@
-"""Answers that are held to something, as clips and poses."""
+"""Tests of answers with constraints, as clips and as poses."""
 
 from dataclasses import replace
 
@@ -9,13 +9,13 @@ from service.motion import skeleton
 from service.motion.card import Event
 from service.motion.errors import InvalidField
 from service.motion.measure import Measure
+from service.question.motion_question import ClipQuestion, PoseQuestion, Target
 from service.synthesis import clips, poses, session
 from service.synthesis.exact.goals import NOTHING, Goals
-from service.synthesis.question import ClipQuestion, Hold, PoseQuestion, Target
 from service.synthesis.session import Session
 from service.synthesis.synthesizer import Synthesizer
 
-FREE = Hold("none")
+FREE = {"exact": "none"}
 
 
 def measured(path, measures) -> Synthesizer:
@@ -51,11 +51,11 @@ def joint(model, answer, name) -> np.ndarray:
 
 def test_a_hand_ends_where_it_is_told_to(reach):
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls, hold=FREE))
+    free = clips.clip(reach, ClipQuestion(controls=controls, **FREE))
     goal = joint(reach, free, "RightHand")[-1] + [0.03, 0.02, -0.04]
     target = Target("RightHand", tuple(goal), free.trust.duration)
-    hold = Hold(FREE.exact, (target,))
-    held = clips.clip(reach, ClipQuestion(controls, fps=10 / free.trust.duration, hold=hold))
+    hold = {"exact": FREE["exact"], "targets": (target,)}
+    held = clips.clip(reach, ClipQuestion(controls=controls, fps=10 / free.trust.duration, **hold))
     assert np.linalg.norm(joint(reach, held, "RightHand")[-1] - goal) < 1e-4
     assert np.linalg.norm(joint(reach, free, "RightHand")[-1] - goal) > 0.05
     (met,) = held.trust.targets
@@ -64,7 +64,7 @@ def test_a_hand_ends_where_it_is_told_to(reach):
 
 def test_a_measured_control_is_met_unless_asked_otherwise(reach):
     controls = middle(reach)
-    held, free = (clips.clip(reach, ClipQuestion(controls, hold=hold)) for hold in (Hold(), FREE))
+    held, free = (clips.clip(reach, ClipQuestion(controls=controls, **hold)) for hold in ({}, FREE))
     off = free.trust.measured["target_height"] - controls["target_height"]
     assert abs(off) > 1e-3
     assert held.trust.measured["target_height"] == pytest.approx(
@@ -74,7 +74,7 @@ def test_a_measured_control_is_met_unless_asked_otherwise(reach):
 
 
 def test_what_is_measured_is_what_the_clip_shows(reach):
-    answer = clips.clip(reach, ClipQuestion(middle(reach), fps=240.0, hold=FREE))
+    answer = clips.clip(reach, ClipQuestion(controls=middle(reach), fps=240.0, **FREE))
     shown = joint(reach, answer, "RightHand")[-1, 1]
     # The last frame of 240 a second is up to 4 ms before the end.
     assert answer.trust.measured["target_height"] == pytest.approx(shown, abs=5e-3)
@@ -83,9 +83,9 @@ def test_what_is_measured_is_what_the_clip_shows(reach):
 
 def test_poses_and_clips_of_a_held_motion_agree(reach):
     controls = middle(reach)
-    hold = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), 0.5),))
-    clip = clips.clip(reach, ClipQuestion(controls, fps=10.0, hold=hold))
-    pose = poses.pose(reach, PoseQuestion(controls, [0.0, 0.5], hold=hold))
+    hold = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=0.5),)}
+    clip = clips.clip(reach, ClipQuestion(controls=controls, fps=10.0, **hold))
+    pose = poses.pose(reach, PoseQuestion(controls=controls, times=[0.0, 0.5], **hold))
     assert np.array_equal(pose.rotations[1], clip.clip.rotations[5])
     translations = skeleton.translations(pose.bone_offsets, pose.root_position)
     card = reach.session.card
@@ -98,61 +98,61 @@ def test_poses_and_clips_of_a_held_motion_agree(reach):
 @pytest.mark.parametrize("level", [0, 1, 3])
 def test_every_level_of_detail_meets_its_targets(reach, level):
     controls = middle(reach)
-    free = poses.pose(reach, PoseQuestion(controls, [0.5], level=level, hold=FREE))
+    free = poses.pose(reach, PoseQuestion(controls=controls, times=[0.5], level=level, **FREE))
     root = free.root_position[0].astype(float)
-    target = Target("Hips", tuple(np.add(root, [0.003, -0.003, 0.002])), 0.5)
-    hold = Hold("none", (target,))
-    held = poses.pose(reach, PoseQuestion(controls, [0.5], level=level, hold=hold))
+    target = Target("Hips", tuple(np.add(root, [0.003, -0.003, 0.002])), time=0.5)
+    hold = {"exact": "none", "targets": (target,)}
+    held = poses.pose(reach, PoseQuestion(controls=controls, times=[0.5], level=level, **hold))
     assert np.linalg.norm(held.root_position[0] - root - [0.003, -0.003, 0.002]) < 1e-4
     assert held.trust.level == level
 
 
 def test_a_time_after_the_end_is_refused(reach):
-    late = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), 5.0),))
+    late = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=5.0),)}
     with pytest.raises(InvalidField, match="expected 0 to") as fault:
-        clips.clip(reach, ClipQuestion(middle(reach), hold=late))
+        clips.clip(reach, ClipQuestion(controls=middle(reach), **late))
     assert fault.value.field == "targets/0/time"
-    endless = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), 1e300),))
+    endless = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=1e300),)}
     with pytest.raises(InvalidField, match="expected 0 to"):
-        clips.clip(reach, ClipQuestion(middle(reach), hold=endless))
+        clips.clip(reach, ClipQuestion(controls=middle(reach), **endless))
 
 
 @pytest.mark.parametrize("moment", ["start", "end"])
 def test_a_time_that_is_another_targets_moment_is_refused(reach, moment):
     controls = middle(reach)
-    duration = clips.clip(reach, ClipQuestion(controls, hold=FREE)).trust.duration
+    duration = clips.clip(reach, ClipQuestion(controls=controls, **FREE)).trust.duration
     time = duration if moment == "end" else 0.0
     twins = Target("LeftHand", (0.3, 1.0, 0.3), moment), Target("LeftHand", (0.3, 1.1, 0.3), time)
     with pytest.raises(InvalidField, match="has a target already") as fault:
-        clips.clip(reach, ClipQuestion(controls, hold=Hold("none", twins)))
+        clips.clip(reach, ClipQuestion(controls=controls, exact="none", targets=twins))
     assert fault.value.field == "targets/1"
     apart = twins[0], Target("LeftHand", (0.3, 1.1, 0.3), 0.5 * duration)
-    both = clips.clip(reach, ClipQuestion(controls, hold=Hold("none", apart)))
+    both = clips.clip(reach, ClipQuestion(controls=controls, exact="none", targets=apart))
     assert len(both.trust.targets) == 2
 
 
 def test_a_target_at_the_time_of_a_control_is_the_nearer_word(reach):
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls, fps=200.0, hold=FREE))
+    free = clips.clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
     place = np.add(joint(reach, free, "RightHand")[-1], [0.0, 0.01, 0.0])
     target = Target("RightHand", tuple(place), free.trust.duration)
-    (met,) = clips.clip(reach, ClipQuestion(controls, hold=Hold(targets=(target,)))).trust.targets
+    (met,) = clips.clip(reach, ClipQuestion(controls=controls, targets=(target,))).trust.targets
     assert met.reached and met.what.startswith("RightHand at")
-    earlier = Target("RightHand", tuple(place), 0.5)
-    both = clips.clip(reach, ClipQuestion(controls, hold=Hold(targets=(earlier,)))).trust.targets
+    earlier = Target("RightHand", tuple(place), time=0.5)
+    both = clips.clip(reach, ClipQuestion(controls=controls, targets=(earlier,))).trust.targets
     assert [each.what for each in both] == ["target_height", "RightHand at 0.5 s"]
 
 
 def test_what_is_met_already_does_not_hinder_what_is_out_of_reach(reach):
     controls = middle(reach)
-    free = poses.pose(reach, PoseQuestion(controls, [0.5], hold=FREE))
-    stays = Target("Hips", tuple(map(float, free.root_position[0])), 0.5)
+    free = poses.pose(reach, PoseQuestion(controls=controls, times=[0.5], **FREE))
+    stays = Target("Hips", tuple(map(float, free.root_position[0])), time=0.5)
     question = reach.door.question(controls, "warn", None, 0)
     begun = reach.keeper.held(question, NOTHING)
     hips = begun.scene.positions(begun.numbers, 0, np.array([0.0]))[0]
-    exactly = Target("Hips", tuple(hips), "start"), Target("LeftHand", (0.3, 2.5, 0.7), "end")
+    exactly = Target("Hips", tuple(hips), at="start"), Target("LeftHand", (0.3, 2.5, 0.7), at="end")
     for targets in (exactly, (stays, exactly[1])):
-        asked = ClipQuestion(controls, hold=Hold("none", targets))
+        asked = ClipQuestion(controls=controls, exact="none", targets=targets)
         near, far = clips.clip(reach, asked).trust.targets
         assert near.miss < 1e-3 < far.miss
 
@@ -172,12 +172,20 @@ def test_a_speed_is_met_by_way_and_duration(walk):
 
 def test_a_held_cycle_closes(walk):
     controls = middle(walk)
-    place = joint(walk, clips.clip(walk, ClipQuestion(controls)), "LeftFoot")[0] + [0.02, 0.02, 0.0]
-    hold = Hold("none", (Target("LeftFoot", tuple(place), 0.2),))
-    loop = clips.clip(walk, ClipQuestion(controls, root="in_place", loop=True, hold=hold)).clip
+    place = joint(walk, clips.clip(walk, ClipQuestion(controls=controls)), "LeftFoot")[0] + [
+        0.02,
+        0.02,
+        0.0,
+    ]
+    hold = {"exact": "none", "targets": (Target("LeftFoot", tuple(place), time=0.2),)}
+    loop = clips.clip(
+        walk, ClipQuestion(controls=controls, root="in_place", loop=True, **hold)
+    ).clip
     assert np.abs(loop.positions()[0] - loop.positions()[-1]).max() < 1e-9
     assert np.abs(loop.positions()[0] - loop.positions()[5]).max() > 1e-2
-    free = clips.clip(walk, ClipQuestion(controls, root="in_place", loop=True, hold=FREE)).clip
+    free = clips.clip(
+        walk, ClipQuestion(controls=controls, root="in_place", loop=True, **FREE)
+    ).clip
     assert np.abs(free.positions() - loop.positions()).max() > 1e-3
 
 
@@ -185,31 +193,35 @@ def test_what_is_held_to_nothing_is_what_the_graph_says(reach, labelled_path):
     controls = middle(reach)
     plain = Synthesizer("reach", session.load(labelled_path))
     graph, own = (
-        clips.clip(model, ClipQuestion(controls, hold=FREE)).clip for model in (plain, reach)
+        clips.clip(model, ClipQuestion(controls=controls, **FREE)).clip for model in (plain, reach)
     )
     assert np.array_equal(graph.rotations, own.rotations)
-    held = clips.clip(reach, ClipQuestion(controls)).clip
+    held = clips.clip(reach, ClipQuestion(controls=controls)).clip
     assert not np.array_equal(graph.rotations, held.rotations)
 
 
 def test_the_same_question_gives_the_same_numbers(reach, labelled_path):
-    hold = Hold(targets=(Target("LeftHand", (0.3, 1.2, 0.4), "event"),))
+    hold = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), at="event"),)}
     names = session.load(labelled_path).card.skeleton.names
     other = measured(
         labelled_path, {"target_height": Measure("height", (names.index("RightHand"),), "end")}
     )
-    both = [clips.clip(m, ClipQuestion(middle(m), hold=hold)).clip for m in (reach, other, reach)]
+    both = [
+        clips.clip(m, ClipQuestion(controls=middle(m), **hold)).clip for m in (reach, other, reach)
+    ]
     assert np.array_equal(both[0].rotations, both[1].rotations)
     assert np.array_equal(both[0].rotations, both[2].rotations)
 
 
 def test_an_extreme_is_met_where_it_is(reach):
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls, fps=200.0, hold=FREE))
+    free = clips.clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
     path = joint(reach, free, "LeftHand")
     top = path[np.argmax(path[:, 1])]
-    target = Target("LeftHand", tuple(np.add(top, [0.0, 0.03, 0.0])), "highest")
-    held = clips.clip(reach, ClipQuestion(controls, fps=200.0, hold=Hold("none", (target,))))
+    target = Target("LeftHand", tuple(np.add(top, [0.0, 0.03, 0.0])), at="highest")
+    held = clips.clip(
+        reach, ClipQuestion(controls=controls, fps=200.0, exact="none", targets=(target,))
+    )
     assert joint(reach, held, "LeftHand")[:, 1].max() == pytest.approx(top[1] + 0.03, abs=2e-3)
     assert held.trust.targets[0].reached
 
@@ -217,9 +229,9 @@ def test_an_extreme_is_met_where_it_is(reach):
 def test_the_event_needs_no_landmark(reach):
     card = replace(reach.session.card, event=Event(0, 0.5))
     model = Synthesizer("reach", replace(reach.session, card=card))
-    hold = Hold("none", (Target("LeftHand", (0.3, 1.1, 0.2), "event"),))
+    hold = {"exact": "none", "targets": (Target("LeftHand", (0.3, 1.1, 0.2), at="event"),)}
     assert (
-        clips.clip(model, ClipQuestion(middle(model), hold=hold)).trust.targets[0].what
+        clips.clip(model, ClipQuestion(controls=middle(model), **hold)).trust.targets[0].what
         == "LeftHand at event"
     )
 
@@ -230,11 +242,14 @@ def test_pinned_feet_stay_where_they_stand(reach):
     card = replace(reach.session.card, feet=feet)
     reach = Synthesizer("reach", replace(reach.session, card=card))
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls, fps=60.0, hold=FREE))
+    free = clips.clip(reach, ClipQuestion(controls=controls, fps=60.0, **FREE))
     goal = np.add(joint(reach, free, "RightHand")[-1], [0.02, -0.01, 0.02])
-    targets = (Target("RightHand", tuple(goal), "end"),)
+    targets = (Target("RightHand", tuple(goal), at="end"),)
     held, pinned = (
-        clips.clip(reach, ClipQuestion(controls, fps=60.0, hold=Hold("none", targets, pin)))
+        clips.clip(
+            reach,
+            ClipQuestion(controls=controls, fps=60.0, exact="none", targets=targets, pin_feet=pin),
+        )
         for pin in (False, True)
     )
 
@@ -251,5 +266,5 @@ def test_pinned_feet_stay_where_they_stand(reach):
 def test_feet_that_nobody_named_cannot_be_pinned(reach):
     model = Synthesizer("reach", replace(reach.session, card=replace(reach.session.card, feet=())))
     with pytest.raises(InvalidField, match="names no feet") as fault:
-        clips.clip(model, ClipQuestion(middle(model), hold=Hold(pin_feet=True)))
+        clips.clip(model, ClipQuestion(controls=middle(model), pin_feet=True))
     assert fault.value.field == "pin_feet"

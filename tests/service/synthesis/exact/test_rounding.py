@@ -1,4 +1,4 @@
-"""What tells machines apart that round otherwise."""
+"""Test of entity tags: they depend on the machine's rounding."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Keys are made whole, known by their hash alone, and told apart."""
+"""Tests of API keys: generation, verification by hash, and errors."""
 
 import hashlib
 

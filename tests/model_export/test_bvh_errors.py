@@ -1,11 +1,14 @@
-"""Files that are refused: each error says what was found, what was expected, and the line."""
+"""Tests of invalid BVH files: each error gives found and expected values and the line."""
 
+import io
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from service.motion import bvh
+from model_export import bvh
+from model_export.bvh import reader
+from model_export.bvh.text import BLOCK
 from service.motion.errors import BvhError
 
 VALID = """\
@@ -451,6 +454,101 @@ def test_a_long_word_is_refused_in_linear_time_and_cut_in_the_message(digits):
 def test_a_long_blank_line_is_passed_in_linear_time():
     assert refused(" " * 1_000_000 + "\n" + "\t" * 1_000_000).line == 2
     assert refused(line_changed(17, " " * 1_000_000 + "Frames")).line == 17
+
+
+@pytest.mark.parametrize("line", [2, 12, 16, 17, 18, 19, 20])
+@pytest.mark.parametrize("blank", ["\n", " \n", "\r\n"])
+def test_blank_lines_take_no_memory(line, blank):
+    lines = VALID.split("\n")
+    count = 1_000_000
+    content = "\n".join(lines[: line - 1]) + "\n" + blank * count + "\n".join(lines[line - 1 :])
+    tracemalloc.start()
+    try:
+        found = bvh.loads(content.encode(), "clips/walk.bvh")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert np.array_equal(found.values, bvh.loads(VALID.encode(), "clips/walk.bvh").values)
+    # A list of the words of each line alone would take 64 MB.
+    assert peak < 25_000_000
+    # Lines are counted all the same.
+    wrong = content.rstrip("\n") + " x\n"
+    assert refused(wrong).line == len(lines) - 1 + count
+
+
+def test_the_text_before_the_motion_is_bounded():
+    error = refused(changed("HIERARCHY", "HIERARCHY" + " " * 4_000_000))
+    assert error.message == "found 4 MB without a line MOTION, expected ROOT"
+
+
+class Endless(io.RawIOBase):
+    """A file that begins like another and goes on with the same for ever."""
+
+    def __init__(self, start, rest):
+        self.start, self.rest = io.BytesIO(start.encode()), rest
+        self.given = 0
+
+    def read(self, size):
+        piece = self.start.read(size) or self.rest[:size]
+        self.given += len(piece)
+        return piece
+
+
+def test_the_size_of_a_file_is_bounded():
+    file = Endless(VALID, b" " * BLOCK)
+    with pytest.raises(BvhError) as caught:
+        reader.load(file, "clips/walk.bvh")
+    assert caught.value.message == "found more than 1000 MB, expected at most 1000 MB"
+    assert file.given < 1_010_000_000
+
+
+ALIKE = "".join(f"{row} 2 3 4 5 6 7 8 9\n" for row in range(200_000))
+"""Lines of numbers that fill several blocks."""
+
+
+def long_motion(text, frames=200_000):
+    return VALID.replace(3 * ROW, text).replace("Frames: 3", f"Frames: {frames}")
+
+
+def test_numbers_are_read_across_blocks():
+    assert len(ALIKE) > 3 * BLOCK
+    values = bvh.loads(long_motion(ALIKE).encode(), "clips/walk.bvh").values
+    assert values.shape == (200_000, 9)
+    assert np.array_equal(values[:, 0], np.arange(200_000.0))
+    assert np.array_equal(values[:, 1:], np.tile(np.arange(2.0, 10.0), (200_000, 1)))
+    # The same frames over lines of which none is a frame.
+    apart = long_motion(ALIKE.replace(" 5", "\n5"))
+    assert np.array_equal(bvh.loads(apart.encode(), "clips/walk.bvh").values, values)
+
+
+def test_far_too_many_numbers_are_not_counted_to_the_end():
+    # A thousand joints leave 10,000 frames of one channel.
+    file = Endless(flat(1000), b"0\n" * BLOCK)
+    with pytest.raises(BvhError) as caught:
+        reader.load(file, "clips/walk.bvh")
+    expected = "found more than 10001 numbers, expected 1 frames x 1 channels = 1"
+    assert caught.value.message == expected
+    assert file.given < 6_000_000
+
+
+@pytest.mark.parametrize("row", [0, 60_000, 199_999])
+def test_faults_are_found_in_every_block(row):
+    line = f"\n{row} 2 3 4 5 6 7 8 9\n"
+    whole = "\n" + ALIKE
+    assert whole.count(line) == 1
+
+    def fault(new):
+        error = refused(long_motion(whole.replace(line, new)[1:]))
+        return error.line - 19, error.message
+
+    expected = f"expected 200000 frames x 9 channels = 1800000, {OWN_LINES}"
+    lines = "in 200000 lines"
+    assert fault("\n1 2 3 4 x 6 7 8 9\n") == (row, "found 'x', expected a number")
+    assert fault("\n1 2 3 4 5\n") == (row, f"found 1799996 numbers {lines}, {expected}")
+    swapped = whole.replace("\n5 2 3 4 5 6 7 8 9\n", "\n5 2 3 4 5 6 7 8\n")
+    swapped = swapped.replace("\n190000 2", "\n0 190000 2")
+    error = refused(long_motion(swapped[1:]))
+    assert (error.line, error.message) == (19 + 5, f"found 1800000 numbers {lines}, {expected}")
 
 
 @pytest.mark.parametrize("seed", range(20))

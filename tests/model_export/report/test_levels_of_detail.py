@@ -1,4 +1,4 @@
-"""The report's levels of detail: the card's, with times, among others that could have been."""
+"""Tests of levels of detail in the report: the card's levels with times, and alternatives."""
 
 import json
 import math
@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from model_export.report import curve, detail, render
+from model_export.report import levels_of_detail
 from service.synthesis.ports import OUTPUTS
 
 SLOWER = (4e-6, 3e-6, 2e-6, 1e-6)
@@ -30,8 +30,8 @@ def without_seconds(text):
     return re.sub(r'("seconds_per_pose": )[-+.0-9e]+', r"\1", text)
 
 
-def retimed(ladder):
-    return replace(ladder, chosen=replace(ladder.chosen, seconds=SLOWER))
+def retimed(levels):
+    return replace(levels, chosen=replace(levels.chosen, seconds=SLOWER))
 
 
 def test_the_levels_are_those_of_the_card(facts, exported):
@@ -45,8 +45,8 @@ def test_the_levels_are_those_of_the_card(facts, exported):
 
 
 def test_every_level_was_timed(facts):
-    for ladder in (facts["levels"], facts["others"]):
-        seconds = [level["seconds_per_pose"] for level in ladder]
+    for levels in (facts["levels"], facts["others"]):
+        seconds = [level["seconds_per_pose"] for level in levels]
         assert min(seconds) > 0.0 and seconds == sorted(seconds, reverse=True)
 
 
@@ -58,34 +58,34 @@ def test_a_pixel_is_as_large_as_the_error_at_its_distance(facts, exported):
         assert 540 * level.rms / half_image < 0.5
 
 
-def test_a_level_is_for_no_nearer_than_the_finer_one(ladder):
-    first, *others = ladder.chosen.levels
-    odd = replace(ladder, chosen=replace(ladder.chosen, levels=(replace(first, pose=9.0), *others)))
-    assert odd.distances == pytest.approx([9.0 * detail.CAMERA.pixels] * 4)
-    assert ladder.distances != pytest.approx([ladder.distances[0]] * 4)
+def test_a_level_is_for_no_nearer_than_the_finer_one(levels):
+    first, *others = levels.chosen.levels
+    odd = replace(levels, chosen=replace(levels.chosen, levels=(replace(first, pose=9.0), *others)))
+    assert odd.distances == pytest.approx([9.0 * levels_of_detail.CAMERA.pixels] * 4)
+    assert levels.distances != pytest.approx([levels.distances[0]] * 4)
 
 
-def test_every_level_is_said_what_it_is_for(page, ladder):
-    first, second, third, fourth = (f"{distance:.0f} m" for distance in ladder.distances)
-    assert (
-        f"Level 0 is for all that is exported or measured, and for characters up to {second}."
-        in page
-    )
+def test_every_level_is_said_what_it_is_for(page, levels):
+    first, second, third, fourth = (f"{distance:.0f} m" for distance in levels.distances)
+    assert f"Level 0 is for export and measurement, and for characters up to {second}." in page
     assert f"Level 1 is for characters from {second} to {third}: " in page
-    assert f"Level 3 is for characters from {fourth} on: " in page
+    assert f"Level 3 is for characters from {fourth} onwards: " in page
     assert f"from {first} " not in page
 
 
-def test_a_model_of_one_level_has_a_report_too(ladder):
-    own = detail.Paced(ladder.chosen.levels[:1], ladder.chosen.seconds[:1])
-    section = replace(ladder, chosen=own).section()
-    assert section.words[1:] == ("Level 0 is for all that is exported or measured.",)
+def test_a_model_of_one_level_has_a_report_too(levels):
+    own = levels_of_detail.TimedLevels(levels.chosen.levels[:1], levels.chosen.seconds[:1])
+    section = replace(levels, chosen=own).section()
+    assert section.paragraphs[1:] == ("Level 0 is for export and measurement.",)
     assert [len(table.rows) for table in section.tables] == [1, 1]
 
 
-def test_the_curve_is_of_levels_made_alone_from_fine_to_coarse(facts, small_recipe):
+def test_alternatives_go_from_fine_to_coarse(facts, small_recipe):
     others = facts["others"]
-    assert [own["times_budget"] for own in others][:: len(others) - 1] == [1.0, curve.FARTHEST]
+    assert [own["times_budget"] for own in others][:: len(others) - 1] == [
+        1.0,
+        levels_of_detail.FARTHEST,
+    ]
     for finer, coarser in pairwise(others):
         assert finer["times_budget"] < coarser["times_budget"]
         assert finer["rms_m"] < coarser["rms_m"] and finer["numbers"] > coarser["numbers"]
@@ -97,10 +97,8 @@ def test_the_curve_is_of_levels_made_alone_from_fine_to_coarse(facts, small_reci
     assert not any(own["rms_m"] <= 0.5 * own["times_budget"] * budget for own in others[:5])
 
 
-def test_a_point_of_the_curve_is_the_level_that_is_timed(small_recipe, trained, exported, ladder):
-    """Its session answers as coarsely as the point says."""
-    found = curve.of(small_recipe, trained, exported.card)
-    assert (found.levels, found.times) == (ladder.others.levels, ladder.times)
+def test_an_alternative_answers_as_coarsely_as_its_figures_say(trained, exported, alternatives):
+    found = alternatives
     low, high = exported.model.bank.low, exported.model.bank.high
     points, times = np.linspace(low, high, 200), np.full((200, 1), 0.5)
     best = exported.model.evaluate(points, times).positions(trained.skeleton.parents)
@@ -118,21 +116,18 @@ def test_a_point_of_the_curve_is_the_level_that_is_timed(small_recipe, trained, 
     assert errors == sorted(errors)
 
 
-def test_seconds_are_all_that_differs_from_run_to_run(trained, exported, ladder, steps, rendered):
-    slower = render.render(trained, exported, retimed(ladder), steps)
-    text, other = rendered.json.decode(), slower.json.decode()
+def test_two_reports_differ_only_in_seconds_per_pose(levels):
+    text, other = (json.dumps(one.facts()) for one in (levels, retimed(levels)))
     assert text != other and without_seconds(text) == without_seconds(other)
-    nearer = replace(ladder, times=(0.5, *ladder.times[1:]))
-    changed = render.render(trained, exported, nearer, steps).json.decode()
-    assert without_seconds(text) != without_seconds(changed)
+    nearer = json.dumps(replace(levels, times=(0.5, *levels.times[1:])).facts())
+    assert without_seconds(text) != without_seconds(nearer)
 
 
-def test_times_on_the_page_are_those_measured(trained, exported, ladder, steps, page):
-    slower = unescape(render.render(trained, exported, retimed(ladder), steps).html.decode())
-    for cell in ("4.00", "3.00", "2.00", "1.00"):
-        assert re.search(rf"<td>[0-9,]+</td><td>{cell}</td></tr>", slower)
-    assert "in 25 % of the finest level's time" in slower
-    assert not re.search(r"<td>[0-9,]+</td><td>4.00</td></tr>", page)
+def test_times_on_the_page_are_those_measured(levels):
+    slower = retimed(levels).section()
+    assert [row[-1] for row in slower.tables[0].rows] == ["4.00", "3.00", "2.00", "1.00"]
+    assert "in 25 % of the time of the finest level" in slower.paragraphs[-1]
+    assert [row[-1] for row in levels.section().tables[0].rows] != ["4.00", "3.00", "2.00", "1.00"]
 
 
 def test_no_time_is_in_the_model(exported):

@@ -1,37 +1,44 @@
-"""Table 1: its errors are what it says, and it prints every baseline with its definition."""
+"""Tests of Table 1: its error measure, its ranks, and its text with all definitions."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from paper import errors, markdown, measurement, precomputation, table1
 
 from model_export import cost, fidelity
-from model_export.evaluate import table1, table1_errors, table1_measure
-from model_export.evaluate import table1_precompute as precompute
+
+SCRIPT = Path(__file__).parents[2] / "benchmarks/paper/table1.py"
+
+# Compiling the kernels and measuring takes longer than a unit test may.
+pytestmark = pytest.mark.system
 
 
 @pytest.fixture(scope="module")
 def over(made):
-    return table1_errors.uniform(made, 30)
+    return errors.uniform(made, 30)
 
 
 @pytest.fixture(scope="module")
 def measured(made):
-    return table1_measure.of(made, points=30, rounds=1)
+    return measurement.of(made, points=30, rounds=1)
 
 
 def test_distances_are_summed_over_joints_and_frames():
     found, expected = np.zeros((2, 4, 5, 3)), np.zeros((2, 4, 5, 3))
     found[0] = [3.0, 4.0, 0.0]
-    assert table1_errors.between(found, expected) == pytest.approx(np.sqrt(100.0**2 / 2))
-    assert table1_errors.between(found, found) == 0.0
+    assert errors.between(found, expected) == pytest.approx(np.sqrt(100.0**2 / 2))
+    assert errors.between(found, found) == 0.0
 
 
 def test_full_rank_has_no_error_and_fewer_ranks_have_more(over, made):
     full = made.trained.full
-    errors = [over.truncation(full.truncated(ranks)) for ranks in ((94, 40, 46), (20, 8, 20))]
-    assert errors[0] < 1e-9 < 0.1 < errors[1]
+    found = [over.truncation(full.truncated(ranks)) for ranks in ((94, 40, 46), (20, 8, 20))]
+    assert found[0] < 1e-9 < 0.1 < found[1]
 
 
 def test_at_the_samples_without_nugget_the_motions_are_the_clips(over, made, small_recipe):
@@ -49,7 +56,7 @@ def test_at_the_samples_without_nugget_the_motions_are_the_clips(over, made, sma
 @pytest.mark.parametrize("threshold", [8.0, 3.0])
 def test_smallest_tensor_keeps_the_threshold_and_is_not_wasteful(over, made, threshold):
     full = made.trained.full
-    found = table1_errors.smallest(over, threshold)
+    found = errors.smallest(over, threshold)
     assert 0.8 * threshold < over.truncation(full.truncated(found)) <= threshold
     for mode in range(3):
         fewer = tuple(rank - 2 * (axis == mode) for axis, rank in enumerate(found))
@@ -57,7 +64,7 @@ def test_smallest_tensor_keeps_the_threshold_and_is_not_wasteful(over, made, thr
 
 
 def test_precomputation_is_the_models_own(made):
-    reduced, field = precompute.ours(made, (12, 5, 10))
+    reduced, field = precomputation.ours(made, (12, 5, 10))
     expected = made.trained.full.truncated((12, 5, 10))
     assert np.abs(reduced.core - expected.core).max() < 1e-9
     assert np.abs(field.predict(made.samples[:3]) - reduced.bases[2][:3]).max() < 0.2
@@ -67,10 +74,10 @@ def test_precomputation_is_the_models_own(made):
 def test_every_size_says_what_it_costs(measured, made):
     named = {size.asked: size for size in measured.sizes}
     assert set(named) == {
-        *table1_measure.THRESHOLDS,
-        *(f"the paper's {'×'.join(map(str, ranks))}" for ranks in table1_measure.PAPER_RANKS),
+        *measurement.THRESHOLDS,
+        *(f"the paper's {'×'.join(map(str, ranks))}" for ranks in measurement.PAPER_RANKS),
     }
-    for asked, limit in table1_measure.THRESHOLDS.items():
+    for asked, limit in measurement.THRESHOLDS.items():
         size = named[asked]
         assert size.error <= limit
         compression = cost.compression(made.trained.tensor, size.ranks, 4)
@@ -80,7 +87,7 @@ def test_every_size_says_what_it_costs(measured, made):
 
 
 def test_every_baseline_is_compared_with_ours_at_the_papers_size(measured):
-    shown = next(size for size in measured.sizes if size.ranks == table1_measure.SHOWN)
+    shown = next(size for size in measured.sizes if size.ranks == measurement.SHOWN)
     assert {one.ours for one in measured.precompute} == {shown.precompute}
     assert {one.ours for one in measured.pose} == {shown.pose}
     for one in (*measured.precompute, *measured.pose):
@@ -88,7 +95,7 @@ def test_every_baseline_is_compared_with_ours_at_the_papers_size(measured):
 
 
 def test_text_holds_the_papers_figures_and_every_definition(measured):
-    said = table1.text(measured)
+    said = markdown.text(measured)
     for figure in ("119.8 s", "2.76 ms", "22 × 6 × 24 | 267 | 106", "18 × 6 × 28 | 280 |"):
         assert figure in said
     for one in (*measured.precompute, *measured.pose):
@@ -100,8 +107,8 @@ def test_text_holds_the_papers_figures_and_every_definition(measured):
 def test_a_goal_that_is_missed_is_called_so(measured):
     slow = tuple(replace(one, seconds=0.5 * one.ours) for one in measured.precompute)
     fast = tuple(replace(one, seconds=500.0 * one.ours) for one in measured.precompute)
-    assert table1.text(replace(measured, precompute=slow)).count("| 20 | **no** |") == len(slow)
-    assert table1.text(replace(measured, precompute=fast)).count("| 20 | yes |") == len(fast)
+    assert markdown.text(replace(measured, precompute=slow)).count("| 20 | **no** |") == len(slow)
+    assert markdown.text(replace(measured, precompute=fast)).count("| 20 | yes |") == len(fast)
 
 
 def test_facts_are_plain(measured):
@@ -109,3 +116,10 @@ def test_facts_are_plain(measured):
     assert facts["raw"] == [94, 40, 46]
     assert len(facts["sizes"]) == 7
     assert facts["pose"][0]["goal"] == 3.3
+
+
+def test_the_script_runs_as_a_file_from_any_folder(tmp_path):
+    command = [sys.executable, SCRIPT, "--help"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "--json" in done.stdout

@@ -1,10 +1,10 @@
-"""What is drawn as predicted is what the other clips predict."""
+"""Tests of leave-one-out predictions in the report, and of their drawing."""
 
 import numpy as np
 import pytest
 
 from model_export import align, kriging
-from model_export.report import figures, left_out
+from model_export.report import drawn_clips, leave_one_out
 
 # Two ways to one solution of the same equations differ by rounding, m.
 ROUNDING = 1e-8
@@ -33,7 +33,7 @@ def clip(request, trained):
 
 def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
     everyone = np.arange(len(trained.examples))
-    found = left_out.motion(trained, clip)
+    found = leave_one_out.motion(trained, clip)
     alone = predicted(trained, everyone[everyone != clip], clip)
     assert np.abs(found - alone).max() < ROUNDING
     # Negative control: with the clip itself the prediction is another.
@@ -44,7 +44,7 @@ def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
 
 
 def test_its_distance_from_the_capture_is_what_training_measured(trained, clip):
-    gap = trained.tensor.values[:, :, clip] - left_out.motion(trained, clip)
+    gap = trained.tensor.values[:, :, clip] - leave_one_out.motion(trained, clip)
     frames = gap.shape[1]
     assert np.sum(gap**2) / (trained.tensor.weight * frames) == pytest.approx(trained.missed[clip])
 
@@ -52,15 +52,15 @@ def test_its_distance_from_the_capture_is_what_training_measured(trained, clip):
 def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
     offsets = np.stack([example.offsets for example in trained.examples])
     expected = align.positions(trained.aligned, trained.skeleton.parents, offsets)[clip]
-    body = left_out.body(trained, clip, trained.tensor.values[:, :, clip])
+    body = leave_one_out.body(trained, clip, trained.tensor.values[:, :, clip])
     assert np.abs(body.joints - expected).max() < ROUNDING
-    guess = left_out.body(trained, clip, left_out.motion(trained, clip))
+    guess = leave_one_out.body(trained, clip, leave_one_out.motion(trained, clip))
     assert np.abs(guess.joints - expected).max() > SEEN
 
 
 def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
     own = trained.examples[clip].clip.skeleton
-    body = left_out.body(trained, clip, left_out.motion(trained, clip))
+    body = leave_one_out.body(trained, clip, leave_one_out.motion(trained, clip))
     bones = np.linalg.norm(body.tips - body.joints[:, list(own.tip_joints)], axis=-1)
     assert np.abs(bones - np.linalg.norm(own.tip_offsets, axis=-1)).max() < ROUNDING
 
@@ -69,7 +69,7 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
     """Over the family, whose poses the metric is averaged over, within five per cent; a single clip
     may be a third off, for its joints hang otherwise than the family's do on average."""
     clips = range(len(trained.examples))
-    drawn = np.array([figures.compare(trained, clip).apart for clip in clips])
+    drawn = np.array([drawn_clips.compare(trained, clip).apart for clip in clips])
     missed = np.sqrt(trained.missed)
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.sqrt(np.mean(missed**2)), rel=0.05)
     assert np.abs(drawn / missed - 1.0).max() < 1.0 / 3.0
@@ -77,7 +77,7 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
 
 
 def test_the_nearest_clip_is_the_nearest(trained, clip):
-    pair = figures.compare(trained, clip)
+    pair = drawn_clips.compare(trained, clip)
     points = trained.laid.half_ranges
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf

@@ -1,6 +1,6 @@
-"""Awkward files that are valid: each is read to the joint positions that it means.
+"""Tests of unusual valid BVH files: each gives the correct joint positions.
 
-The expected positions come from matrices, a channel at a time, over joints that the tests state
+The expected positions come from matrices, one channel at a time, over joints that the tests define
 beside the file's text.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from service.motion import bvh
+from model_export import bvh
 
 # Both sides compute in float64 from the same decimals.
 TOLERANCE = 1e-9

@@ -1,4 +1,4 @@
-"""Clips written and read again, and valid files broken at random."""
+"""Tests of writing and reading BVH, and of randomly damaged files."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.motion import bvh, quat
-from service.motion.bvh import writer
+from model_export import bvh
+from service.motion import bvh_writer, quat
 from service.motion.clip import Clip
 from service.motion.errors import BvhError
 from service.motion.skeleton import Skeleton
@@ -126,7 +126,7 @@ def tip_places(skeleton):
 
 
 def assert_returns(clip, metres_per_unit):
-    other = returned(bvh.dumps(clip, metres_per_unit=metres_per_unit), metres_per_unit)
+    other = returned(bvh_writer.dumps(clip, metres_per_unit=metres_per_unit), metres_per_unit)
     assert set(other.skeleton.names) == set(clip.skeleton.names)
     for joint, name in enumerate(clip.skeleton.names[1:], start=1):
         same = other.skeleton.names.index(name)
@@ -186,7 +186,7 @@ def rng():
 
 
 def test_bytes_are_these():
-    assert bvh.dumps(small_clip(), metres_per_unit=0.01) == GOLDEN
+    assert bvh_writer.dumps(small_clip(), metres_per_unit=0.01) == GOLDEN
 
 
 @pytest.mark.parametrize("decimals", [7, 8, 11])
@@ -198,12 +198,12 @@ def test_numbers_are_written_as_percent_f_writes_them(rng, decimals):
     expected = "".join(
         " ".join(f"{number:.{decimals}f}" for number in row) + "\n" for row in rounded
     )
-    assert writer.written(values, decimals).decode() == expected
+    assert bvh_writer.written(values, decimals).decode() == expected
 
 
 def test_numbers_of_too_many_digits_are_refused():
     with pytest.raises(ValueError, match=r"numbers of up to 1e\+12, expected fewer digits"):
-        writer.written(np.array([[1.0, -1e12]]), 7)
+        bvh_writer.written(np.array([[1.0, -1e12]]), 7)
 
 
 def nearest_by_hand(angles):
@@ -219,7 +219,7 @@ def nearest_by_hand(angles):
 def test_angles_are_as_near_as_taking_one_frame_after_another(rng):
     wild = quat.exp(np.cumsum(rng.normal(0.0, 0.3, (2000, 3)), axis=0))
     angles = quat.to_euler(wild, "ZYX")
-    found = writer.continuous(angles)
+    found = bvh_writer.continuous(angles)
     assert np.abs(found - nearest_by_hand(angles)).max() < 1e-9
     assert np.abs(found - angles).max() > np.pi
 
@@ -231,18 +231,20 @@ def test_bytes_hang_on_the_numbers_and_not_on_their_layout(rng):
         rotations=np.asfortranarray(clip.rotations),
         translations=np.asfortranarray(clip.translations),
     )
-    assert bvh.dumps(clip, metres_per_unit=0.01) == bvh.dumps(other, metres_per_unit=0.01)
+    assert bvh_writer.dumps(clip, metres_per_unit=0.01) == bvh_writer.dumps(
+        other, metres_per_unit=0.01
+    )
 
 
 def test_writing_again_and_again_does_not_drift(rng):
     clip = last = random_clip(rng, (-1, 0, 1, 0, 3, 3))
     for _ in range(20):
-        last = returned(bvh.dumps(last, metres_per_unit=0.01), 0.01)
+        last = returned(bvh_writer.dumps(last, metres_per_unit=0.01), 0.01)
     assert worst(clip, last) < TOLERANCE
 
 
 def test_root_offset_is_zero_so_that_both_readings_agree():
-    file = bvh.loads(bvh.dumps(small_clip(), metres_per_unit=0.01), "written.bvh")
+    file = bvh.loads(bvh_writer.dumps(small_clip(), metres_per_unit=0.01), "written.bvh")
     assert file.joints[0].offset == (0, 0, 0)
     added, replaced = (
         bvh.to_clip(file, metres_per_unit=0.01, up="y", root_offset=choice)
@@ -256,7 +258,7 @@ def test_only_joints_that_slide_have_position_channels():
     still = clip.translations.copy()
     still[1, 3] = still[0, 3] + 1e-10
     for translations, channels in ((clip.translations, 6), (still, 3)):
-        content = bvh.dumps(replace(clip, translations=translations), metres_per_unit=0.01)
+        content = bvh_writer.dumps(replace(clip, translations=translations), metres_per_unit=0.01)
         joints = {joint.name: joint for joint in bvh.loads(content, "written.bvh").joints}
         assert len(joints["foot:L"].channels) == channels
         assert len(joints["spine"].channels) == 3
@@ -268,7 +270,7 @@ def test_angles_go_on_where_the_middle_one_passes_a_quarter_turn():
     for axis in "XYZ":
         rotations = quat.from_euler(angles[:, None, None], axis)
         clip = Clip(skeleton, rotations, np.zeros((len(angles), 1, 3)), 60.0)
-        values = bvh.loads(bvh.dumps(clip, metres_per_unit=1.0), "written.bvh").values
+        values = bvh.loads(bvh_writer.dumps(clip, metres_per_unit=1.0), "written.bvh").values
         column = 3 + "ZYX".index(axis)
         np.testing.assert_allclose(values[:, column], np.rad2deg(angles), atol=1e-5)
         assert_returns(clip, 1.0)
@@ -277,7 +279,7 @@ def test_angles_go_on_where_the_middle_one_passes_a_quarter_turn():
 def test_no_negative_zero_is_written():
     clip = small_clip()
     clip = replace(clip, translations=-1e-12 - 0.0 * clip.translations)
-    assert b"-0.0000000" not in bvh.dumps(clip, metres_per_unit=0.01)
+    assert b"-0.0000000" not in bvh_writer.dumps(clip, metres_per_unit=0.01)
 
 
 @pytest.mark.parametrize(
@@ -287,7 +289,7 @@ def test_a_name_that_would_break_the_grammar_is_refused(name):
     clip = small_clip()
     skeleton = replace(clip.skeleton, names=("hips", name, "spine", "foot"))
     with pytest.raises(ValueError, match="expected words parted by single blanks") as caught:
-        bvh.dumps(replace(clip, skeleton=skeleton), metres_per_unit=0.01)
+        bvh_writer.dumps(replace(clip, skeleton=skeleton), metres_per_unit=0.01)
     assert repr(name) in str(caught.value)
 
 
@@ -307,13 +309,13 @@ def test_numbers_that_are_not_finite_are_refused(part, value):
     broken = getattr(clip, part).copy()
     broken[1, 2, 0] = value
     with pytest.raises(ValueError, match="not finite"):
-        bvh.dumps(replace(clip, **{part: broken}), metres_per_unit=0.01)
+        bvh_writer.dumps(replace(clip, **{part: broken}), metres_per_unit=0.01)
 
 
 @pytest.mark.parametrize("unit", [0.0, -1.0, np.nan, np.inf])
 def test_a_unit_that_is_no_length_is_refused(unit):
     with pytest.raises(ValueError, match="expected a positive number"):
-        bvh.dumps(small_clip(), metres_per_unit=unit)
+        bvh_writer.dumps(small_clip(), metres_per_unit=unit)
 
 
 def swapped_outer(content):
@@ -341,7 +343,7 @@ def first_frame_twice(content):
 def test_wrong_bytes_miss_the_tolerance(rng, wrong):
     """Negative control: each of these is read without complaint and seen by the comparison."""
     clip = random_clip(rng, (-1, 0, 1, 1))
-    content = bvh.dumps(clip, metres_per_unit=0.01)
+    content = bvh_writer.dumps(clip, metres_per_unit=0.01)
     assert worst(clip, returned(content, 0.01)) < TOLERANCE
     assert worst(clip, returned(wrong(content), 0.01)) > TOLERANCE
 

@@ -1,11 +1,14 @@
-"""What is timed is right: compiled poses are those of the model and of naive kriging."""
+"""Tests of the compiled kernels against the model and naive kriging."""
 
 import numpy as np
 import pytest
+from paper import kernels, poses, precomputation
+from timing import in_turn
 
 from model_export.decoder import Decoder
-from model_export.evaluate import table1_kernels as kernels
-from model_export.evaluate import table1_pose, table1_precompute
+
+# Compiling the kernels takes longer than a unit test may.
+pytestmark = pytest.mark.system
 
 RANKS = (12, 5, 10)
 # Sums of a hundred products in another order, in float64.
@@ -14,32 +17,32 @@ EXACT = 1e-9
 
 @pytest.fixture(scope="module")
 def question(made):
-    return table1_pose.asked(made, 40)
+    return poses.questions(made, 40)
 
 
 @pytest.fixture(scope="module")
 def field(made):
-    fitter = table1_precompute.FITS["our own linearised grid search"]
-    return table1_precompute.naive(made, fitter)
+    fitter = precomputation.FITS["our own linearised grid search"]
+    return precomputation.naive(made, fitter)
 
 
 def test_compiled_poses_are_those_of_the_decoder(made, question):
-    reduced, own = table1_precompute.ours(made, RANKS)
+    reduced, own = precomputation.ours(made, RANKS)
     tensor = made.trained.tensor
     decoder = Decoder(reduced, tensor.mean, tensor.unwhiten, tensor.chart.means)
-    found = table1_pose.ours(made, reduced, own, question)()
+    found = poses.ours(made, reduced, own, question)()
 
     def expected(points, places):
-        poses = decoder.reduced_poses(own.predict(points), places[:, None])[:, 0]
-        return (decoder.mean + poses @ decoder.directions)[:, made.varies]
+        reduced_poses = decoder.reduced_poses(own.predict(points), places[:, None])[:, 0]
+        return (decoder.mean + reduced_poses @ decoder.directions)[:, made.varies]
 
     assert np.abs(found - expected(question.points, question.places)).max() < EXACT
     assert np.abs(found - expected(question.points, question.frames)).max() > 1e-4
 
 
-@pytest.mark.parametrize("form", table1_pose.FORMS)
+@pytest.mark.parametrize("form", poses.FORMS)
 def test_compiled_naive_poses_are_those_of_naive_kriging(made, question, field, form):
-    found = table1_pose.naive(field, question)[form]()
+    found = poses.naive(field, question)[form]()
     frames, each = field.numpy(question.points), np.arange(len(question.points))
     before = question.frames.astype(int)
     share = (question.places - before)[:, None]
@@ -52,22 +55,20 @@ def test_compiled_naive_poses_are_those_of_naive_kriging(made, question, field, 
 
 
 def test_a_call_answers_the_same_again(made, question, field):
-    answer = table1_pose.naive(field, question)["dual, on a frame"]
+    answer = poses.naive(field, question)["dual, on a frame"]
     first = answer().copy()
     assert np.array_equal(first, answer())
 
 
 def test_solve_is_what_the_system_says(rng):
     system, b = rng.normal(size=(9, 9)), rng.normal(size=9)
-    (columns, order, inverse), out = table1_pose._factors(system[None]), np.zeros(9)
+    (columns, order, inverse), out = poses.lu_factors(system[None]), np.zeros(9)
     kernels.solve(np.ascontiguousarray(columns[0]), order[0], inverse[0], b, out)
     assert np.abs(system @ out - b).max() < 1e-12
     assert len(set(order[0])) == 9 and list(order[0]) != list(range(9)), "rows change places"
 
 
 def test_timing_takes_turns_and_the_median():
-    from model_export.evaluate.table1_timing import in_turn
-
     called = []
     runs = {name: lambda name=name: called.append(name) for name in "ab"}
     taken = in_turn(runs, rounds=3, repeats=2)

@@ -1,0 +1,93 @@
+"""Trained models of the fixtures, each built once and cached by `fixture_cache`."""
+
+import functools
+import tomllib
+from pathlib import Path
+
+import fixture_cache
+
+from model_export import export, ingest, recipe, train
+from model_export.export import Exported
+from model_export.ingest import Example
+from model_export.recipe import Recipe
+from model_export.sample import stroll, write
+from model_export.train import Trained
+
+
+def family() -> Path:
+    """Return the folder of the whole procedural family; its recipe is recipe.toml."""
+    return fixture_cache.path("family", write.family)
+
+
+@functools.cache
+def small_recipe() -> Recipe:
+    """Return the recipe of the family at few frames, which trains in a few seconds."""
+    whole = recipe.read(family() / "recipe.toml")
+    motion = whole.motion.model_copy(update={"frames": 40})
+    return whole.model_copy(update={"motion": motion})
+
+
+@functools.cache
+def labelled_recipe() -> Recipe:
+    """Return the small recipe with its three performers told apart, and one kernel to fit."""
+    told = {"label": "performer", "covariance": "matern52", "drift": 1}
+    kriging = small_recipe().kriging.model_copy(update=told)
+    return small_recipe().model_copy(update={"kriging": kriging})
+
+
+@functools.cache
+def measured_recipe() -> Recipe:
+    """Return the recipe of the procedural walk with its speed and turn measured."""
+    measured = [
+        {"name": name, "auto": {"quantity": name}, "description": name}
+        for name in ("speed", "turn")
+    ]
+    return Recipe.model_validate({**tomllib.loads(stroll.TOML), "controls": measured})
+
+
+RECIPES = {
+    "reaching": small_recipe,
+    "labelled": labelled_recipe,
+    "stroll": stroll.recipe,
+    "measured": measured_recipe,
+}
+
+
+def strides_folder() -> Path:
+    """Return the folder of the procedural walk's strides and the table strides.csv."""
+    return fixture_cache.path("strides", _write_strides)
+
+
+@functools.cache
+def reaches() -> list[Example]:
+    """Return every second clip of the family."""
+    return fixture_cache.value("reaches", lambda: ingest.ingest(small_recipe(), family())[0][::2])
+
+
+def examples(model: str) -> list[Example]:
+    """Return the clips that a model is trained on."""
+    if model in ("reaching", "labelled"):
+        return reaches()
+    return ingest.ingest(RECIPES[model](), strides_folder())[0]
+
+
+@functools.cache
+def trained(model: str) -> Trained:
+    """Return a small model, trained."""
+    return fixture_cache.value(
+        f"{model}-trained",
+        lambda: train.train(RECIPES[model](), examples(model), lambda _: None),
+    )
+
+
+@functools.cache
+def exported(model: str) -> Exported:
+    """Return a small model with its levels of detail and the content of its file."""
+    return fixture_cache.value(
+        f"{model}-exported", lambda: export.export(RECIPES[model](), trained(model), [])
+    )
+
+
+def _write_strides(folder: Path) -> None:
+    folder.mkdir()
+    stroll.write(folder)

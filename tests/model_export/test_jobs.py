@@ -1,0 +1,67 @@
+"""Tests of jobs in local processes."""
+
+import os
+import time
+
+import pytest
+
+from model_export.jobs import Processes
+from service.motion.errors import TrainingError
+
+
+def divide(dividend, divisor):
+    if divisor == 0:
+        raise TrainingError("divided by 0")
+    return dividend // divisor, os.getpid()
+
+
+def wait(seconds):
+    time.sleep(seconds)
+    return seconds
+
+
+def test_one_process_runs_jobs_here_and_in_order():
+    found = list(Processes(1).run(divide, [(1,), (2,), (3,)], (12,)))
+    assert found == [(12, os.getpid()), (6, os.getpid()), (4, os.getpid())]
+
+
+def test_a_single_job_needs_no_other_process():
+    assert list(Processes(8).run(divide, [(3,)], (12,))) == [(4, os.getpid())]
+
+
+def test_no_jobs_have_no_results():
+    assert list(Processes().run(divide, [])) == []
+
+
+def test_arguments_are_read_as_jobs_are_started():
+    read = []
+
+    def arguments():
+        for seconds in range(50):
+            read.append(seconds)
+            yield (0,)
+
+    results = Processes(1).run(wait, arguments())
+    assert next(results) == 0
+    assert len(read) < 5
+    assert len(list(results)) == 49
+
+
+def test_an_error_in_a_job_is_raised():
+    with pytest.raises(TrainingError, match="divided by 0"):
+        list(Processes(1).run(divide, [(1,), (0,), (2,)], (12,)))
+
+
+@pytest.mark.system
+def test_more_processes_share_the_jobs_and_the_first_result_comes_first():
+    jobs = [(1.5,), (0.01,), (0.02,), (0.03,)]
+    found = list(Processes(2).run(wait, jobs))
+    assert sorted(found) == sorted(own for (own,) in jobs)
+    # The longest job began first.
+    assert found[-1] == 1.5
+
+
+@pytest.mark.system
+def test_an_error_in_another_process_is_raised():
+    with pytest.raises(TrainingError, match="divided by 0"):
+        list(Processes(2).run(divide, [(1,), (0,), (2,)], (12,)))

@@ -1,0 +1,26 @@
+"""Layer format that counts its writers' calls."""
+
+from collections import Counter
+
+from service.encode import crate
+from service.encode.content import Author, Content, Pattern
+from service.encode.press import Form, Template
+
+
+class Counted:
+    """Layers of a form; calls: how many were written by usd-core, and how many templates made."""
+
+    def __init__(self, form: Form = crate) -> None:
+        self.form = form
+        self.calls = Counter[str]()
+
+    def pattern(self, author: Author, content: Content) -> Pattern:
+        return self.form.pattern(author, content)
+
+    def ordinary(self, author: Author, content: Content) -> bytes:
+        self.calls["ordinary"] += 1
+        return self.form.ordinary(author, content)
+
+    def template(self, author: Author, content: Content, pattern: Pattern) -> Template | None:
+        self.calls["template"] += 1
+        return self.form.template(author, content, pattern)

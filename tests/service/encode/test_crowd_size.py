@@ -1,0 +1,35 @@
+"""Tests of the predicted sizes of crowds: never below the real sizes."""
+
+import conftest
+import crowds
+import pytest
+
+from service.encode.crowd import INSTANCING, STREAMS, crowd_size, writer
+from service.encode.crowd.crowd_size import Counts
+
+# Characters, motions, frames.
+SHAPES = [(1, 1, 2), (1, 1, 200), (40, 2, 2), (12, 12, 30)]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("instancing", INSTANCING)
+@pytest.mark.parametrize("ending", STREAMS)
+def test_a_file_is_no_larger_than_said(ending, instancing, shape):
+    characters, motions, frames = shape
+    person = conftest.person()
+    made = crowds.motions(person, motions, frames)
+    crowd = crowds.crowd(person, made, [index % motions for index in range(characters)])
+    size = sum(map(len, writer.stream(crowd, ending, instancing)))
+    said = crowd_size.file(
+        Counts(len(person), characters, motions, frames), ending, instancing == "flatten"
+    )
+    # Of what each file begins with nothing is said.
+    assert size - 40_000 < said
+
+
+def test_a_package_is_as_large_as_its_largest_layer():
+    long, many = Counts(31, 1, 1, 36_000), Counts(31, 100_000, 1, 2)
+    assert crowd_size.layer(long, "usdz", False) == pytest.approx(36_000 * 31 * 28, rel=0.1)
+    assert crowd_size.layer(many, "usdz", False) == 100_000 * crowd_size.CHARACTER
+    ten = Counts(31, 10, 10, 3_600)
+    assert crowd_size.layer(ten, "usdc", False) > 9 * crowd_size.layer(ten, "usdz", False)

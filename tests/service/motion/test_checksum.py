@@ -1,0 +1,49 @@
+"""Tests of the checksum at the end of a file: every single-bit change is detected."""
+
+import hashlib
+
+import onnx
+import pytest
+
+from service.motion import checksum
+
+CONTENT = bytes(range(256)) * 4
+
+
+def test_a_sealed_file_holds_and_begins_as_before():
+    whole = checksum.sealed(CONTENT)
+    assert checksum.holds(whole)
+    assert whole[: -checksum.SIZE] == CONTENT
+    assert whole.endswith(hashlib.sha256(CONTENT).hexdigest().encode())
+    assert checksum.holds(checksum.sealed(b""))
+
+
+def test_every_bit_counts():
+    whole = checksum.sealed(CONTENT)
+    for place in range(8 * len(whole)):
+        damaged = bytearray(whole)
+        damaged[place // 8] ^= 1 << place % 8
+        assert not checksum.holds(bytes(damaged))
+
+
+@pytest.mark.parametrize("cut", [1, 10, checksum.SIZE - 1, checksum.SIZE, checksum.SIZE + 1, 1000])
+def test_a_file_that_is_cut_does_not_hold(cut):
+    whole = checksum.sealed(CONTENT)
+    assert not checksum.holds(whole[:-cut])
+    assert not checksum.holds(whole[cut:])
+
+
+@pytest.mark.parametrize("content", [b"", b"x", CONTENT, checksum.sealed(CONTENT) + b"\n"])
+def test_a_file_without_a_checksum_does_not_hold(content):
+    assert not checksum.holds(content)
+
+
+def test_the_checksum_is_metadata_of_an_onnx_file(model_path):
+    """Other engines read past it."""
+    content = model_path.read_bytes()
+    model = onnx.load_from_string(content)
+    onnx.checker.check_model(model, full_check=True)
+    last = model.metadata_props[-1]
+    assert last.key == checksum.KEY.decode()
+    assert last.value == hashlib.sha256(content[: -checksum.SIZE]).hexdigest()
+    assert model.SerializeToString(deterministic=True) == content

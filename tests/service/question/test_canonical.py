@@ -1,0 +1,30 @@
+"""Tests of canonical questions: independent of form and order."""
+
+import json
+
+import pytest
+
+from service.question import body, words
+from service.question.model_question import SigmaQuestion, WhyQuestion
+from service.question.motion_question import FileQuestion, PoseQuestion
+
+PAIRS = [("turn", "20"), ("stature", "1.7")]
+BODY = {"controls": {"stature": 1.7, "turn": 20}}
+GRID = {"across": "a", "along": "b", "rows": 3}
+CASES = {
+    PoseQuestion: ([("time", "0.5")], {"times": [0.5]}),
+    FileQuestion: ([("fps", "25")], {"fps": 25}),
+    WhyQuestion: ([("nearest", "3")], {"nearest": 3.0}),
+    SigmaQuestion: ([(name, str(value)) for name, value in GRID.items()], GRID),
+}
+
+
+@pytest.mark.parametrize("form", CASES)
+def test_every_way_to_ask_is_one_question(form):
+    pairs, rest = [*PAIRS, *CASES[form][0]], {**BODY, **CASES[form][1]}
+    first = words.question(form, pairs)
+    assert words.question(form, pairs[::-1]) == first
+    assert body.question(form, json.dumps(rest).encode()) == first
+    assert body.question(form, json.dumps(dict(reversed(rest.items()))).encode()) == first
+    other = [(key, "1.8" if key == "stature" else text) for key, text in pairs]
+    assert words.question(form, other) != first

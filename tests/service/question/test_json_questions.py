@@ -1,0 +1,111 @@
+"""Tests of msgspec errors as JSON pointers, in linear time."""
+
+import json
+import time
+from typing import Annotated
+
+import msgspec
+import pytest
+
+from service.motion.errors import FormError
+from service.question import body as bodies
+from service.question.motion_question import ClipsQuestion, FileQuestion
+
+
+class Inner(msgspec.Struct, forbid_unknown_fields=True):
+    """One of several things in a body."""
+
+    size: Annotated[float, msgspec.Meta(ge=0)]
+
+
+class Outer(msgspec.Struct, forbid_unknown_fields=True):
+    """A body."""
+
+    inner: list[Inner]
+    name: str = ""
+
+
+def pointer(content):
+    with pytest.raises(FormError) as caught:
+        bodies.question(Outer, json.dumps(content).encode())
+    return f"/{caught.value.field}" if caught.value.field else ""
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ({"inner": [], "frames": 3}, "/frames"),
+        ({}, "/inner"),
+        ({"inner": 3}, "/inner"),
+        ({"inner": [{"size": 1}, {"size": -1}]}, "/inner/1/size"),
+        ({"inner": [{"size": 1, "x": 1}]}, "/inner/0/x"),
+        ({"inner": [{}]}, "/inner/0/size"),
+        ([], ""),
+        ({"inner": [], "a/b~c": 1}, "/a~1b~0c"),
+        ({"inner": [], "line\nfeed`": 1}, "/line\nfeed`"),
+        ({"inner": [], "field `x` - ": 1}, "/field `x` - "),
+    ],
+)
+def test_a_complaint_leads_to_its_place(content, expected):
+    assert pointer(content) == expected
+
+
+def seconds(count):
+    body = {"field `" * count + "\n": 1}
+    begun = time.process_time()
+    pointer(body)
+    return time.process_time() - begun
+
+
+def test_a_long_key_takes_no_time_that_grows_with_its_square():
+    # 32 times as long: 1,024 times the time for an expression that backtracks, 32 for none.
+    short = min(seconds(4_000) for _ in range(5))
+    assert min(seconds(128_000) for _ in range(3)) < 200 * max(short, 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("form", "content", "path", "said"),
+    [
+        (
+            FileQuestion,
+            '{"controls":{"a":1,"b":"x"}}',
+            "controls/b",
+            "Expected `float`, got `str` 'x'",
+        ),
+        (
+            FileQuestion,
+            '{"controls":{"a":1,"b":[]}}',
+            "controls/b",
+            "Expected `float`, got `array`",
+        ),
+        (FileQuestion, '{"controls":{"a":1e400}}', "controls/a", "Number out of range"),
+        (FileQuestion, '{"controls":{},"level":0.5}', "level", "Expected `int`, got `float` 0.5"),
+        (FileQuestion, '{"controls":{},"loop":1}', "loop", "Expected `bool`, got `int` 1"),
+        (FileQuestion, "{", "", "expected UTF-8 JSON; Input data was truncated"),
+        (FileQuestion, "[" * 100_000, "", "Expected `object`, got `array`"),
+        (
+            ClipsQuestion,
+            '{"format":"bvh","clips":[{"controls":{}},{"controls":{"a":true}}]}',
+            "clips/1/controls/a",
+            "Expected `float`, got `bool` True",
+        ),
+        (
+            FileQuestion,
+            '{"controls":{},"targets":[{"joint":"a","position":[0,0,0]}]}',
+            "targets/0",
+            "neither time nor at, expected one of them",
+        ),
+    ],
+)
+def test_a_body_that_is_no_question_is_named(form, content, path, said):
+    with pytest.raises(FormError) as caught:
+        bodies.question(form, content.encode())
+    assert caught.value.field == path and caught.value.message == said
+    assert str(caught.value) == (f"{path}: {said}" if path else said)
+
+
+def test_whole_numbers_may_be_written_as_json_writes_them():
+    for level in ("1", "1.0", "10e-1"):
+        body = f'{{"controls":{{"a":1.0}},"level":{level}}}'.encode()
+        found = bodies.question(FileQuestion, body)
+        assert found == FileQuestion(controls={"a": 1.0}, level=1) and type(found.level) is int

@@ -1,0 +1,143 @@
+"""Tests of targets and exact controls as text and as plain values."""
+
+import msgspec
+import pytest
+
+from service.motion.errors import FormError, InvalidField
+from service.question import words
+from service.question.model_question import SigmaQuestion, WhyQuestion
+from service.question.motion_question import FileQuestion, PoseQuestion, Target
+from service.question.walk_question import WalkQuestion
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("rhand@end:0.3,1.2,-0.4", Target("rhand", (0.3, 1.2, -0.4), at="end")),
+        ("rhand@0.8:1,2,3", Target("rhand", (1, 2, 3), time=0.8)),
+        (
+            "mixamorig:Hand@farthest:1e-3,0,0",
+            Target("mixamorig:Hand", (0.001, 0, 0), at="farthest"),
+        ),
+        ("a@b@event:0,0,0", Target("a@b", (0, 0, 0), at="event")),
+        ("左手@-1:0,0,0", Target("左手", (0, 0, 0), time=-1.0)),
+    ],
+)
+def test_words_are_targets(text, expected):
+    assert words.target(text) == expected
+    assert words.target("=".join(text.rsplit(":", 1))) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "rhand",
+        "rhand@end",
+        "@end:0,0,0",
+        "rhand:0,0,0",
+        "rhand@:0,0,0",
+        "rhand@soon:0,0,0",
+        "rhand@end:0,0",
+        "rhand@end:0,0,0,0",
+        "rhand@end:0,0,nan",
+        "rhand@end:0,0,1e999",
+        "rhand@end:0,0, 1",
+        "rhand@1_0:0,0,0",
+    ],
+)
+def test_other_words_are_none(text):
+    with pytest.raises(ValueError, match="expected JOINT@MOMENT:X,Y,Z, m; a moment is seconds or"):
+        words.target(text)
+
+
+HAND = {"joint": "hand", "position": [0, 1.5, 2], "time": 1}
+
+
+def test_plain_values_are_targets():
+    found = msgspec.convert(HAND, Target)
+    assert found == Target("hand", (0.0, 1.5, 2.0), time=1) and found.when == 1.0
+    at = {"joint": "hand", "position": [0, 1, 2], "at": "lowest"}
+    assert msgspec.convert(at, Target) == Target("hand", (0.0, 1.0, 2.0), at="lowest")
+    assert msgspec.convert(at, Target).when == "lowest"
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        None,
+        [],
+        "hand@end:0,0,0",
+        {**HAND, "joint": 3},
+        {**HAND, "position": [0, 1]},
+        {**HAND, "position": [0, 1, True]},
+        {**HAND, "position": "0,1,2"},
+        {**HAND, "at": "end"},
+        {**HAND, "frame": 3},
+        {**HAND, "time": None},
+        {"joint": "hand", "position": [0, 1, 2]},
+        {"joint": "hand", "position": [0, 1, 2], "at": "soon"},
+        {"joint": "hand", "position": [0, 1, 2], "at": ["end"]},
+    ],
+)
+def test_other_values_are_none(found):
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(found, Target)
+
+
+def test_exact_controls_in_words():
+    assert words.exact("auto") == "auto"
+    assert words.exact("none") == "none"
+    assert words.exact("speed") == ("speed",)
+    assert words.exact("speed,turn") == ("speed", "turn")
+    for text in ("", ",", "speed,"):
+        with pytest.raises(ValueError, match="expected auto, none or names"):
+            words.exact(text)
+
+
+def test_a_name_that_is_no_parameter_is_a_control():
+    pairs = [("turn", "3"), ("fps", "24"), ("loop", "true"), ("unit", "cm")]
+    pairs += [("target", "a@end:1,2,3"), ("target", "b@0.5:1,2,3")]
+    found = words.question(FileQuestion, pairs)
+    targets = (Target("a", (1, 2, 3), at="end"), Target("b", (1, 2, 3), time=0.5))
+    assert found == FileQuestion(
+        controls={"turn": 3}, fps=24, loop=True, unit="cm", targets=targets
+    )
+    assert found.corrects and not words.question(FileQuestion, [("turn", "3")]).corrects
+
+
+@pytest.mark.parametrize(
+    ("form", "pairs", "said"),
+    [
+        (PoseQuestion, [], "time: missing, expected seconds from the start"),
+        (PoseQuestion, [("time", "0"), ("turn", "1"), ("turn", "2")], "turn: given twice"),
+        (PoseQuestion, [("time", "0"), ("level", "1"), ("level", "1")], "level: given twice"),
+        (PoseQuestion, [("time", "nan")], "time: 'nan', expected a finite number"),
+        (PoseQuestion, [("time", "0"), ("turn", "1_0")], "turn: '1_0', expected a finite number"),
+        (PoseQuestion, [("time", "0"), ("level", "1.0")], "level: '1.0', expected a whole number"),
+        (FileQuestion, [("up", "x")], "up: 'x', expected one of y, z"),
+        (FileQuestion, [("loop", "1")], "loop: '1', expected one of true, false"),
+        (FileQuestion, [("exact", "")], "exact: '', expected auto, none or names"),
+        (SigmaQuestion, [("across", "a")], "along: missing, expected the name of a control"),
+        (WhyQuestion, [("nearest", "x")], "nearest: 'x', expected a whole number"),
+        (WalkQuestion, [("camera", "1,2")], "camera: '1,2', expected x,y,z in metres"),
+    ],
+)
+def test_words_that_are_no_question_are_named(form, pairs, said):
+    with pytest.raises(FormError, match=said):
+        words.question(form, pairs)
+
+
+@pytest.mark.parametrize(
+    ("form", "pairs", "field"),
+    [
+        (SigmaQuestion, [("across", "a"), ("along", "a")], "along"),
+        (SigmaQuestion, [("across", "a"), ("along", "b"), ("rows", "1")], "rows"),
+        (WhyQuestion, [("nearest", "0")], "nearest"),
+        (WalkQuestion, [("fov", "1")], "fov"),
+    ],
+)
+def test_a_question_checks_itself(form, pairs, field):
+    with pytest.raises(InvalidField) as fault:
+        words.question(form, pairs)
+    assert fault.value.field == field

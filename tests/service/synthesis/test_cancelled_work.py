@@ -1,0 +1,131 @@
+"""Tests of cancellation in all long computations: repeated checks, and an early end."""
+
+import json
+from contextvars import copy_context
+
+import pytest
+
+from service.encode import ENCODERS
+from service.encode.crowd import writer
+from service.export import pack
+from service.motion import cancel
+from service.motion.cancel import Cancellation, Cancelled
+from service.question import body as bodies
+from service.question.model_question import SigmaQuestion, SuggestQuestion
+from service.question.motion_question import ClipQuestion, FileQuestion
+from service.synthesis import clips, crowd, library
+from service.synthesis.grid import grid
+from service.synthesis.suggest import suggest
+from service.synthesis.walk import gait, order
+from service.synthesis.walk.order import Order
+from service.web import clips_query, crowd_query
+from service.web.settings import Settings
+
+
+class Counted(Cancellation):
+    """Counts how often the work looks at it; cancelled from look number `last` on."""
+
+    def __init__(self, last):
+        super().__init__()
+        self.looks, self.last = 0, last
+
+    def check(self):
+        self.looks += 1
+        if self.looks >= self.last:
+            self.cancel()
+        super().check()
+
+
+@pytest.fixture(scope="module")
+def reaching(model_path):
+    return library.load([model_path]).models["reaching"]
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path):
+    return library.load([walk_path]).models["stroll"]
+
+
+def controls(model):
+    return {control.name: control.default for control in model.session.card.controls}
+
+
+def contradictory(count):
+    return [
+        {"joint": "RightHand", "time": 0.01 * i, "position": [(-1) ** i, 1.0, 1.0]}
+        for i in range(count)
+    ]
+
+
+def solved(model, walk):
+    """A clip with targets that contradict each other."""
+    body = json.dumps({"controls": controls(model), "targets": contradictory(8)}).encode()
+    return clips.clip(model, bodies.question(FileQuestion, body))
+
+
+def solved_open(model, walk):
+    """The same where the controls are left open."""
+    body = json.dumps({"controls": {}, "targets": contradictory(8)}).encode()
+    return clips.clip(model, bodies.question(FileQuestion, body))
+
+
+def mapped(model, walk):
+    """A grid of sigma."""
+    return grid(model, SigmaQuestion(across="turn", along="target_height", columns=128, rows=128))
+
+
+def suggested(model, walk):
+    """Suggestions."""
+    return suggest(model, SuggestQuestion(count=20))
+
+
+def archived(model, walk):
+    """An archive of clips."""
+    asked = {"format": "usdc", "clips": [{"controls": controls(model)}] * 20}
+    found = clips_query.order(model, ENCODERS, json.dumps(asked).encode(), Settings())
+    return list(pack.members(found))
+
+
+def crowded(model, walk):
+    """Poses of a crowd."""
+    asked = {"controls": controls(model), "time": [0.1] * 20_000}
+    return crowd.poses(model, crowd_query.of_body(json.dumps(asked).encode(), 1e6))
+
+
+def planned(model, walk):
+    """The plan of a crowd that walks."""
+    return order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=10.0))
+
+
+def walked(model, walk):
+    """A crowd that walks, as USD."""
+    made = order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=1.0))
+    return list(writer.stream(made, "usdc"))
+
+
+def several(model, walk):
+    """Several clips, written together."""
+    answers = [clips.clip(model, ClipQuestion(controls=controls(model)))] * 8
+    return ENCODERS["usda"].write(answers, ENCODERS["usda"].usual)
+
+
+WORK = [solved, solved_open, mapped, suggested, archived, crowded, planned, walked, several]
+
+
+@pytest.mark.parametrize("work", WORK, ids=lambda work: work.__name__)
+@pytest.mark.parametrize("last", [1, 6])
+def test_work_stops_when_it_is_cancelled(work, last, reaching, walk):
+    own, context = Counted(last), copy_context()
+    context.run(cancel.current.set, own)
+    with pytest.raises(Cancelled):
+        context.run(work, reaching, walk)
+    # Several threads of one crowd may look before the first of them has ended.
+    assert last <= own.looks <= last + 8
+
+
+@pytest.mark.parametrize("work", [solved, mapped, walked], ids=lambda work: work.__name__)
+def test_work_that_is_not_cancelled_goes_on(work, reaching, walk):
+    own, context = Counted(10**9), copy_context()
+    context.run(cancel.current.set, own)
+    assert context.run(work, reaching, walk) is not None
+    assert own.looks > 6

@@ -1,0 +1,88 @@
+"""Tests of durations that clients round to float32: the end of a clip stays valid."""
+
+import numpy as np
+import pytest
+
+from service.motion.errors import InvalidField
+from service.question.motion_question import ClipQuestion, PoseQuestion, Target
+from service.synthesis import clips, library, poses
+from service.synthesis.synthesizer import Synthesizer
+
+POINTS = 40
+# Single precision has 24 bits: two steps above a number lie beyond its rounding.
+STEPS = 2
+
+
+@pytest.fixture(scope="module", params=["model_path", "walk_path"])
+def model(request) -> Synthesizer:
+    path = request.getfixturevalue(request.param)
+    return library.load([path]).models[path.stem]
+
+
+def sampled(model, rng):
+    """Controls within what was sampled."""
+    found = {c.name: rng.uniform(c.minimum, c.maximum) for c in model.session.card.controls}
+    return {name: float(value) for name, value in found.items()}
+
+
+def pose(model, controls, *times, **more):
+    return poses.pose(model, PoseQuestion(controls=controls, times=times, extrapolate="ok", **more))
+
+
+def as_float32(number):
+    """The number as a client writes it that keeps float32: in the fewest digits that tell it."""
+    return float(str(np.float32(number)))
+
+
+def assert_same_poses(a, b):
+    assert np.array_equal(a.times, b.times)
+    assert a.rotations.tobytes() == b.rotations.tobytes()
+    assert a.root_position.tobytes() == b.root_position.tobytes()
+
+
+def test_a_duration_as_float32_is_the_duration(model, rng):
+    above = 0
+    for controls in (sampled(model, rng) for _ in range(POINTS)):
+        duration = pose(model, controls, 0.0).trust.duration
+        written = as_float32(duration)
+        above += written > duration
+        end = pose(model, controls, written)
+        assert end.times.tolist() == [min(written, duration)]
+        if written > duration:
+            assert_same_poses(end, pose(model, controls, duration))
+        whole = clips.clip(model, ClipQuestion(controls=controls, end=written)).clip
+        assert len(whole) == len(clips.clip(model, ClipQuestion(controls=controls)).clip)
+        last = clips.clip(model, ClipQuestion(controls=controls, start=written)).clip
+        assert len(last) == 1
+    # Negative control: without slack these would have been refused.
+    assert above > POINTS / 10
+
+
+def test_a_held_motion_takes_its_duration_as_float32(model, rng):
+    feet = model.session.card.skeleton.names[-1]
+    hold = {"exact": "none", "targets": (Target(feet, (0.0, 0.3, 0.3), at="start"),)}
+    for controls in (sampled(model, rng) for _ in range(4)):
+        duration = pose(model, controls, 0.0, **hold).trust.duration
+        written = np.nextafter(duration, np.inf)
+        assert_same_poses(
+            pose(model, controls, float(written), **hold),
+            pose(model, controls, duration, **hold),
+        )
+
+
+@pytest.mark.parametrize("field", ["times/1", "end", "start"])
+def test_what_is_later_is_refused_in_digits_that_differ(model, rng, field):
+    controls = sampled(model, rng)
+    duration = pose(model, controls, 0.0).trust.duration
+    late = np.float32(duration)
+    for _ in range(STEPS):
+        late = np.nextafter(late, np.float32(np.inf))
+    with pytest.raises(InvalidField) as caught:
+        if field == "times/1":
+            pose(model, controls, 0.0, float(late))
+        else:
+            clips.clip(model, ClipQuestion(controls=controls, **{field: float(late)}))
+    assert caught.value.field == field
+    found, _, bound = caught.value.message.partition(" s, expected 0 to ")
+    assert float(found) > float(bound.removesuffix(" s"))
+    assert np.float32(float(found)) == late and np.float32(float(bound[:-2])) == duration

@@ -1,0 +1,179 @@
+"""Tests of damaged model files: refused before onnxruntime reads them."""
+
+import json
+import os
+
+import onnx
+import pytest
+from model_files import numbered, written
+
+from service.motion import checksum
+from service.motion.errors import ModelError
+from service.synthesis import model_file
+
+DAMAGED = 500
+
+
+@pytest.fixture(scope="module")
+def content(labelled_path):
+    return labelled_path.read_bytes()
+
+
+def refusal(content):
+    with pytest.raises(ModelError) as caught:
+        model_file.checked(content, "some.onnx")
+    assert caught.value.path == "some.onnx"
+    assert "\n" not in caught.value.message
+    return caught.value.message
+
+
+def test_a_good_file_passes(content):
+    card = model_file.checked(content, "some.onnx")
+    assert model_file.checked(numbered(content, 7), "other").name == card.name
+
+
+def flipped(content, rng):
+    """One bit."""
+    damaged = bytearray(content)
+    damaged[rng.integers(len(content))] ^= 1 << rng.integers(8)
+    return bytes(damaged)
+
+
+def cut(content, rng):
+    """A piece is missing, at the end or within."""
+    start = rng.integers(len(content))
+    end = len(content) if rng.random() < 0.5 else rng.integers(start, len(content)) + 1
+    return content[:start] + content[end:]
+
+
+def spliced(content, rng):
+    """A piece stands in place of another."""
+    size = rng.integers(1, 2000)
+    start, other = rng.integers(0, len(content) - size, 2)
+    return content[:start] + content[other : other + size] + content[start + size :]
+
+
+@pytest.mark.parametrize("damage", [flipped, cut, spliced])
+def test_every_damaged_file_is_refused(content, rng, damage):
+    tried = 0
+    while tried < DAMAGED:
+        damaged = damage(content, rng)
+        if damaged != content:
+            tried += 1
+            assert refusal(damaged) == model_file.UNSEALED
+
+
+def test_a_file_that_another_program_has_changed_is_refused(content):
+    """As optimizers do it: the same answers, another graph."""
+    model = onnx.load_from_string(content)
+    model.graph.name = "optimized"
+    assert refusal(model.SerializeToString()) == model_file.UNSEALED
+    model.metadata_props.add(key="optimizer", value="1.0")
+    assert refusal(model.SerializeToString()) == model_file.UNSEALED
+
+
+@pytest.mark.parametrize("after", [b"\n", onnx.ModelProto(producer_name="x").SerializeToString()])
+def test_bytes_after_the_checksum_are_refused(content, after):
+    assert refusal(content + after) == model_file.UNSEALED
+
+
+def test_a_file_from_before_checksums_is_refused(content):
+    assert refusal(content[: -checksum.SIZE]) == model_file.UNSEALED
+
+
+def test_a_foreign_model_is_refused():
+    foreign = onnx.ModelProto(producer_name="other", ir_version=8).SerializeToString()
+    assert refusal(foreign) == model_file.UNSEALED
+    said = "no posefield metadata: it was not written by posefield"
+    assert refusal(checksum.sealed(foreign + graph_of_nothing())) == said
+
+
+def graph_of_nothing():
+    opset = onnx.helper.make_opsetid("", 18)
+    model = onnx.ModelProto(graph=onnx.GraphProto(name="g"), opset_import=[opset])
+    return model.SerializeToString()
+
+
+@pytest.mark.parametrize("found", [b"", b"no model", bytes(range(256)) * 8, b"\0" * 4096])
+def test_something_else_is_refused(found):
+    assert refusal(found) == model_file.UNSEALED
+    assert refusal(checksum.sealed(found)) != model_file.UNSEALED
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda m: m.graph.node.add(op_type="Loop"),
+            "its graph has an operator 'Loop', which posefield does not use",
+        ),
+        (
+            lambda m: setattr(entry(m, "rate"), "value", "null"),
+            "its card's entry 'rate' is wrong: Expected `float`, got `null`",
+        ),
+        (
+            lambda m: setattr(entry(m, "frames"), "value", "41"),
+            "its card's diagnostics.tensor is (94, 40, 46), expected 41 frames and 46 clips",
+        ),
+        (
+            lambda m: setattr(entry(m, "performers"), "value", '["a", "b", "c", "d"]'),
+            "its graph's constant 'performer' has shape (1, 3), expected (1, 4) by its card",
+        ),
+    ],
+)
+def test_a_checksum_does_not_make_a_wrong_file_right(content, change, said):
+    model = onnx.load_from_string(content)
+    change(model)
+    assert refusal(written(model)) == said
+
+
+def entry(model, key):
+    return next(prop for prop in model.metadata_props if prop.key == f"posefield.{key}")
+
+
+def test_a_graph_without_the_values_that_corrections_need_is_refused(content):
+    model = onnx.load_from_string(content)
+    for node in model.graph.node:
+        for names in (node.input, node.output):
+            names[:] = ["other" if name == "coefficients" else name for name in names]
+    assert refusal(written(model)) == "its graph computes no value 'coefficients', expected one"
+
+
+def test_a_skeleton_of_other_joints_than_the_graph_is_refused(content):
+    model = onnx.load_from_string(content)
+    plain = json.loads(entry(model, "skeleton").value)
+    plain["names"].append("extra")
+    plain["parents"].append(0)
+    plain["offsets"].append([0.0, 0.1, 0.0])
+    entry(model, "skeleton").value = json.dumps(plain)
+    assert refusal(written(model)) == "its card's joint_sigma has 33 entries, expected 34"
+
+
+def test_a_file_is_read(tmp_path, content):
+    (tmp_path / "good.onnx").write_bytes(content)
+    assert model_file.read(tmp_path / "good.onnx") == content
+
+
+def unreadable(path):
+    with pytest.raises(ModelError) as caught:
+        model_file.read(path)
+    return caught.value.message
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.onnx")
+    (tmp_path / "endless.onnx").symlink_to("/dev/zero")
+    for name in ("pipe", "endless"):
+        assert unreadable(tmp_path / f"{name}.onnx") == "cannot be read: not a regular file"
+    assert unreadable(tmp_path) == "cannot be read: Is a directory"
+    assert unreadable(tmp_path / "none.onnx") == "cannot be read: No such file or directory"
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path):
+    path = tmp_path / "large.onnx"
+    with path.open("wb") as file:
+        # It takes no room on the disk.
+        file.truncate(100 << 30)
+    said = "cannot be read: 107374182400 bytes, expected at most 67108864"
+    assert unreadable(path) == said
+    assert "expected at most 67108864" in refusal(bytes(model_file.MOST_BYTES + 1))

@@ -1,0 +1,157 @@
+"""Tests of the ONNX check: files of posefield pass, other content is refused by name."""
+
+import functools
+
+import model_files
+import onnx
+import pytest
+from onnx import TensorProto
+
+from model_export.covariance import COVARIANCES
+from model_export.net import Net
+from service.motion import checksum
+from service.motion.errors import ModelError
+from service.synthesis import model_file, onnx_check
+
+MODELS = ("model_path", "labelled_path", "walk_path", "measured_walk_path")
+
+
+@pytest.fixture
+def model(model_path):
+    """The good model, to be changed."""
+    return onnx.load(model_path)
+
+
+def refusal(model):
+    content = model if isinstance(model, bytes) else model.SerializeToString()
+    with pytest.raises(ValueError) as caught:
+        onnx_check.check(content)
+    return str(caught.value)
+
+
+def weight(model, name):
+    return next(tensor for tensor in model.graph.initializer if tensor.name == name)
+
+
+def covariance(formula):
+    """A graph of one covariance, as the exporter writes it."""
+    net = Net()
+    net.named("near", formula.onnx(net, "squared"))
+    content = net.model({"squared": ["n"]}, {"near": ["n"]}, {}, {"producer_name": "posefield"})
+    return onnx.load_from_string(content)
+
+
+@pytest.fixture(scope="module")
+def written(request):
+    """Everything that the exporter writes: trained models, and every covariance."""
+    models = [onnx.load(request.getfixturevalue(name)) for name in MODELS]
+    return [*models, *map(covariance, COVARIANCES.values())]
+
+
+def used(message):
+    """Fields that messages have, as `onnx_check.MODEL` tells them."""
+    found = {}
+    for field, value in message.ListFields():
+        inners = value if hasattr(value, "__len__") else [value]
+        inner = [used(one) for one in inners] if field.message_type else []
+        found[field.number] = functools.reduce(merged, inner, found.get(field.number, {}))
+    return found
+
+
+def merged(one, other):
+    both = {number: merged(one.get(number, {}), other.get(number, {})) for number in one | other}
+    return dict(sorted(both.items()))
+
+
+def test_operators_are_those_that_the_exporter_writes_and_no_others(written):
+    assert {node.op_type for model in written for node in model.graph.node} == onnx_check.OPERATORS
+
+
+def test_fields_are_those_that_the_exporter_writes_and_no_others(written):
+    assert functools.reduce(merged, map(used, written)) == onnx_check.MODEL
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_what_is_found_is_what_onnx_finds(name, request):
+    content = request.getfixturevalue(name).read_bytes()
+    model, found = onnx.load_from_string(content), onnx_check.check(content)
+    metadata = {entry.key: entry.value.encode() for entry in model.metadata_props}
+    assert found.metadata == metadata
+    assert found.shapes == {t.name: tuple(t.dims) for t in model.graph.initializer}
+    assert found.values == {name for node in model.graph.node for name in node.output}
+
+
+def test_a_loop_is_refused(model_path):
+    looping = onnx.load_from_string(model_files.loop(model_path.read_bytes()))
+    assert (
+        refusal(looping) == "it has a field 7.1.5.6 of onnx.proto, which posefield does not write"
+    )
+    looping.graph.node[-1].ClearField("attribute")
+    assert refusal(looping) == "its graph has an operator 'Loop', which posefield does not use"
+
+
+def test_a_constant_of_any_shape_is_refused(model_path):
+    assert refusal(model_files.fill(model_path.read_bytes())) == (
+        "its graph has an operator 'ConstantOfShape', which posefield does not use"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (lambda m: m.graph.node.add(op_type="Add", domain="com.microsoft"), "7.1.7"),
+        (lambda m: m.functions.add(name="f"), "25"),
+        (lambda m: m.training_info.add(), "20"),
+        (lambda m: m.graph.sparse_initializer.add(), "7.15"),
+        (lambda m: m.graph.initializer[0].external_data.add(key="location"), "7.5.13"),
+        (lambda m: setattr(m.graph.initializer[0], "data_location", 1), "7.5.14"),
+        (lambda m: m.graph.initializer[0].float_data.append(1.0), "7.5.4"),
+        (lambda m: setattr(m, "doc_string", "a note"), "6"),
+        (lambda m: m.graph.node[0].attribute.add(name="x").t.dims.append(1), "7.1.5.5"),
+        (lambda m: m.graph.value_info.add(name="x"), "7.13"),
+    ],
+)
+def test_other_fields_are_refused_by_number(model, change, field):
+    change(model)
+    assert refusal(model) == (
+        f"it has a field {field} of onnx.proto, which posefield does not write"
+    )
+
+
+def test_fields_of_a_second_graph_are_checked_too(model):
+    """Readers of protocol buffers merge it with the first one."""
+    content = model.SerializeToString()
+    second = onnx.ModelProto(graph=onnx.GraphProto(node=[onnx.NodeProto(op_type="Loop")]))
+    assert "operator 'Loop'" in refusal(content + second.SerializeToString())
+
+
+@pytest.mark.parametrize(
+    "shape", [[1, 2], [2**40, 2**40, 0], [-1], [2**62, 4], [2**63 - 1, 2**63 - 1]]
+)
+def test_a_constant_of_another_shape_than_its_bytes_is_refused(model_path, shape):
+    model = onnx.load(model_path)
+    weight(model, "core").dims[:] = shape
+    with pytest.raises(ModelError):
+        model_file.checked(model_files.written(model), "some.onnx")
+
+
+@pytest.mark.parametrize("change", [{"data_type": TensorProto.STRING}, {"name": None}])
+def test_a_constant_of_another_kind_is_refused(model, change):
+    core = weight(model, "core")
+    for name, value in change.items():
+        setattr(core, name, value) if value else core.ClearField(name)
+    assert refusal(model) == "it has a constant without name, or neither of float32 nor int64"
+
+
+def test_a_key_that_stands_twice_is_refused(model):
+    model.metadata_props.append(model.metadata_props[0])
+    assert refusal(model) == "two of its metadata entries have one key"
+
+
+def test_text_that_is_no_text_is_refused(model):
+    content = model.SerializeToString().replace(b"control_gain", b"control_\xff\xff\xff\xff")
+    assert "codec can't decode" in refusal(content)
+
+
+def test_the_checksum_is_an_entry_like_others(model):
+    assert checksum.KEY.decode() in onnx_check.check(model.SerializeToString()).metadata

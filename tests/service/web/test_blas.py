@@ -1,0 +1,36 @@
+"""Tests of the number of BLAS threads of a server process."""
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from service.motion.cores import ALONE
+from service.web import blas
+
+
+@pytest.fixture(autouse=True)
+def two_threads(monkeypatch):
+    """Two BLAS threads, of which the environment says nothing."""
+    for name in ALONE:
+        monkeypatch.delenv(name, raising=False)
+    with threadpool_limits(2, user_api="blas"):
+        assert threads() == {2}
+        yield
+
+
+def threads():
+    """Numbers of threads of the BLAS libraries that are loaded."""
+    np.ones((2, 2)) @ np.ones((2, 2))
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+def test_blas_keeps_to_one_thread():
+    blas.limit_threads()
+    assert threads() == {1}
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_the_environment_counts_more(monkeypatch, name):
+    monkeypatch.setenv(name, "2")
+    blas.limit_threads()
+    assert threads() == {2}

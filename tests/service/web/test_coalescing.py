@@ -1,0 +1,87 @@
+"""Tests of write coalescing: one system call, with all data in order."""
+
+import asyncio
+
+import pytest
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from service.web.coalescing import MOST, CoalescingProtocol, CoalescingTransport
+
+
+class Recorder(asyncio.Transport):
+    """A transport that notes what each call gave it."""
+
+    def __init__(self):
+        super().__init__()
+        self.calls, self.closed = [], False
+
+    def writelines(self, pieces):
+        self.calls.append(b"".join(pieces))
+
+    def write(self, data):
+        self.calls.append(bytes(data))
+
+    def close(self):
+        self.closed = True
+
+    def is_closing(self):
+        return self.closed
+
+    def get_extra_info(self, name, default=None):
+        return {"socket": "its own"}.get(name, default)
+
+
+def scene(play):
+    async def run():
+        recorder = Recorder()
+        await play(CoalescingTransport(recorder), recorder)
+        return recorder.calls
+
+    return asyncio.run(run())
+
+
+def test_head_and_body_are_one_call_and_the_next_turn_another():
+    async def play(transport, recorder):
+        transport.write(b"head")
+        transport.write(b"body")
+        assert recorder.calls == []
+        await asyncio.sleep(0)
+        transport.writelines([b"more", b"still"])
+        await asyncio.sleep(0)
+
+    assert scene(play) == [b"headbody", b"morestill"]
+
+
+def test_much_is_not_held_so_that_flow_control_sees_it():
+    async def play(transport, recorder):
+        transport.write(b"h")
+        transport.write(b"x" * MOST)
+        assert [len(call) for call in recorder.calls] == [MOST + 1]
+        transport.write(b"rest")
+        await asyncio.sleep(0)
+
+    assert [len(call) for call in scene(play)] == [MOST + 1, 4]
+
+
+def test_what_is_held_goes_before_the_end():
+    async def play(transport, recorder):
+        transport.write(b"last")
+        assert not transport.is_closing()
+        transport.close()
+        assert recorder.closed and transport.is_closing()
+
+    assert scene(play) == [b"last"]
+
+
+def test_all_else_is_the_transport_s_own():
+    async def play(transport, recorder):
+        assert transport.get_extra_info("socket") == "its own"
+        with pytest.raises(AttributeError):
+            transport.no_such_thing  # noqa: B018
+
+    scene(play)
+
+
+def test_the_parser_is_the_fast_one():
+    """Without httptools uvicorn falls back to one that takes four times as long."""
+    assert issubclass(CoalescingProtocol, HttpToolsProtocol)

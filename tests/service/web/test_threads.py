@@ -1,0 +1,169 @@
+"""Tests of work in threads: the limit counts cancelled work until it ends."""
+
+import asyncio
+import gc
+import threading
+import time
+
+import pytest
+from anyio import CapacityLimiter, create_task_group
+
+from service.motion import cancel
+from service.motion.cancel import Cancelled
+from service.web import threads
+
+
+class Work:
+    """Work that goes on until it is cancelled, or to its end without looking."""
+
+    def __init__(self, looks: bool = True, seconds: float = 20.0) -> None:
+        self.begun, self.ended = threading.Event(), threading.Event()
+        self.looks, self.seconds = looks, seconds
+
+    def __call__(self) -> str:
+        self.begun.set()
+        until = time.monotonic() + self.seconds
+        try:
+            while time.monotonic() < until:
+                if self.looks:
+                    cancel.check()
+                time.sleep(0.005)
+            return "done"
+        finally:
+            self.ended.set()
+
+
+async def begun(work):
+    while not work.begun.is_set():
+        await asyncio.sleep(0.002)
+
+
+async def cancelled(task):
+    with pytest.raises(asyncio.CancelledError):
+        await task
+
+
+def test_a_result_and_a_fault_come_back():
+    async def both():
+        assert await threads.run(lambda a, b: a + b, 1, 2) == 3
+        with pytest.raises(ZeroDivisionError):
+            await threads.run(lambda: 1 / 0)
+
+    asyncio.run(both())
+
+
+def test_cancelled_work_is_asked_to_stop_and_has_ended_when_its_task_has():
+    async def scene():
+        work = Work()
+        task = asyncio.create_task(threads.run(work))
+        await begun(work)
+        task.cancel()
+        await cancelled(task)
+        assert work.ended.is_set()
+
+    asyncio.run(scene())
+
+
+class Failing(Work):
+    """Work that fails where it should stop."""
+
+    def __call__(self) -> str:
+        try:
+            return super().__call__()
+        except Cancelled:
+            raise OSError("a fault of its own") from None
+
+
+@pytest.mark.parametrize(("kind", "lines"), [(Work, []), (Failing, ["a fault of its own"])])
+def test_cancelled_work_leaves_nothing_in_the_log_unless_it_fails(kind, lines, caplog):
+    async def scene():
+        work = kind()
+        task = asyncio.create_task(threads.run(work))
+        await begun(work)
+        task.cancel()
+        await cancelled(task)
+
+    asyncio.run(scene())
+    # asyncio logs an exception that has not been retrieved when its future is collected.
+    gc.collect()
+    assert [str(record.exc_info[1]) for record in caplog.records] == lines
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_a_place_is_held_until_work_that_does_not_look_has_ended(times):
+    async def scene():
+        places, work, next_one = CapacityLimiter(1), Work(looks=False, seconds=0.3), Work()
+        task = asyncio.create_task(threads.run(work, places=places))
+        await begun(work)
+        waiting = asyncio.create_task(threads.run(next_one, places=places))
+        for _ in range(times):
+            task.cancel()
+            await asyncio.sleep(0.01)
+        assert not next_one.begun.is_set() and not task.done()
+        await begun(next_one)
+        assert work.ended.is_set() and task.done()
+        waiting.cancel()
+        await cancelled(waiting)
+        assert places.borrowed_tokens == 0
+
+    asyncio.run(scene())
+
+
+def test_work_that_waits_for_a_place_never_begins_when_it_is_cancelled():
+    async def scene():
+        places, work, never = CapacityLimiter(1), Work(), Work()
+        first = asyncio.create_task(threads.run(work, places=places))
+        await begun(work)
+        second = asyncio.create_task(threads.run(never, places=places))
+        await asyncio.sleep(0.01)
+        second.cancel()
+        await cancelled(second)
+        first.cancel()
+        await cancelled(first)
+        assert not never.begun.is_set()
+
+    asyncio.run(scene())
+
+
+def test_a_scope_of_anyio_that_is_cancelled_waits_for_the_end_without_spinning():
+    async def scene():
+        work = Work(looks=False, seconds=0.4)
+        async with create_task_group() as group:
+            group.start_soon(threads.run, work)
+            await begun(work)
+            before = time.process_time()
+            group.cancel_scope.cancel()
+        assert work.ended.is_set()
+        # Spinning would take the processor for all of the 0.4 seconds.
+        assert time.process_time() - before < 0.2
+
+    asyncio.run(scene())
+
+
+def test_what_runs_without_a_request_is_never_cancelled():
+    cancel.check()
+    with pytest.raises(Cancelled):
+        own = cancel.Cancellation()
+        own.cancel()
+        token = cancel.current.set(own)
+        try:
+            cancel.check()
+        finally:
+            cancel.current.reset(token)
+
+
+def test_the_fault_of_cancelled_work_is_no_complaint_of_the_loop():
+    complaints = []
+
+    async def scene():
+        asyncio.get_running_loop().set_exception_handler(lambda _, said: complaints.append(said))
+        work = Work()
+        task = asyncio.create_task(threads.run(work))
+        await begun(work)
+        task.cancel()
+        await cancelled(task)
+        del task
+        gc.collect()
+
+    asyncio.run(scene())
+    assert complaints == []

@@ -1,0 +1,90 @@
+"""Tests of the fixture cache: one build per digest, and a new digest after a change."""
+
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import fixture_cache
+import pytest
+
+# Trains the smallest of the models, and prints the project's files that were imported for it.
+TRAIN = """
+import sys
+from pathlib import Path
+import fixture_models
+from model_export import export, ingest, train
+from model_export.sample import stroll
+
+own = stroll.recipe()
+found, _ = ingest.ingest(own, stroll.write(Path(sys.argv[1])))
+export.export(own, train.train(own, found, lambda _: None), [])
+for module in list(sys.modules.values()):
+    file = getattr(module, "__file__", None) or ""
+    if file.startswith(sys.argv[2]) and "/.venv" not in file:
+        print(Path(file).relative_to(sys.argv[2]))
+"""
+
+
+@pytest.fixture
+def place():
+    """A name under which nothing is kept, before and after."""
+    place = fixture_cache.FOLDER / fixture_cache.digest() / f"test-{threading.get_native_id()}"
+    yield place
+    place.unlink(missing_ok=True)
+    place.with_name(f"{place.name}.lock").unlink(missing_ok=True)
+
+
+@pytest.mark.system
+def test_the_digest_covers_every_file_that_training_imports(tmp_path):
+    words = [sys.executable, "-c", TRAIN, tmp_path, fixture_cache.ROOT]
+    own = {"PYTHONPATH": str(fixture_cache.ROOT / "tests"), "PATH": ""}
+    said = subprocess.run(words, env=own, capture_output=True, text=True, check=True).stdout
+    imported = {Path(line) for line in said.split()}
+    assert Path("model_export/train.py") in imported
+    assert imported <= set(fixture_cache.sources(fixture_cache.ROOT))
+
+
+def test_the_digest_changes_with_a_source_and_with_its_name(tmp_path):
+    for file in fixture_cache.sources(fixture_cache.ROOT):
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(fixture_cache.ROOT / file, tmp_path / file)
+    found = [fixture_cache.digest_of(tmp_path)]
+    assert found == [fixture_cache.digest_of(fixture_cache.ROOT)]
+    source = tmp_path / "service/motion/quat.py"
+    source.write_text(source.read_text() + "\n")
+    found.append(fixture_cache.digest_of(tmp_path))
+    source.rename(source.with_name("quaternion.py"))
+    found.append(fixture_cache.digest_of(tmp_path))
+    assert len(set(found)) == 3
+
+
+def test_a_file_is_built_once_by_many_that_want_it_at_once(place):
+    built = []
+
+    def build(new):
+        built.append(new)
+        new.write_bytes(b"whole")
+
+    def ask():
+        assert fixture_cache.path(place.name, build).read_bytes() == b"whole"
+
+    threads = [threading.Thread(target=ask) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(built) == 1 and place.exists() and not built[0].exists()
+
+
+def test_a_build_that_fails_leaves_nothing_and_is_tried_again(place):
+    def broken(new):
+        new.write_bytes(b"half")
+        raise RuntimeError("interrupted")
+
+    with pytest.raises(RuntimeError, match="interrupted"):
+        fixture_cache.path(place.name, broken)
+    assert not place.exists()
+    fixture_cache.path(place.name, lambda new: new.write_bytes(b"whole"))
+    assert place.read_bytes() == b"whole"

@@ -1,0 +1,179 @@
+"""Rules of the test suite: patches, marks, assertions and imports."""
+
+import ast
+import builtins
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TESTS = sorted(path for path in (ROOT / "tests").rglob("*.py") if "interop" not in path.parts)
+# Plants a fault in a process of its own, to prove that it is noticed there.
+PLANTS = {ROOT / "tests/contract/watched_serve.py"}
+OWN = {"service", "model_export", "posefield_client", "without_blender"}
+# Marks of pytest itself.
+MARKS = {"parametrize", "skip", "skipif", "usefixtures", "filterwarnings", "xfail"}
+# Of other libraries: they raise where something is not as it should be.
+RAISING = {"raises", "warns", "fail", "validate", "check_schema"}
+# What a test of quaternions has no use for, and would wait for.
+HEAVY = {
+    *OWN - {"service"},
+    "anyio", "matplotlib", "moto", "numba", "onnx", "onnxruntime", "pxr", "schemathesis", "scipy",
+    "service.cli", "service.synthesis", "service.web", "starlette",
+}  # fmt: skip
+
+
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(), str(path))
+
+
+def imported(tree: ast.Module) -> dict[str, str]:
+    """Names that a module imports, anywhere in it, and the package that each comes from."""
+    found = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                name = alias.asname or alias.name.partition(".")[0]
+                found[name] = alias.name.partition(".")[0]
+        if isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                found[alias.asname or alias.name] = (node.module or "").partition(".")[0]
+    return found
+
+
+def root(node: ast.expr) -> str:
+    """The name that an expression of attributes begins with; empty for any other expression."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def called(node: ast.Call) -> str:
+    """The last name of what is called."""
+    return node.func.attr if isinstance(node.func, ast.Attribute) else root(node.func)
+
+
+def patches(tree: ast.Module) -> Iterator[int]:
+    """Lines that replace something of the project's own modules, or import mocks."""
+    names = imported(tree)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and called(node) in ("setattr", "delattr"):
+            # Of pytest's monkeypatch, whatever it is called. Anything is refused but an attribute
+            # of another library's module: strings and calls, too.
+            of_pytest = isinstance(node.func, ast.Attribute)
+            if of_pytest and names.get(root(node.args[0]), "service") in OWN:
+                yield node.lineno
+        if isinstance(node, ast.Assign | ast.AugAssign):
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                if isinstance(target, ast.Attribute) and names.get(root(target)) in OWN:
+                    yield node.lineno
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            modules = [alias.name for alias in node.names]
+            if "mock" in modules or "unittest.mock" in [*modules, getattr(node, "module", "")]:
+                yield node.lineno
+
+
+def asserts(test: ast.AST) -> bool:
+    """Whether a test asserts in its own words, or calls what says in its name that it does."""
+    for node in ast.walk(test):
+        if isinstance(node, ast.Assert):
+            return True
+        if isinstance(node, ast.Call):
+            name = called(node)
+            if name.startswith("assert_") or name in RAISING:
+                return True
+    return False
+
+
+def functions(tree: ast.Module) -> Iterator[ast.FunctionDef]:
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            yield node
+
+
+def marks(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "pytest.mark":
+            yield node.lineno, node.attr
+
+
+def places(path: Path, lines: Iterator[int]) -> list[str]:
+    return [f"{path.relative_to(ROOT)}:{line}" for line in lines]
+
+
+def test_nothing_of_our_own_is_patched():
+    checked = [path for path in TESTS if path not in PLANTS]
+    found = [place for path in checked for place in places(path, patches(parsed(path)))]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from service.web import caching\nmonkeypatch.setattr(caching, 'version', 1)",
+        "from service.web import caching\nmonkeypatch.setattr(caching.os, 'name', 1)",
+        "import service.web.caching\nmonkeypatch.setattr(service.web.caching, 'version', 1)",
+        "monkeypatch.setattr('service.web.caching.version', 1)",
+        "with monkeypatch.context() as patch:\n    patch.setattr(form, 'ordinary', 1)",
+        "monkeypatch.setattr(type(model), 'run', 1)",
+        "from model_export import train\ntrain.ROUNDS = 3",
+        "from unittest import mock",
+        "import unittest.mock",
+        "from unittest.mock import patch",
+    ],
+)
+def test_a_patch_would_be_found(line):
+    assert len(list(patches(ast.parse(line)))) == 1
+
+
+def test_what_is_no_patch_of_ours_is_let_pass():
+    text = "import os\nimport numpy as np\nmonkeypatch.setattr(os, 'link', 1)\nmodel.name = 'x'\n"
+    assert list(patches(ast.parse(text + "monkeypatch.setattr(np.linalg, 'qr', 1)"))) == []
+
+
+def test_every_test_asserts_by_name_or_itself():
+    found = [
+        f"{path.relative_to(ROOT)}::{test.name}"
+        for path in TESTS
+        for test in functions(parsed(path))
+        if not asserts(test)
+    ]
+    assert found == []
+
+
+def test_a_test_that_asserts_nothing_would_be_found():
+    (test,) = functions(ast.parse("def test_it(made):\n    check(made)\n"))
+    assert not asserts(test)
+
+
+def test_every_mark_is_declared():
+    options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    assert "--strict-markers" in options["addopts"]
+    declared = {line.partition(":")[0] for line in options["markers"]}
+    used = {mark for path in TESTS for _, mark in marks(parsed(path))}
+    assert used - MARKS == declared
+
+
+COLLECT = f"""
+import sys, pytest
+pytest.main(["--collect-only", "-q", "tests/service/motion/test_quat.py"])
+print(sorted({HEAVY!r} & sys.modules.keys()))
+"""
+
+
+def test_a_test_of_quaternions_waits_for_nothing_heavy():
+    words = [sys.executable, "-c", COLLECT]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "collected" in done.stdout
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_every_file_of_tests_has_a_name_of_its_own():
+    """They are imported by their names alone, and a helper's must hide no library."""
+    names = [path.stem for path in TESTS if path.stem != "conftest"]
+    assert sorted(names) == sorted(set(names))
+    assert not set(names) & (sys.stdlib_module_names | set(dir(builtins)))
