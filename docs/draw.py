@@ -1,6 +1,6 @@
 """Draws the README's picture: poses of a clip side by side, rendered by Blender.
 
-make interop && .venv-blender/bin/python docs/draw.py CLIP.usdc PICTURE.png
+make test-system && .venv-blender/bin/python docs/draw.py CLIP.usdc PICTURE.png
 """
 
 import math
