@@ -63,6 +63,8 @@ class CoalescingTransport:
         self._transport.close()
 
     def _flush(self) -> None:
-        if self._held:
-            held, self._held, self._size = self._held, [], 0
+        held, self._held, self._size = self._held, [], 0
+        # A client that has reset its connection closes the transport before the next iteration;
+        # uvloop raises an error for a write to a closed one.
+        if held and not self._transport.is_closing():
             self._transport.writelines(held)

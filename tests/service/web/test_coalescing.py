@@ -1,8 +1,10 @@
 """Tests of write coalescing: one system call, with all data in order."""
 
 import asyncio
+import socket
 
 import pytest
+import uvloop
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.web.coalescing import MOST, CoalescingProtocol, CoalescingTransport
@@ -71,6 +73,27 @@ def test_what_is_held_goes_before_the_end():
         assert recorder.closed and transport.is_closing()
 
     assert scene(play) == [b"last"]
+
+
+@pytest.mark.parametrize("wrapped", [True, False], ids=["coalesced", "direct"])
+def test_data_for_a_connection_that_was_reset_is_dropped_without_an_error(wrapped):
+    """The negative control writes to uvloop's transport itself, which raises RuntimeError."""
+
+    async def play():
+        loop, errors = asyncio.get_running_loop(), []
+        loop.set_exception_handler(lambda _, error: errors.append(error["exception"]))
+        ours, theirs = socket.socketpair()
+        direct, _ = await loop.create_connection(asyncio.Protocol, sock=ours)
+        transport = CoalescingTransport(direct) if wrapped else direct
+        direct.abort()
+        await asyncio.sleep(0.01)
+        loop.call_soon(transport.writelines, [b"an answer"])
+        await asyncio.sleep(0.01)
+        theirs.close()
+        return errors
+
+    errors = uvloop.run(play())
+    assert [type(error) for error in errors] == ([] if wrapped else [RuntimeError])
 
 
 def test_all_else_is_the_transport_s_own():
