@@ -37,7 +37,7 @@ TIMES = re.compile(
     rb'"(instance|changed)":"[^"]*"|"seconds": [0-9.e-]+|"seconds_per_pose": \[[^\]]*\]'
     rb"|here [0-9.]+ .{1,3}s a pose|in [0-9.]+ s, [0-9]+ a second"
 )
-"""What is said of the run itself: identifiers of requests and measured times."""
+"""Identifiers of requests and measured times, which differ between runs of the same code."""
 POINTS = 4
 
 Question = tuple[str, str, str, dict[str, str], Any]
@@ -326,9 +326,9 @@ def wrong() -> Iterator[Question]:
 
 
 def ran(models: Path, posefield: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """What commands print and write."""
+    """Yield the output and the files of each command, by its name."""
     for model in sorted(models.glob("*.onnx")):
-        for words in commands(model):
+        for words in commands(model, posefield):
             with tempfile.TemporaryDirectory() as folder:
                 yield (
                     f"command {model.stem} {' '.join(words[:1] + words[2:])}",
@@ -336,14 +336,14 @@ def ran(models: Path, posefield: Path) -> Iterator[tuple[str, dict[str, Any]]]:
                 )
 
 
-def commands(model: Path) -> Iterator[list[str]]:
+def commands(model: Path, posefield: Path) -> Iterator[list[str]]:
     """Words of commands for one model, run in an empty folder."""
     file = str(model)
     yield ["inspect", file]
     yield ["inspect", file, "--json"]
     card = json.loads(
         subprocess.run(
-            [str(Path(sys.executable).parent / "posefield"), "inspect", file, "--json"],
+            [str(posefield), "inspect", file, "--json"],
             check=True,
             capture_output=True,
             text=True,
