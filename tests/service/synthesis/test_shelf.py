@@ -1,6 +1,8 @@
 """Tests of reload: versions side by side, atomic replacement, and the old version on errors."""
 
+import contextlib
 import gc
+import mmap
 import os
 import resource
 import shutil
@@ -395,18 +397,34 @@ def test_a_fault_of_the_start_is_logged_at_the_next_look_and_then_no_more(put, t
     assert "b.onnx: does not end with its checksum" in record.getMessage()
 
 
+def address_space_but(room):
+    """Fill the address space that the limit leaves but for `room` bytes; return what fills it.
+
+    Objects of earlier tests that are freed meanwhile would else give room for both files.
+    """
+    filled, size = [], 1 << 20
+    with contextlib.suppress(OSError):
+        while True:
+            filled.append(mmap.mmap(-1, size))
+    return filled[: len(filled) - room // size]
+
+
 def test_an_error_that_no_check_foresees_is_a_fault_too(put, tmp_path, caplog):
     with (tmp_path / "a.onnx").open("wb") as file:
         file.truncate(model_file.MOST_BYTES)
     good = put("b.onnx", 1)
     intake = Intake([tmp_path], most=1)
     before = resource.getrlimit(resource.RLIMIT_AS)
+    gc.collect()
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     # There is room for one file, and not for the other.
-    resource.setrlimit(resource.RLIMIT_AS, (used + model_file.MOST_BYTES // 2, before[1]))
+    room = model_file.MOST_BYTES // 2
+    resource.setrlimit(resource.RLIMIT_AS, (used + room, before[1]))
     try:
+        ballast = address_space_but(room)
         for _ in range(3):
             intake.look()
+        del ballast
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
     (fault,) = intake.faults.values()
