@@ -17,9 +17,12 @@ RUN pip install --no-cache-dir uv==0.13.8
 ARG EXTRAS="--extra store"
 WORKDIR /src
 # Dependencies change seldom, the service often: they get a layer of their own.
-COPY pyproject.toml uv.lock README.md LICENSE ./
+COPY pyproject.toml uv.lock ./
+COPY service/pyproject.toml service/
+COPY model_export/pyproject.toml model_export/
+COPY clients/python/pyproject.toml clients/python/
 # hadolint ignore=SC2086
-RUN uv sync --frozen --no-dev --no-install-project ${EXTRAS}
+RUN uv sync --frozen --no-dev --package posefield --no-install-workspace ${EXTRAS}
 # A third of USD's wheel is symbols. Not everywhere: stripped, OpenBLAS of NumPy's does not load any more.
 # What follows are the wheels' own tests, and tools that make models.
 WORKDIR /opt/posefield/lib/python3.11/site-packages
@@ -27,15 +30,15 @@ RUN find pxr usd_core.libs -name '*.so*' -type f -exec strip --strip-unneeded {}
     find . -type d -name tests -prune -exec rm -r {} + && \
     rm -r onnxruntime/quantization onnxruntime/tools onnxruntime/transformers
 WORKDIR /src
-# service/web/openapi.yaml is a link into api/.
+# service/posefield/http/api/openapi.yaml is a link into api/.
 COPY api api
 COPY service service
 # `make page` builds them, once for every machine: the image needs no Node.
 # hadolint ignore=SC2086
-RUN { test -f service/web/viewer/index.html && test -f service/web/docs/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
-    uv sync --frozen --no-dev --no-editable ${EXTRAS}
+RUN { test -f service/posefield/http/pages/viewer/index.html && test -f service/posefield/http/pages/docs/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
+    uv sync --frozen --no-dev --package posefield --no-editable ${EXTRAS}
 # What is in it, by what is installed: /opt/posefield/share/sbom.cdx.json (CycloneDX).
-RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
+RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject service/pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python
 
 FROM ${BASE}
 ARG SOURCE=""

@@ -18,10 +18,10 @@ help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 # The lock file decides every version; the stamp makes the install happen once.
-$(ENV): pyproject.toml uv.lock
+$(ENV): pyproject.toml service/pyproject.toml model_export/pyproject.toml uv.lock
 	test -x $(BIN)/python || { python=$$(.ci/find-python $(PYTHON)) && "$$python" -m venv $(VENV); }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
-	UV_PROJECT_ENVIRONMENT=$(VENV) $(BIN)/uv sync --frozen --inexact --all-extras --quiet
+	UV_PROJECT_ENVIRONMENT=$(VENV) $(BIN)/uv sync --frozen --inexact --all-packages --all-extras --quiet
 	@touch $@
 
 .PHONY: install
@@ -38,12 +38,12 @@ node: $(NODE) ## install into clients/node_modules what its lock file names
 
 # The service's answer to `/`: one file, made of the page's sources and of nothing else; and the files that
 # `posefield page` lays beside it for hosts without a service.
-PAGE := service/web/viewer/index.html
+PAGE := service/posefield/http/pages/viewer/index.html
 $(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.offline.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
 # The service's answer to `/docs`: one file with Swagger UI in it, which reads the contract from the service.
-DOCS := service/web/docs/index.html
+DOCS := service/posefield/http/pages/docs/index.html
 $(DOCS): $(NODE) $(shell find clients/docs/src -type f) clients/docs/index.html clients/docs/vite.config.ts clients/tsconfig.base.json clients/docs/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/docs --silent
 
@@ -106,4 +106,4 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist service/web/docs service/web/viewer service/web/offline clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist service/posefield/http/pages/docs service/posefield/http/pages/viewer service/posefield/http/pages/offline clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -22,11 +22,12 @@ from family import Family
 from rows import Row, table
 from timing import in_turn
 
-from service.encode import ENCODERS, packs
-from service.export import pack
-from service.synthesis.synthesizer import Synthesizer
-from service.web import clips_query
-from service.web.settings import Settings
+from posefield.batch import clip_archive
+from posefield.encode import archives
+from posefield.encode.formats import ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.decoding import clips_query
+from posefield.synthesis.synthesizer import Synthesizer
 
 CLIPS, FEW, MANY = 500, 100, 5000
 FORMATS = ("usdc", "json")
@@ -110,7 +111,7 @@ def _first(client: httpx.Client, body: bytes) -> None:
 def _made(model: Synthesizer, body: bytes) -> int:
     """Bytes of the same archive without a server."""
     order = clips_query.order(model, ENCODERS, body, Settings())
-    return sum(map(len, packs.zip(pack.members(order))))
+    return sum(map(len, archives.zip(clip_archive.members(order))))
 
 
 def _most_memory(process: subprocess.Popen[bytes]) -> int:

@@ -11,9 +11,9 @@ from family import Family
 from rows import Row
 from timing import in_turn
 
-from service.synthesis.crowd import BATCH
-from service.synthesis.ports import OUTPUTS
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.synthesis.synthesizer import Synthesizer
 
 Profile = dict[str, Part]
 

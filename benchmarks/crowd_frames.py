@@ -9,10 +9,10 @@ from family import Family
 from paper import poses
 from scipy import linalg
 
-from model_export import naive
-from model_export.covariance import COVARIANCES
-from model_export.kriging import Kriging
-from service.motion.conventions import Indices, Singles
+from posefield.common.units import Indices, Singles
+from posefield_train.kriging import naive_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.universal_kriging import Kriging
 
 Answer = Callable[[], list[Singles]]
 """What answers with rotations (N, J, 4)."""
@@ -28,7 +28,7 @@ class Questions:
     share: Singles
 
 
-def solved(made: Family, field: naive.Naive, questions: Questions) -> Answer:
+def solved(made: Family, field: naive_kriging.Naive, questions: Questions) -> Answer:
     """Poses by LU factors of each frame's system, made beforehand, and averages of the samples."""
     factors = [linalg.lu_factor(poses.system(one).astype(np.float32)) for one in field.fields]
     values = field.values.astype(np.float32)
@@ -41,7 +41,7 @@ def solved(made: Family, field: naive.Naive, questions: Questions) -> Answer:
     return _by_frame(made, field, questions, frame)
 
 
-def dual(made: Family, field: naive.Naive, questions: Questions) -> Answer:
+def dual(made: Family, field: naive_kriging.Naive, questions: Questions) -> Answer:
     """Poses by inverse and samples multiplied beforehand."""
     duals = [one.dual.astype(np.float32) for one in field.fields]
     return _by_frame(made, field, questions, lambda index, basis: basis @ duals[index])
@@ -49,7 +49,7 @@ def dual(made: Family, field: naive.Naive, questions: Questions) -> Answer:
 
 def _by_frame(
     made: Family,
-    field: naive.Naive,
+    field: naive_kriging.Naive,
     questions: Questions,
     frame: Callable[[int, Singles], Singles],
 ) -> Answer:

@@ -7,13 +7,15 @@ from tempfile import TemporaryDirectory
 from family import Family
 from threadpoolctl import threadpool_limits
 
-from model_export import export, ingest, recipe, train
-from model_export.recipe import Recipe
-from model_export.sample import stroll
-from service.synthesis import session
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.walk import gait
-from service.synthesis.walk.gait import Gait
+from posefield.inference import session
+from posefield.locomotion import gait
+from posefield.locomotion.gait import Gait
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.sample import sample_walk
+from posefield_train.source import ingest, recipe
+from posefield_train.source.recipe import Recipe
 
 WALK = Path(recipe.__file__).parent / "recipes" / "cmu_walk.toml"
 BESIDE = Path(__file__).parents[2] / "shared" / "data"
@@ -27,7 +29,7 @@ def reaching(made: Family) -> Synthesizer:
 def walks() -> dict[str, Gait]:
     """The procedural walk, and that of the motion capture where it is present."""
     with TemporaryDirectory() as folder:
-        found = {"procedural walk": _walk(stroll.recipe(), stroll.write(Path(folder)))}
+        found = {"procedural walk": _walk(sample_walk.recipe(), sample_walk.write(Path(folder)))}
     data = Path(os.environ.get("POSEFIELD_DATA", BESIDE))
     if (data / "cmu_walk.zip").exists() or (data / "cmu_walk").exists():
         found["CMU walk"] = _walk(recipe.read(WALK), data)
@@ -38,5 +40,5 @@ def _walk(own: Recipe, folder: Path) -> Gait:
     with threadpool_limits(limits=1):
         examples, notes = ingest.ingest(own, folder)
         trained = train.train(own, examples, lambda _: None)
-        content = export.export(own, trained, notes).content
+        content = onnx_export.export(own, trained, notes).content
     return gait.of(session.open_bytes(content, f"{own.name}.onnx"))

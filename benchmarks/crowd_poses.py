@@ -9,9 +9,9 @@ from crowd_scene import AUTO, SEEN, Scene
 from rows import Row
 from timing import in_turn
 
-from service.synthesis.crowd import BATCH
-from service.synthesis.ports import OUTPUTS
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.synthesis.synthesizer import Synthesizer
 
 MANY = 10_000
 SIZES = (1, 10, 100, 1_000, MANY, 100_000)

@@ -20,11 +20,11 @@ from rows import Row
 from scipy.interpolate import RBFInterpolator
 from timing import in_turn
 
-from model_export import naive, variogram
-from service.motion.conventions import Indices, Singles
-from service.synthesis.crowd import BATCH
-from service.synthesis.ports import OUTPUTS
-from service.synthesis.synthesizer import Synthesizer
+from posefield.common.units import Indices, Singles
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train.kriging import naive_kriging, variogram
 
 MANY, FEW, CHECKED = 10_000, 1_000, 200
 TOGETHER = 128
@@ -54,7 +54,7 @@ class Asked:
 
 def rows(made: Family, model: Synthesizer) -> list[Row]:
     """Ours, at levels by view and at the finest, against every rival."""
-    field = naive.fit(
+    field = naive_kriging.fit(
         made.trained.model.bank.pose.samples,
         naive_graphs.positions(made),
         naive_graphs.numbers(made),
@@ -109,7 +109,7 @@ def _ours(scene: Scene, levels: Indices) -> Callable[[], None]:
     return run
 
 
-def _naive(made: Family, field: naive.Naive, asked: Asked) -> dict[str, Answer]:
+def _naive(made: Family, field: naive_kriging.Naive, asked: Asked) -> dict[str, Answer]:
     content, questions = naive_graphs.Contents(made, field), asked.questions
     return {
         SOLVED: crowd_frames.solved(made, field, questions),
@@ -153,7 +153,7 @@ def _scipy(made: Family, questions: Questions) -> Answer:
     return run
 
 
-def _check(made: Family, field: naive.Naive, asked: Asked) -> None:
+def _check(made: Family, field: naive_kriging.Naive, asked: Asked) -> None:
     scene = asked.scene
     rivals = _naive(made, field, asked)
     naive_graphs.check(made, field, rivals, scene.controls, scene.times[:, None])

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.motion.conventions import Floats, Indices
-from service.motion.crowd import CrowdPoses, Placement
-from service.synthesis import crowd
-from service.synthesis.crowd_question import CrowdQuestion
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.view import Camera, View
+from posefield.common.units import Floats, Indices
+from posefield.inference.level_selection import Camera, View
+from posefield.motion.crowd_clip import CrowdPoses, Placement
+from posefield.synthesis import crowd_synthesis
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.crowd_question import CrowdQuestion
 
 EYES = np.array([0.0, 1.6, 0.0])
 CAMERA = Camera(EYES, math.radians(60.0), 1080.0)
@@ -50,7 +50,7 @@ class Scene:
             "travelling",
             "warn",
         )
-        return lambda: crowd.poses(self.model, question)
+        return lambda: crowd_synthesis.poses(self.model, question)
 
     @property
     def coarsest(self) -> int:

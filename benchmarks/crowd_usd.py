@@ -14,12 +14,12 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, table
 from timing import in_turn
 
-from service.encode import names
-from service.encode.crowd import writer
-from service.motion import quat
-from service.motion.conventions import Indices
-from service.motion.crowd import CrowdClip, Motions, Placement
-from service.motion.skeleton import Skeleton
+from posefield.common.units import Indices
+from posefield.encode.character import joint_names
+from posefield.encode.usd_crowd import crowd_writer
+from posefield.motion import quat
+from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.skeleton import Skeleton
 
 CHARACTERS, FRAMES, JOINTS, SHARED, BATCH = 500, 100, 31, 20, 50
 LISTED, COPIED = 10, 50
@@ -65,7 +65,7 @@ def _against(words: str, theirs: float, ours: float) -> Row:
 
 def _ours(person: Skeleton, made: Motions, path: Path) -> Callable[[], None]:
     played = np.arange(CHARACTERS) % len(made)
-    return lambda: writer.write(_crowd(person, made, played), path)
+    return lambda: crowd_writer.write(_crowd(person, made, played), path)
 
 
 def _crowd(person: Skeleton, made: Motions, played: Indices) -> CrowdClip:
@@ -139,7 +139,7 @@ def _schemas(
 def _character(
     stage: Any, at: str, person: Skeleton, made: Motions, index: int, convert: Convert
 ) -> None:
-    joints = names.paths(names.legal(person.names), person.parents)
+    joints = joint_names.paths(joint_names.legal(person.names), person.parents)
     root = UsdSkel.Root.Define(stage, at)
     skeleton = UsdSkel.Skeleton.Define(stage, f"{at}/Skel")
     animation = UsdSkel.Animation.Define(stage, f"{at}/Anim")

@@ -13,16 +13,16 @@ import numpy as np
 from rows import Row
 from timing import in_turn
 
-from service.motion import skeleton
-from service.motion.conventions import Floats, Indices, Singles
-from service.synthesis import view
-from service.synthesis.crowd import BATCH
-from service.synthesis.ports import OUTPUTS
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.view import Camera
-from service.synthesis.walk import company, plane, stride
-from service.synthesis.walk.gait import Gait
-from service.synthesis.walk.march import Plan
+from posefield.common.units import Floats, Indices, Singles
+from posefield.inference import level_selection
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.level_selection import Camera
+from posefield.locomotion import floor_plane, stride, walking_crowd
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.locomotion_plan import Plan
+from posefield.motion import skeleton
+from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.synthesis.synthesizer import Synthesizer
 
 COUNT, SECONDS, RATE = 500, 10.0, 30.0
 EXTENTS = (100.0, 200.0, 400.0)
@@ -48,7 +48,7 @@ class Walk:
     def levels(self) -> Indices:
         """Levels (K,) by view."""
         seen, levels = ~np.isnan(self.scale), np.zeros(len(self.scale), dtype=np.int64)
-        levels[seen] = view.choose(self.model.ladder.errors, self.scale[seen], LIMIT)
+        levels[seen] = level_selection.choose(self.model.ladder.errors, self.scale[seen], LIMIT)
         return levels
 
     def posed(self, levels: Indices) -> Callable[[], None]:
@@ -97,7 +97,7 @@ def rows(walks: dict[str, Gait]) -> list[Row]:
 
 
 def _walk_rows(name: str, gait: Gait) -> list[Row]:
-    plan = company.wandering(gait, COUNT, SECONDS, RATE, seed=0)
+    plan = walking_crowd.wandering(gait, COUNT, SECONDS, RATE, seed=0)
     own = float(np.ptp(plan.places[:, 0].real))
     found = []
     for extent in (own, *EXTENTS):
@@ -123,11 +123,11 @@ def _walk(gait: Gait, plan: Plan) -> Walk:
 def _scale(model: Synthesizer, plan: Plan) -> Floats:
     """Pixels (K,) that a metre covers on each to somebody who stands in the middle."""
     middle = plan.places[:, 0].mean()
-    camera = Camera(plane.at_height(middle, np.array(EYES)), FOV, HEIGHT)
-    bodies = plane.at_height(plan.places.T.ravel(), np.zeros(1)) + model.middle
+    camera = Camera(floor_plane.at_height(middle, np.array(EYES)), FOV, HEIGHT)
+    bodies = floor_plane.at_height(plan.places.T.ravel(), np.zeros(1)) + model.middle
     outside = np.linalg.norm(bodies - camera.position, axis=-1) > model.radius
     scale = np.full(len(bodies), np.nan)
-    scale[outside] = view.pixels_per_metre(camera, bodies[outside], model.radius)
+    scale[outside] = level_selection.pixels_per_metre(camera, bodies[outside], model.radius)
     return scale
 
 

@@ -9,13 +9,13 @@ from family import Family
 from rows import Row
 from timing import in_turn
 
-from service.motion.measure import Measure
-from service.synthesis import session
-from service.synthesis.exact import holding
-from service.synthesis.exact.aims import Place
-from service.synthesis.exact.holding import Bench
-from service.synthesis.ports import OUTPUTS
-from service.synthesis.session import Session, State
+from posefield.constraints import constrained_motion
+from posefield.constraints.constrained_motion import Bench
+from posefield.constraints.constraint import Place
+from posefield.inference import session
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.session import Session, State
+from posefield.motion.measures import Measure
 
 FRAMES, TARGETS = 100, 64
 # A hand that ends some way from where the model puts it, m; a captured one may.
@@ -74,7 +74,7 @@ def rows(made: Family) -> list[Row]:
 
 def _asked(made: Family) -> Asked:
     opened = session.open_bytes(made.exported.content, "reaching.onnx")
-    bench, point = holding.bench(opened, 0), made.examples[4].controls[None]
+    bench, point = constrained_motion.bench(opened, 0), made.examples[4].controls[None]
     times = np.linspace(0.0, float(opened.durations(point)[0]), FRAMES)
     begun = bench.begun(opened.state(point, times))
     joint, last = opened.card.skeleton.names.index("RightHand"), float(opened.card.frames - 1)

@@ -22,17 +22,18 @@ from pathlib import Path
 
 from rows import Row, table
 
-from service.encode import ENCODERS
-from service.export import chunks, layouts, manifest, pool, queries, run
-from service.export.checkpoint import Part
-from service.export.job import Job, Work
-from service.export.pool import Runner
-from service.export.queries import Asked
-from service.export.query import Source
-from service.export.reading import Defaults
-from service.export.target import open_target
-from service.synthesis import intake
-from service.synthesis.clips import clip
+from posefield.batch import chunks, layouts, manifest, process_pool, run
+from posefield.batch.checkpoint import Part
+from posefield.batch.job import Job, Work
+from posefield.batch.process_pool import Runner
+from posefield.batch.rows import row_sources
+from posefield.batch.rows.row_query import Source
+from posefield.batch.rows.row_sources import Asked
+from posefield.batch.rows.row_validation import Defaults
+from posefield.batch.target import open_target
+from posefield.encode.formats import ENCODERS
+from posefield.registry import model_loading
+from posefield.synthesis.clips import clip
 
 ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
 LONGER = 8
@@ -54,8 +55,8 @@ class Bench:
     def of(cls, model: Path, clips: int, form: str) -> "Bench":
         """Clips at points sampled from a model's controls."""
         content = model.read_bytes()
-        opened = intake.opened(model.stem, model, content)
-        source = queries.source(Asked(sample=clips), Defaults(form), opened)
+        opened = model_loading.opened(model.stem, model, content)
+        source = row_sources.source(Asked(sample=clips), Defaults(form), opened)
         digest = hashlib.sha256(content).hexdigest()
         job = Job(opened.identity, digest, source.digest, "folder", 1)
         return cls(Work(job, content, ""), source)
@@ -100,7 +101,9 @@ class PeakMemory:
 def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     """Rates, ratios and shares, with what one process takes of memory."""
     bench = Bench.of(model, clips, form)
-    taken = in_turn({name: partial(bench.seconds, name, pool.run_here) for name in layouts.LAYOUTS})
+    taken = in_turn(
+        {name: partial(bench.seconds, name, process_pool.run_here) for name in layouts.LAYOUTS}
+    )
     return [
         *_rates(clips, form, taken),
         *_shares(bench, form, taken["folder"] / clips),
@@ -134,8 +137,8 @@ def _rates(clips: int, form: str, taken: dict[str, float]) -> list[Row]:
 def _processes(bench: Bench, clips: int, form: str) -> Row:
     taken = in_turn(
         {
-            "one": partial(bench.seconds, "folder", pool.run_here),
-            "two": partial(bench.seconds, "folder", pool.runner(2)),
+            "one": partial(bench.seconds, "folder", process_pool.run_here),
+            "two": partial(bench.seconds, "folder", process_pool.runner(2)),
         }
     )
     name = f"export of {clips} clips as {form} by two processes, their beginning included"
@@ -165,7 +168,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
     rows = bench.source.rows()
     asked = [next(rows) for _ in range(STAGED)]
     name = bench.work.job.model.partition("@")[0]
-    opened = intake.opened(name, name, bench.work.model)
+    opened = model_loading.opened(name, name, bench.work.model)
     encoder = ENCODERS[form]
     answers = [clip(opened, query.question) for query in asked]
     files = encoder.write(answers, encoder.usual)
@@ -214,7 +217,7 @@ def _memory(model: Path, clips: int, form: str) -> Row:
 
 def _peaks(model: Path, clips: int, form: str) -> list[float]:
     with tempfile.TemporaryDirectory() as target:
-        return Bench.of(model, clips, form).export("folder", pool.run_here, target)
+        return Bench.of(model, clips, form).export("folder", process_pool.run_here, target)
 
 
 def main() -> None:

@@ -17,8 +17,8 @@ from distributed import LocalCluster
 from export import Bench
 from rows import Row, table
 
-from service.export import cluster, pool
-from service.export.pool import Runner
+from posefield.batch import dask_export, process_pool
+from posefield.batch.process_pool import Runner
 
 CLIPS, FORM, LAYOUT = export.LONGER * export.CLIPS, "usdc", "folder"
 GOAL = 1.6
@@ -29,8 +29,8 @@ def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     bench = Bench.of(model, clips, form)
     with ExitStack() as stack:
         runners = {
-            "one process": pool.run_here,
-            "two processes": pool.runner(2),
+            "one process": process_pool.run_here,
+            "two processes": process_pool.runner(2),
             "one worker": stack.enter_context(_workers(1)),
             "two workers": stack.enter_context(_workers(2)),
         }
@@ -54,7 +54,7 @@ def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
 def _workers(count: int) -> Iterator[Runner]:
     """Yield the runner of `count` Dask workers with one thread each."""
     own = LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=":0")
-    with own, cluster.runner(own.scheduler_address) as runner:
+    with own, dask_export.runner(own.scheduler_address) as runner:
         yield runner
 
 

@@ -11,11 +11,12 @@ from family import Family
 from rows import Row, table
 from timing import in_turn
 
-from service.encode import ENCODERS
-from service.motion.answer import ClipAnswer
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, poses, session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.encode.formats import ENCODERS
+from posefield.inference import session
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.question.results import ClipAnswer
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 FRAMES, BATCH = 100, 16
 GOALS = {"glb": 5.0, "bvh": 5.0}

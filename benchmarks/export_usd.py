@@ -18,25 +18,23 @@ from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, table
 from timing import in_turn
 
-from service.encode import (
-    METRES,
-    animation,
-    body,
-    character,
-    crate,
-    library,
-    names,
-    press,
-    text,
-    usd,
+from posefield.encode.character import body_mesh, character, joint_names
+from posefield.encode.character.character import Rig
+from posefield.encode.formats import METRES
+from posefield.encode.usd import (
+    crate_template,
+    template_cache,
+    text_template,
+    usd_animation,
+    usd_clip,
+    usd_library,
 )
-from service.encode.character import Rig
-from service.encode.content import Content
-from service.motion import clip as clips
-from service.motion import quat
-from service.motion.answer import ClipAnswer, Trust
-from service.motion.clip import Clip
-from service.motion.skeleton import Skeleton
+from posefield.encode.usd.layer_content import Content
+from posefield.motion import clip as clips
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield.question.results import ClipAnswer, Trust
 
 CLIPS, FRAMES, JOINTS, ENTRIES = 32, 100, 30, 100_000
 SIZE = f"{JOINTS} joints × {FRAMES} frames"
@@ -49,14 +47,14 @@ class Form:
 
     name: str
     write: Callable[..., list[bytes]]
-    press: press.Press
+    press: template_cache.Press
     ordinary: Callable[..., bytes]
     goals: tuple[float | None, float | None]
 
 
 FORMS = (
-    Form("usdc", usd.usdc, press.CRATES, crate.ordinary, (200.0, 20.0)),
-    Form("usda", usd.usda, press.TEXTS, text.ordinary, (None, None)),
+    Form("usdc", usd_clip.usdc, template_cache.CRATES, crate_template.ordinary, (200.0, 20.0)),
+    Form("usda", usd_clip.usda, template_cache.TEXTS, text_template.ordinary, (None, None)),
 )
 
 
@@ -68,7 +66,7 @@ def rows() -> list[Row]:
 
 
 def _form(answers: list[ClipAnswer], form: Form) -> list[Row]:
-    one, made = answers[0], list(usd.authored(answers, METRES))
+    one, made = answers[0], list(usd_clip.authored(answers, METRES))
     expected = [form.ordinary(*each) for each in made]
     if any(form.write(answers, METRES) != expected for _ in range(2)):
         raise AssertionError(f"{form.name} differs from what usd-core writes")
@@ -113,8 +111,8 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
     one = answers[0]
     taken = in_turn(
         {
-            "usdz": lambda: usd.usdz(answers, METRES),
-            "sdf": lambda: usd.package(crate.ordinary(*_first([one]))),
+            "usdz": lambda: usd_clip.usdz(answers, METRES),
+            "sdf": lambda: usd_clip.package(crate_template.ordinary(*_first([one]))),
         },
         rounds=15,
         repeats=2,
@@ -128,9 +126,9 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
     """What an animation alone takes, a clip that warns, the first clips of a length, a library."""
     taken = in_turn(
         {
-            "whole": lambda: usd.usdc(answers, METRES),
-            "bare": lambda: animation.usdc(answers, METRES),
-            "warned": lambda: usd.usdc(_warned(answers), METRES),
+            "whole": lambda: usd_clip.usdc(answers, METRES),
+            "bare": lambda: usd_animation.usdc(answers, METRES),
+            "warned": lambda: usd_clip.usdc(_warned(answers), METRES),
             "new": lambda: _new(answers[:3]),
         },
         rounds=9,
@@ -138,7 +136,7 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
     )
     each = {name: 1e3 * seconds / CLIPS for name, seconds in taken.items()}
     warned = each["warned"] / each["whole"]
-    entries = [library.entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)]
+    entries = [usd_library.entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)]
     some = list(itertools.islice(itertools.cycle(entries), ENTRIES))
     stage = in_turn({"stage": lambda: _stage(answers[0], some)}, rounds=1, repeats=1)["stage"]
     return [
@@ -163,17 +161,17 @@ SERIAL = itertools.count()
 
 
 def _new(answers: list[ClipAnswer]) -> None:
-    fresh = press.Press(crate, press.CRATES.limit)
-    for each in usd.authored(answers, METRES):
+    fresh = template_cache.Press(crate_template, template_cache.CRATES.limit)
+    for each in usd_clip.authored(answers, METRES):
         fresh.write(*each)
 
 
-def _stage(answer: ClipAnswer, entries: list[library.Entry]) -> bytes:
-    return library.stage(answer.clip.skeleton, METRES, 30.0, entries)
+def _stage(answer: ClipAnswer, entries: list[usd_library.Entry]) -> bytes:
+    return usd_library.stage(answer.clip.skeleton, METRES, 30.0, entries)
 
 
-def _first(answers: list[ClipAnswer]) -> tuple[usd.Clips, Content]:
-    return next(usd.authored(answers, METRES))
+def _first(answers: list[ClipAnswer]) -> tuple[usd_clip.Clips, Content]:
+    return next(usd_clip.authored(answers, METRES))
 
 
 def _answers(count: int) -> list[ClipAnswer]:
@@ -248,7 +246,7 @@ def _schemas(clip: Clip, content: Content, convert: Convert, path: Path) -> byte
 def _skeleton(stage: Any, rig: Rig, content: Content) -> Any:
     made = UsdSkel.Skeleton.Define(stage, "/Character/Skel")
     made.CreateJointsAttr(rig.paths)
-    made.CreateJointNamesAttr(names.legal(rig.names))
+    made.CreateJointNamesAttr(joint_names.legal(rig.names))
     made.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["bind"]))
     made.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["rest"]))
     return made
@@ -259,14 +257,14 @@ def _mesh(stage: Any, rig: Rig, content: Content, extent: Any) -> Any:
     made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(content.values["points"]))
     made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(content.values["normals"]))
     made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    counts, corners = map(Vt.IntArray.FromNumpy, body.faces(rig.bones))
+    counts, corners = map(Vt.IntArray.FromNumpy, body_mesh.faces(rig.bones))
     made.CreateFaceVertexCountsAttr(counts)
     made.CreateFaceVertexIndicesAttr(corners)
     made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     made.CreateExtentAttr(extent)
     made.CreateDisplayColorAttr([Gf.Vec3f(0.75)])
     binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
-    joints = np.repeat(rig.bones.joints, body.POINTS)
+    joints = np.repeat(rig.bones.joints, body_mesh.POINTS)
     binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray.FromNumpy(joints))
     binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(len(joints), 1.0))
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))

@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from model_export import export, ingest, recipe, train
-from model_export.export import Exported
-from model_export.ingest import Example
-from model_export.sample import write
-from model_export.train import Trained
-from service.motion.conventions import Floats
+from posefield.common.units import Floats
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.graph.onnx_export import Exported
+from posefield_train.graph.trained_model import Trained
+from posefield_train.sample import sample_files
+from posefield_train.source import ingest, recipe
+from posefield_train.source.ingest import Example
 
 
 @dataclass(frozen=True)
@@ -53,13 +55,13 @@ def make(folder: Path) -> Family:
     Training is limited to one thread: the matrices are small, and on a busy machine threads that
     wait for each other take ten times as long.
     """
-    path = write.family(folder)
+    path = sample_files.family(folder)
     start = time.perf_counter()
     with threadpool_limits(limits=1):
         own = recipe.read(path)
         examples, notes = ingest.ingest(own, path.parent)
         trained = train.train(own, examples, lambda _: None)
-        exported = export.export(own, trained, notes)
+        exported = onnx_export.export(own, trained, notes)
     return of(trained, exported, time.perf_counter() - start)
 
 

@@ -12,15 +12,15 @@ import onnx
 import orjson
 from onnx import numpy_helper
 
-from service.encode import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
-from service.encode.packs import PACKS
-from service.motion import checksum
-from service.motion.card import Control
-from service.synthesis import session
-from service.synthesis.library import Library
-from service.synthesis.synthesizer import Synthesizer
-from service.web.app import App, create_app
-from service.web.settings import Settings
+from posefield.encode.archives import PACKS
+from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.app import App, create_app
+from posefield.inference import session
+from posefield.model_file import checksum
+from posefield.model_file.model_card import Control
+from posefield.registry.model_registry import Library
+from posefield.synthesis.synthesizer import Synthesizer
 
 FEWER = 4
 """Each so many questions are enough for a model that is there to be replaced."""

@@ -11,13 +11,15 @@ from functools import partial
 import numpy as np
 from family import Family
 
-from model_export import align, decoder, field_graph
-from model_export.covariance import COVARIANCES
-from model_export.ladder import Ladder
-from model_export.naive import Naive
-from model_export.net import Net
-from service.motion import quat
-from service.motion.conventions import Floats
+from posefield.common.units import Floats
+from posefield.motion import quat
+from posefield_train.align import time_alignment
+from posefield_train.kriging import kriging_graph
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.naive_kriging import Naive
+from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.tensor import decoder
 
 ABOUT = {"producer_name": "posefield", "producer_version": "naive"}
 
@@ -32,7 +34,7 @@ def numbers(made: Family) -> Floats:
 
 def positions(made: Family) -> Floats:
     """Joint positions (N, T, J, 3) of the aligned clips, m."""
-    return align.positions(made.trained.aligned, made.parents, made.offsets)
+    return time_alignment.positions(made.trained.aligned, made.parents, made.offsets)
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,8 @@ class Contents:
         """Graph of one question at many times, or of many questions at a time each."""
         model = self.made.trained.model
         net = Net()
-        ends = Ladder(field_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]]))
-        fields = field_graph.onnx(model.bank, net, "controls", ends.onnx(net))
+        ends = Ladder(kriging_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]]))
+        fields = kriging_graph.onnx(model.bank, net, "controls", ends.onnx(net))
         duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
         points = self._points(net)
         axes = net.indices(1, 2) if alone else net.indices(0, 2)

@@ -20,8 +20,8 @@ from threading import Thread
 import serve_process
 from rows import Row, table
 
-from service.motion.card import ModelCard
-from service.synthesis import library
+from posefield.model_file.model_card import ModelCard
+from posefield.registry import model_registry
 
 CLIENTS, ROUNDS, POSES = 10, 5, 20
 PAUSE = 0.02
@@ -63,7 +63,7 @@ def questions(name: str, card: ModelCard) -> dict[str, Question]:
 
 def rows(path: Path) -> list[Row]:
     """Return the factor by which each costly request slows a cheap pose down."""
-    ((name, model),) = library.load([path]).models.items()
+    ((name, model),) = model_registry.load([path]).models.items()
     card = model.session.card
     cheap = json.dumps({"controls": {c.name: c.default for c in card.controls}, "times": [0.0]})
     question = "POST", f"/v1/models/{name}/pose", cheap.encode()

@@ -14,8 +14,8 @@ from family import Family
 from rows import Row
 from timing import in_turn
 
-from model_export import naive, variogram
-from service.synthesis import freeze
+from posefield.model_file import subgraph
+from posefield_train.kriging import naive_kriging, variogram
 
 FRAMES, POSES = 100, 256
 
@@ -35,7 +35,7 @@ class Asked:
 def rows(made: Family) -> list[Row]:
     """A clip of 100 frames, a single pose, what pruning saves, and the file's size."""
     model = made.trained.model
-    field = naive.fit(
+    field = naive_kriging.fit(
         model.bank.pose.samples,
         naive_graphs.positions(made),
         naive_graphs.numbers(made),
@@ -48,7 +48,7 @@ def rows(made: Family) -> list[Row]:
     times = np.linspace(0.0, duration, FRAMES)[None]
     asked = {"controls": point.astype(np.float32), "time": times.astype(np.float32)}
     # As the service opens it.
-    ours = Asked(_session(freeze.at_level(made.exported.content, 0)), asked)
+    ours = Asked(_session(subgraph.at_level(made.exported.content, 0)), asked)
     rivals = {
         name: Asked(_session(made_by()), asked)
         for name, made_by in (
@@ -66,7 +66,7 @@ def rows(made: Family) -> list[Row]:
     ]
 
 
-def _batch_rows(made: Family, field: naive.Naive, ours: Asked) -> list[Row]:
+def _batch_rows(made: Family, field: naive_kriging.Naive, ours: Asked) -> list[Row]:
     """Poses of as many questions, each at its own time."""
     model = made.trained.model
     rng = np.random.Generator(np.random.PCG64(POSES))

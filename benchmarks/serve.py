@@ -20,8 +20,8 @@ from rows import Row, table
 from serve_load import Cost, Load, get, in_turn, post, run
 from serve_process import Server, bare, posefield
 
-from service.motion.card import Control
-from service.synthesis import session
+from posefield.inference import session
+from posefield.model_file.model_card import Control
 
 MODEL = Path("build/models/reaching.onnx")
 ROUNDS = 7

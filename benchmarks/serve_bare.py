@@ -15,8 +15,8 @@ import numpy as np
 import orjson
 import uvicorn
 
-from service.synthesis import session
-from service.synthesis.poses import ANSWERED
+from posefield.inference import session
+from posefield.synthesis.poses import ANSWERED
 
 
 def main(model: Path, port: int) -> None:

@@ -17,7 +17,7 @@ from serve import MODEL, TOGETHER, pose_questions
 from serve_load import Load, get, run
 from serve_process import posefield
 
-from service.synthesis import session
+from posefield.inference import session
 
 TOTAL, STEP = 1_000_000, 100_000
 SECONDS = 4.0

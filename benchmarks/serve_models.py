@@ -20,8 +20,7 @@ from tempfile import TemporaryDirectory
 import httpx
 from rows import Row, table
 
-from service.motion import checksum
-from service.synthesis import protobuf
+from posefield.model_file import checksum, protobuf_wire
 
 POSEFIELD = Path(sys.executable).with_name("posefield")
 MODEL = Path("build/models/reaching.onnx")
@@ -47,8 +46,8 @@ def content(model: Path, number: int) -> bytes:
 
 def numbered(sealed: bytes, number: int) -> bytes:
     """A model file with a number in its metadata, and the checksum of that."""
-    entry = protobuf.nested(1, b"number") + protobuf.nested(2, b"%04d" % number)
-    return checksum.sealed(sealed[: -checksum.SIZE] + protobuf.nested(14, entry))
+    entry = protobuf_wire.nested(1, b"number") + protobuf_wire.nested(2, b"%04d" % number)
+    return checksum.sealed(sealed[: -checksum.SIZE] + protobuf_wire.nested(14, entry))
 
 
 def _models(model: Path, folder: Path, count: int) -> None:

@@ -28,7 +28,7 @@ from serve import MODEL, TOGETHER, Numbers, pose_questions
 from serve_load import Cost, Load, get, in_turn, post
 from serve_process import PATIENCE, Server, free_port, posefield, started
 
-from service.synthesis import session
+from posefield.inference import session
 
 HERE = Path(__file__).parent
 ADAPTERS = HERE / "rivals"

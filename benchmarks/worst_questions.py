@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from service.encode import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
-from service.motion.errors import InvalidField
-from service.question import words
-from service.question.walk_question import WalkQuestion
-from service.synthesis import library
-from service.synthesis.course import MOST_POSES
-from service.synthesis.exact.goals import MOST_TARGETS
-from service.synthesis.synthesizer import Synthesizer
-from service.web import crowd_query, walk_query
-from service.web.settings import Settings
+from posefield.common.errors import InvalidField
+from posefield.constraints.targets import MOST_TARGETS
+from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.decoding import crowd_query
+from posefield.question import text_decoding
+from posefield.question.walk_question import WalkQuestion
+from posefield.registry import model_registry
+from posefield.synthesis.frame_times import MOST_POSES
+from posefield.synthesis.synthesizer import Synthesizer
 
 SETTINGS = Settings()
 GRID = 256
@@ -35,7 +35,7 @@ class Question:
 
 def of(reaching: Path, walk: Path) -> Iterator[Question]:
     """Yield the candidates of all operations that make something."""
-    ((name, model),) = library.load([reaching]).models.items()
+    ((name, model),) = model_registry.load([reaching]).models.items()
     one = _Asked(reaching, f"/v1/models/{name}", model)
     yield from _poses(one)
     yield from _clips(one)
@@ -46,7 +46,7 @@ def of(reaching: Path, walk: Path) -> Iterator[Question]:
     yield Question("suggestions", "count=200", reaching, f"{one.path}/suggestions?count=200")
     for path in ("/v1/models", one.path, "/", "/docs", "/problems", "/openapi.json", "/metrics"):
         yield Question(f"GET {path}", "", reaching, path)
-    ((name, model),) = library.load([walk]).models.items()
+    ((name, model),) = model_registry.load([walk]).models.items()
     yield from _walks(_Asked(walk, f"/v1/models/{name}", model))
 
 
@@ -185,9 +185,9 @@ def _largest(
 def _legal(one: _Asked, ending: str, query: str) -> bool:
     pairs = [tuple(pair.split("=")) for pair in query.split("&")]
     try:
-        asked = words.question(WalkQuestion, pairs)
+        asked = text_decoding.question(WalkQuestion, pairs)
         joints = len(one.model.session.card.skeleton)
-        walk_query.order(asked, ending, joints, SETTINGS)
+        crowd_query.walk_order(asked, ending, joints, SETTINGS)
     except InvalidField:
         return False
     return True

@@ -17,10 +17,10 @@ import pytest
 if TYPE_CHECKING:
     import numpy as np
 
-    from model_export.export import Exported
-    from model_export.ingest import Example
-    from model_export.recipe import Recipe
-    from model_export.train import Trained
+    from posefield_train.graph.onnx_export import Exported
+    from posefield_train.graph.trained_model import Trained
+    from posefield_train.source.ingest import Example
+    from posefield_train.source.recipe import Recipe
 
 
 # Coverage measures pytest-xdist's workers, but not their child processes: some of these are killed
@@ -185,7 +185,7 @@ def posefield(monkeypatch, capsys):
     """Return a function that runs `posefield` here, and returns exit code, output and errors."""
 
     def run(*words):
-        from service import cli
+        from posefield import cli
 
         monkeypatch.setattr(sys, "argv", ["posefield", *map(str, words)])
         capsys.readouterr()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.web import contract
+from posefield.http.api import contract
 
 EXAMPLES = Path(__file__).parents[1] / "api/examples"
 OPERATIONS = {operation.id: operation for operation in contract.load().operations}

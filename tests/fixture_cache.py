@@ -24,9 +24,9 @@ ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "fixtures"
 SOURCES = (
     "model_export",
-    "service/__init__.py",
-    "service/motion",
-    "service/synthesis",
+    "service/posefield/__init__.py",
+    "service/posefield/motion",
+    "service/posefield/synthesis",
     "tests/fixture_cache.py",
     "tests/fixture_models.py",
 )
@@ -99,8 +99,9 @@ def _environment() -> Iterator[str]:
     # Absolute paths of the clips are in what is pickled.
     yield str(FOLDER)
     yield f"{platform.python_implementation()} {platform.python_version()} {platform.machine()}"
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    for line in [*project["dependencies"], *project["optional-dependencies"]["train"]]:
+    files = [ROOT / folder / "pyproject.toml" for folder in ("service", "model_export")]
+    projects = [tomllib.loads(file.read_text())["project"] for file in files]
+    for line in [line for project in projects for line in project["dependencies"]]:
         name = re.split(r"[\[<>=!~ ;]", line, maxsplit=1)[0]
         try:
             yield f"{name} {version(name)}"

@@ -6,17 +6,19 @@ from pathlib import Path
 
 import fixture_cache
 
-from model_export import export, ingest, recipe, train
-from model_export.export import Exported
-from model_export.ingest import Example
-from model_export.recipe import Recipe
-from model_export.sample import stroll, write
-from model_export.train import Trained
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.graph.onnx_export import Exported
+from posefield_train.graph.trained_model import Trained
+from posefield_train.sample import sample_files, sample_walk
+from posefield_train.source import ingest, recipe
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
 
 
 def family() -> Path:
     """Return the folder of the whole procedural family; its recipe is recipe.toml."""
-    return fixture_cache.path("family", write.family)
+    return fixture_cache.path("family", sample_files.family)
 
 
 @functools.cache
@@ -42,13 +44,13 @@ def measured_recipe() -> Recipe:
         {"name": name, "auto": {"quantity": name}, "description": name}
         for name in ("speed", "turn")
     ]
-    return Recipe.model_validate({**tomllib.loads(stroll.TOML), "controls": measured})
+    return Recipe.model_validate({**tomllib.loads(sample_walk.TOML), "controls": measured})
 
 
 RECIPES = {
     "reaching": small_recipe,
     "labelled": labelled_recipe,
-    "stroll": stroll.recipe,
+    "stroll": sample_walk.recipe,
     "measured": measured_recipe,
 }
 
@@ -84,10 +86,10 @@ def trained(model: str) -> Trained:
 def exported(model: str) -> Exported:
     """Return a small model with its levels of detail and the content of its file."""
     return fixture_cache.value(
-        f"{model}-exported", lambda: export.export(RECIPES[model](), trained(model), [])
+        f"{model}-exported", lambda: onnx_export.export(RECIPES[model](), trained(model), [])
     )
 
 
 def _write_strides(folder: Path) -> None:
     folder.mkdir()
-    stroll.write(folder)
+    sample_walk.write(folder)

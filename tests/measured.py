@@ -3,16 +3,16 @@
 from dataclasses import replace
 from pathlib import Path
 
-from service.motion.measure import Measure
-from service.synthesis import library
-from service.synthesis.synthesizer import Synthesizer
+from posefield.motion.measures import Measure
+from posefield.registry import model_registry
+from posefield.synthesis.synthesizer import Synthesizer
 
 HAND = "RightHand"
 
 
 def reaching(path: Path) -> Synthesizer:
     """The model of a file of the reaching family, `target_height` measured at the hand's end."""
-    (found,) = library.load([path]).models.values()
+    (found,) = model_registry.load([path]).models.values()
     card = found.session.card
     own = Measure("height", (card.skeleton.names.index(HAND),), "end")
     controls = tuple(

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from service.motion.card import Control, Event, Making, ModelCard
-from service.motion.detail import Level
-from service.motion.field import Hyper
-from service.motion.measure import Measure
-from service.motion.skeleton import Skeleton
+from posefield.kriging.kriging_model import Hyper
+from posefield.model_file.level_of_detail import Level
+from posefield.model_file.model_card import Control, Event, Making, ModelCard
+from posefield.motion.measures import Measure
+from posefield.motion.skeleton import Skeleton
 
 CARD = ModelCard(
     name="reaching",

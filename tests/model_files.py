@@ -4,8 +4,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from service.motion import checksum
-from service.synthesis import protobuf
+from posefield.model_file import checksum, protobuf_wire
 
 METADATA = 14
 """Number of the field of an ONNX file that holds an entry of its metadata."""
@@ -13,8 +12,8 @@ METADATA = 14
 
 def numbered(content: bytes, number: int) -> bytes:
     """Return the same model in other bytes: a number is written into its metadata."""
-    entry = protobuf.nested(1, b"number") + protobuf.nested(2, b"%04d" % number)
-    return checksum.sealed(content[: -checksum.SIZE] + protobuf.nested(METADATA, entry))
+    entry = protobuf_wire.nested(1, b"number") + protobuf_wire.nested(2, b"%04d" % number)
+    return checksum.sealed(content[: -checksum.SIZE] + protobuf_wire.nested(METADATA, entry))
 
 
 def written(model: onnx.ModelProto) -> bytes:

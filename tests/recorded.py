@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from service.synthesis.session import Session
+from posefield.inference.session import Session
 
 Feed = dict[str, Any]
 

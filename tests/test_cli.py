@@ -13,14 +13,15 @@ import typer
 from pxr import Usd, UsdSkel
 from rich.text import Text
 
-from model_export import bvh
-from model_export.cli import commands
-from model_export.sample import truth
-from service import __version__, cli
-from service.encode import ENCODERS
-from service.encode.convention import Convention
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, library, poses
+from posefield import __version__, cli
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import ENCODERS
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips, poses
+from posefield_train.cli import commands
+from posefield_train.sample import noise_free
+from posefield_train.source import bvh
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
@@ -192,7 +193,7 @@ def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path, fps):
     words = ("sample", "reaching", "--truth", "-o", path, *CONTROLS, "--fps", fps, "--json")
     code, out, _ = posefield(*words)
     assert code == 0
-    expected = truth.clip(POINT, fps)
+    expected = noise_free.clip(POINT, fps)
     found = bvh.read(path)
     assert (len(found.values), found.rate) == (len(expected), fps)
     # A BVH file of ours is in centimetres.
@@ -200,7 +201,7 @@ def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path, fps):
     assert np.abs(clip.positions() - expected.positions()).max() < 1e-4
     said = json.loads(out)
     assert (said["model"], said["frames"], said["sigma"]) == ("reaching@truth", len(expected), 0.0)
-    assert said["duration"] == pytest.approx(truth.duration(POINT), abs=1.0 / fps)
+    assert said["duration"] == pytest.approx(noise_free.duration(POINT), abs=1.0 / fps)
 
 
 def test_sample_truth_of_what_no_body_can_do_is_refused(refused, tmp_path):
@@ -234,7 +235,7 @@ def test_train_writes_a_model_and_says_what_it_measured(posefield, train_words, 
     steps = [line.split(" s  ")[1] for line in err.splitlines()]
     assert steps[0].startswith("reading ") and steps[1] == "aligning 30 clips"
     assert steps[-1] == "done"
-    assert library.load([path]).models["quick"].session.card.frames == 8
+    assert model_registry.load([path]).models["quick"].session.card.frames == 8
     assert [p.name for p in path.parent.iterdir()] == ["quick.onnx"]
 
 
@@ -328,7 +329,7 @@ def test_inspect_answers_as_json(posefield, model_path):
     code, out, _ = posefield("inspect", model_path, "--json")
     assert code == 0
     card = json.loads(out)
-    assert card["identity"] == library.load([model_path]).models["reaching"].identity
+    assert card["identity"] == model_registry.load([model_path]).models["reaching"].identity
     assert [c["name"] for c in card["controls"]] == list(POINT)
     assert card["skeleton"]["names"][0] == "Hips"
     assert card["diagnostics"]["notes"] == []
@@ -372,7 +373,7 @@ def test_pose_answers_as_json(posefield, model_path):
     assert np.shape(said["root_position"]) == (2, 3)
     assert np.shape(said["bone_offsets"]) == (33, 3)
     assert said["trust"]["controls"] == POINT and said["trust"]["warnings"] == []
-    model = library.load([model_path]).models["reaching"]
+    model = model_registry.load([model_path]).models["reaching"]
     expected = poses.pose(model, PoseQuestion(controls=POINT, times=[0.25, 0.5]))
     assert np.abs(said["rotations"] - expected.rotations).max() < 1e-6
 
@@ -479,7 +480,7 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
     path = tmp_path / "new" / f"clip.{ending}"
     code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
     assert (code, err) == (0, "")
-    model = library.load([model_path]).models["reaching"]
+    model = model_registry.load([model_path]).models["reaching"]
     answer = clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn"))
     said = json.loads(out)
     assert said == {
@@ -523,7 +524,7 @@ def test_clip_names_joints_and_measures_as_asked_for(posefield, model_path, tmp_
     assert found["names"][9:12] == ["Spine", "Spine1", "Spine2"]
     assert (found["units"]["length"], found["units"]["up"]) == ("centimetre", "Z")
     asked = ClipQuestion(controls=POINT, names="humanik", root="in_place")
-    answer = clips.clip(library.load([model_path]).models["reaching"], asked)
+    answer = clips.clip(model_registry.load([model_path]).models["reaching"], asked)
     assert path.read_bytes() == ENCODERS["json"].encode(answer, Convention(0.01, "z"))
 
 

@@ -7,8 +7,9 @@ import pytest
 from pxr import Usd, UsdSkel
 from typer.testing import CliRunner
 
-from service import cli, crowds
-from service.motion.errors import FileError, FormError, InvalidField, MotionError
+from posefield import cli
+from posefield.cli import crowd_files
+from posefield.common.errors import FileError, FormError, InvalidField, MotionError
 
 
 def run(*words):
@@ -98,7 +99,7 @@ def test_a_file_that_is_no_json_is_named(walk_path, tmp_path):
     path = tmp_path / "routes.json"
     path.write_text("[")
     with pytest.raises(MotionError, match=r"routes\.json: not JSON"):
-        crowds.routes(path)
+        crowd_files.routes(path)
 
 
 @pytest.mark.parametrize("ending", ["usd", "usda", "usdc", "usdz"])

@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from service import __version__
+from posefield import __version__
 
 ROOT = Path(__file__).parents[1]
-PACKAGING = {"pyproject.toml", "uv.lock", "README.md", "LICENSE"}
+# uv reads the description of every distribution of the workspace, and installs one.
+PACKAGING = {"pyproject.toml", "uv.lock"}
+MEMBERS = {"model_export/pyproject.toml", "clients/python/pyproject.toml"}
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +70,7 @@ def test_two_stages_from_one_base_that_is_pinned_by_digest(parts):
 def test_only_the_service_and_its_packaging_are_copied(stages):
     build, final = stages
     copied = {source for line in values(build, "COPY") for source in line.split()[:-1]}
-    assert copied == {*PACKAGING, "api", "service"}
+    assert copied == {*PACKAGING, *MEMBERS, "api", "service/pyproject.toml", "service"}
     assert values(final, "COPY") == ["--from=build /opt/posefield /opt/posefield"]
     assert not values(build, "ADD") + values(final, "ADD")
 
@@ -80,7 +82,7 @@ def test_the_build_takes_the_lock_and_what_exports_to_stores_need(stages):
     assert values(stages[0], "ARG") == ['EXTRAS="--extra store"']
     assert values(stages[1], "ARG") == ['SOURCE=""', 'REVISION=""']
     assert all(line.endswith(" ${EXTRAS}") and "--extra" not in line for line in syncs)
-    known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    known = tomllib.loads((ROOT / "service/pyproject.toml").read_text())["project"]
     assert "store" in known["optional-dependencies"]
 
 
@@ -121,7 +123,7 @@ def test_it_serves_the_models_folder(stages):
 def test_labels_say_what_it_is(stages):
     given = dict(pair.split("=", 1) for pair in shlex.split(values(stages[1], "LABEL")[0]))
     said = {name.removeprefix("org.opencontainers.image."): text for name, text in given.items()}
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "service/pyproject.toml").read_text())["project"]
     assert (said["title"], said["version"]) == (project["name"], __version__)
     assert said["licenses"] == project["license"]
     assert (said["source"], said["revision"]) == ("${SOURCE}", "${REVISION}")
@@ -139,4 +141,9 @@ def test_the_context_is_what_is_copied():
     lines = (ROOT / ".dockerignore").read_text().splitlines()
     rules = [line for line in lines if line and not line.startswith("#")]
     assert rules[0] == "*"
-    assert {rule[1:] for rule in rules if rule.startswith("!")} == {*PACKAGING, "api", "service"}
+    assert {rule[1:] for rule in rules if rule.startswith("!")} == {
+        *PACKAGING,
+        *MEMBERS,
+        "api",
+        "service",
+    }

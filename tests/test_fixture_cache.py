@@ -14,12 +14,14 @@ TRAIN = """
 import sys
 from pathlib import Path
 import fixture_models
-from model_export import export, ingest, train
-from model_export.sample import stroll
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.sample import sample_walk
+from posefield_train.source import ingest
 
-own = stroll.recipe()
-found, _ = ingest.ingest(own, stroll.write(Path(sys.argv[1])))
-export.export(own, train.train(own, found, lambda _: None), [])
+own = sample_walk.recipe()
+found, _ = ingest.ingest(own, sample_walk.write(Path(sys.argv[1])))
+onnx_export.export(own, train.train(own, found, lambda _: None), [])
 for module in list(sys.modules.values()):
     file = getattr(module, "__file__", None) or ""
     if file.startswith(sys.argv[2]) and "/.venv" not in file:
@@ -42,7 +44,7 @@ def test_the_digest_covers_every_file_that_training_imports(tmp_path):
     own = {"PYTHONPATH": str(fixture_cache.ROOT / "tests"), "PATH": ""}
     said = subprocess.run(words, env=own, capture_output=True, text=True, check=True).stdout
     imported = {Path(line) for line in said.split()}
-    assert Path("model_export/train.py") in imported
+    assert Path("model_export/posefield_train/train.py") in imported
     assert imported <= set(fixture_cache.sources(fixture_cache.ROOT))
 
 
@@ -52,7 +54,7 @@ def test_the_digest_changes_with_a_source_and_with_its_name(tmp_path):
         shutil.copy(fixture_cache.ROOT / file, tmp_path / file)
     found = [fixture_cache.digest_of(tmp_path)]
     assert found == [fixture_cache.digest_of(fixture_cache.ROOT)]
-    source = tmp_path / "service/motion/quat.py"
+    source = tmp_path / "service/posefield/motion/quat.py"
     source.write_text(source.read_text() + "\n")
     found.append(fixture_cache.digest_of(tmp_path))
     source.rename(source.with_name("quaternion.py"))

@@ -1,5 +1,6 @@
 """Tests of the import rules between the shipped packages and the training packages."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -9,6 +10,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+LAYERS = "packages import only those below them"
+PACKAGES = ("service/posefield", "model_export/posefield_train")
 
 # In a process of its own: nothing of the training job can be imported, as in the image.
 HIDDEN = """
@@ -16,7 +19,7 @@ import sys
 
 class Hidden:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {"model_export", "scipy", "onnx", "pydantic", "matplotlib"}:
+        if name.partition(".")[0] in {"posefield_train", "scipy", "onnx", "pydantic", "matplotlib"}:
             raise ModuleNotFoundError(f"hidden: {name}", name=name)
 
 sys.meta_path.insert(0, Hidden())
@@ -38,7 +41,15 @@ sys.meta_path.insert(0, Watch())
 def lint(folder):
     """Outcome of import-linter over the packages in a folder, by its own contracts."""
     command = [str(Path(sys.executable).parent / "lint-imports"), "--no-cache"]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    paths = os.pathsep.join(str((folder / package).parent) for package in PACKAGES)
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def python(code):
@@ -54,7 +65,7 @@ def python(code):
 @pytest.fixture
 def copy(tmp_path):
     """The packages and their contracts, to make a hole in."""
-    for package in ("service", "model_export"):
+    for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=lambda *_: ["__pycache__"])
     shutil.copy(ROOT / ".importlinter", tmp_path)
     return tmp_path
@@ -70,16 +81,44 @@ def test_every_import_stays_within_its_layer():
 @pytest.mark.parametrize(
     ("module", "line", "broken"),
     [
-        ("service/motion/clip.py", "import orjson", "the floor needs numpy only"),
-        ("service/motion/clip.py", "import service.encode", "the service reads downhill"),
-        ("service/encode/usd.py", "import service.synthesis", "the service reads downhill"),
-        ("service/check/rig.py", "import service.encode", "the service reads downhill"),
-        ("service/encode/usd.py", "import starlette", "only the web speaks HTTP"),
-        ("service/web/app.py", "import model_export.train", "what ships never imports"),
-        ("service/synthesis/session.py", "import onnx", "what ships never imports"),
-        ("service/check/rig.py", "import matplotlib.figure", "what ships never imports"),
-        ("model_export/train.py", "import service.synthesis.session", "the training job uses"),
-        ("model_export/export.py", "import service.encode", "the training job uses"),
+        ("service/posefield/motion/clip.py", "import orjson", "the floor needs numpy only"),
+        ("service/posefield/motion/clip.py", "import posefield.encode", LAYERS),
+        (
+            "service/posefield/encode/usd/usd_clip.py",
+            "import posefield.synthesis",
+            LAYERS,
+        ),
+        (
+            "service/posefield/check/skeleton_bindings.py",
+            "import posefield.encode",
+            LAYERS,
+        ),
+        (
+            "service/posefield/encode/usd/usd_clip.py",
+            "import starlette",
+            "only the web speaks HTTP",
+        ),
+        (
+            "service/posefield/http/app.py",
+            "import posefield_train.train",
+            "what ships never imports",
+        ),
+        ("service/posefield/inference/session.py", "import onnx", "what ships never imports"),
+        (
+            "service/posefield/check/skeleton_bindings.py",
+            "import matplotlib.figure",
+            "what ships never imports",
+        ),
+        (
+            "model_export/posefield_train/train.py",
+            "import posefield.inference.session",
+            "the training job uses",
+        ),
+        (
+            "model_export/posefield_train/graph/onnx_export.py",
+            "import posefield.encode",
+            "the training job uses",
+        ),
     ],
 )
 def test_a_planted_breach_is_caught_and_named(copy, module, line, broken):
@@ -91,11 +130,12 @@ def test_a_planted_breach_is_caught_and_named(copy, module, line, broken):
 
 
 def test_what_ships_runs_without_the_training_job():
-    done = python(f"{HIDDEN}import service.cli, service.web.app, service.check\nprint('fine')")
+    packages = "posefield.cli, posefield.http.app, posefield.check"
+    done = python(f"{HIDDEN}import {packages}\nprint('fine')")
     assert (done.returncode, done.stdout) == (0, "fine\n"), done.stderr
 
 
-@pytest.mark.parametrize("module", ["model_export", "scipy.linalg", "onnx.helper", "pydantic"])
+@pytest.mark.parametrize("module", ["posefield_train", "scipy.linalg", "onnx.helper", "pydantic"])
 def test_what_is_hidden_cannot_be_imported(module):
     """Negative control of the test above."""
     done = python(f"{HIDDEN}import {module}")
@@ -108,13 +148,18 @@ DRAWS = "import sys, {module}\nprint('matplotlib' in sys.modules)"
 
 @pytest.mark.system
 def test_who_wants_no_pictures_waits_for_none():
-    done = python(DRAWS.format(module="model_export.evaluate.protocol"))
+    done = python(DRAWS.format(module="posefield_train.evaluate.protocol"))
     assert done.stdout == "False\n", done.stderr
     # Negative control: the page needs it.
-    assert python(DRAWS.format(module="model_export.evaluate.evaluation_page")).stdout == "True\n"
+    assert (
+        python(DRAWS.format(module="posefield_train.evaluate.pages.evaluation_page")).stdout
+        == "True\n"
+    )
 
 
-@pytest.mark.parametrize("module", ["service.synthesis.session", "service.cli", "model_export.cli"])
+@pytest.mark.parametrize(
+    "module", ["posefield.inference.session", "posefield.cli", "posefield_train.cli"]
+)
 def test_telemetry_is_off_before_onnxruntime_is_imported(module):
     done = python(f"{WATCHED}import {module}")
     assert done.stdout.splitlines() == ["telemetry disabled: 1"], done.stderr
@@ -129,12 +174,12 @@ def test_onnxruntime_by_itself_would_not_find_it_off():
 LATE = ("pxr", "jinja2", "obstore", "scipy", "onnx", "rich.progress")
 
 
-@pytest.mark.parametrize("module", ["service.cli", "service.web.app", "model_export.cli"])
+@pytest.mark.parametrize("module", ["posefield.cli", "posefield.http.app", "posefield_train.cli"])
 def test_the_start_imports_nothing_that_only_some_requests_need(module):
     said = python(f"import sys, {module}; print([m for m in {LATE} if m in sys.modules])")
     assert said.stdout == "[]\n", said.stderr
 
 
 def test_an_import_at_the_start_would_be_noticed():
-    said = python("import sys, service.encode.usd; print('pxr' in sys.modules)")
+    said = python("import sys, posefield.encode.usd.usd_clip; print('pxr' in sys.modules)")
     assert said.stdout == "True\n", said.stderr

@@ -150,5 +150,5 @@ def test_no_npm_package_is_copyleft():
 def test_what_is_our_own_is_under_one_licence():
     for name in ("posefield", "posefield-client"):
         assert licences(distribution(name)) == ["Apache-2.0"]
-    addon = (ROOT / "clients/blender/posefield/blender_manifest.toml").read_text()
+    addon = (ROOT / "clients/blender/addon/blender_manifest.toml").read_text()
     assert 'license = ["SPDX:Apache-2.0"]' in addon

@@ -7,13 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_export import align, data, export, ingest, recipe, samples, train
-from service.motion import ground, quat
-from service.motion.conventions import UP
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, poses, session
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.walk import company, detail, gait, march, skating
+from posefield.common.units import UP
+from posefield.inference import session
+from posefield.locomotion import (
+    gait,
+    level_transitions,
+    locomotion_plan,
+    walking_crowd,
+)
+from posefield.motion import foot_skate, quat
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train import train
+from posefield_train.align import time_alignment
+from posefield_train.graph import onnx_export
+from posefield_train.kriging import sample_points
+from posefield_train.source import data_folder, ingest, recipe
 
 pytestmark = pytest.mark.system
 
@@ -37,7 +47,7 @@ def made(request, real_data):
     own = recipe.read(RECIPES / f"{request.param}.toml")
     examples, notes = ingest.ingest(own, real_data)
     trained = train.train(own, examples, lambda _: None)
-    return own, trained.examples, trained, export.export(own, trained, notes)
+    return own, trained.examples, trained, onnx_export.export(own, trained, notes)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +63,7 @@ def middle(model):
 def test_a_recipe_trains_and_passes_the_gate(made):
     own, examples, trained, exported = made
     assert len(examples) == exported.card.samples == CLIPS[own.name]
-    assert 0.0 < exported.parity < export.ALLOWED
+    assert 0.0 < exported.parity < onnx_export.ALLOWED
     assert len(exported.content) < 135_000
     budget = 0.01 * own.size.rms_budget_cm
     assert 0.95 * budget < exported.card.diagnostics["truncation_rms_m"] <= budget
@@ -72,7 +82,7 @@ WRITTEN = 0.00051
 def table(made, real_data):
     """What others measured of the clips, by column."""
     own, examples, *_ = made
-    with data.find(real_data, own.clips.table).open("rb") as file:
+    with data_folder.find(real_data, own.clips.table).open("rb") as file:
         # The heading is line one.
         records = list(csv.DictReader(io.TextIOWrapper(file, "utf-8-sig")))
 
@@ -177,7 +187,7 @@ def test_samples_are_met_better_than_by_the_mean_motion(made):
     own, examples, trained, _ = made
     aligned, model = trained.aligned, trained.model
     frames = np.tile(np.arange(float(own.motion.frames)), (len(examples), 1))
-    labels = samples.labels([e.row.performer for e in examples], model.bank.performers)
+    labels = sample_points.labels([e.row.performer for e in examples], model.bank.performers)
     controls = np.stack([example.controls for example in examples])
     fields = model.bank.numpy(model.bank.points(controls, labels))
     rotations, root = model.decoder.numpy(fields["pose"], frames)
@@ -233,8 +243,8 @@ def test_a_walk_closes_its_loop(made, model):
 
 def finest(opened, plan):
     """Motions of all characters of a plan, at the finest level."""
-    shown = detail.constant(0, plan.phases.shape)
-    return company.motions(opened, plan, np.arange(len(plan.who)), shown)
+    shown = level_transitions.constant(0, plan.phases.shape)
+    return walking_crowd.motions(opened, plan, np.arange(len(plan.who)), shown)
 
 
 def source_skate(clips, feet, rate):
@@ -243,8 +253,8 @@ def source_skate(clips, feet, rate):
     for clip in clips:
         frames = round(clip.duration * rate) + 1
         joints = clip.positions()[:, list(feet)].reshape(len(clip), -1)
-        even = align.at(joints, np.linspace(0.0, 1.0, frames)).reshape(frames, -1, 3)
-        speeds.append(ground.skate(even, (frames - 1) / clip.duration))
+        even = time_alignment.at(joints, np.linspace(0.0, 1.0, frames)).reshape(frames, -1, 3)
+        speeds.append(foot_skate.skate(even, (frames - 1) / clip.duration))
     return np.array(speeds)
 
 
@@ -258,8 +268,8 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
     _, examples, _, exported = made
     card, rate = exported.card, 30.0
     walk = gait.of(model.session)
-    plan = company.wandering(walk, 150, 10.0, rate, 0)
-    feet = skating.of(
+    plan = walking_crowd.wandering(walk, 150, 10.0, rate, 0)
+    feet = walking_crowd.foot_skate_of(
         card,
         finest(walk.session, plan),
         rate,
@@ -268,14 +278,14 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
     crowd = mean_walker(feet.mean(axis=1), plan.who, count)
     moved_by = np.array(card.moved_by)
     source = source_skate([example.clip for example in examples], card.feet, rate)
-    strides = skating.of_strides(walk, rate)[:, 0]
+    strides = walking_crowd.stride_skate(walk, rate)[:, 0]
     assert crowd < 1.2 * mean_walker(source, moved_by, count)
     assert crowd < 1.1 * mean_walker(strides, moved_by, count)
     # The path costs nothing: left to itself the model's feet slide as much.
     starts = plan.places[:, 0], plan.headings[:, 0]
-    free = march.roam(walk, plan.controls, plan.who, plan.phases[:, 0], starts, rate)
+    free = locomotion_plan.roam(walk, plan.controls, plan.who, plan.phases[:, 0], starts, rate)
     assert np.abs(free.places - plan.places).max() < 0.3
-    left = skating.of(
+    left = walking_crowd.foot_skate_of(
         card,
         finest(walk.session, free),
         rate,

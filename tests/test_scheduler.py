@@ -9,19 +9,19 @@ from pathlib import Path
 import pytest
 from clusters import started
 
-import service
-from service import scheduler
-from service.motion.errors import ClusterError
+import posefield
+from posefield.common import dask_scheduler
+from posefield.common.errors import ClusterError
 
 pytestmark = pytest.mark.system
 
-KIT = scheduler.Kit(("service",), ("numpy", "onnxruntime"))
+KIT = dask_scheduler.Kit(("service",), ("numpy", "onnxruntime"))
 
 # Every client in a process of its own: its loop and sockets are nobody else's.
 CONNECT = f"""
 import sys
 from service import scheduler
-from service.motion.errors import ClusterError
+from posefield.common.errors import ClusterError
 try:
     with scheduler.connect(sys.argv[1], scheduler.{KIT!r}, 3.0) as client:
         print(len(client.scheduler_info()["workers"]), "workers")
@@ -63,7 +63,7 @@ def test_a_worker_without_posefield_is_named(cluster, tmp_path):
 
 def test_a_worker_with_another_source_is_named(cluster, tmp_path):
     copy = tmp_path / "older"
-    shutil.copytree(Path(service.__file__).parent, copy / "service")
+    shutil.copytree(Path(posefield.__file__).parent, copy / "service")
     cluster.add(path=str(copy))
     assert connect(cluster.address) == "2 workers"
     with (copy / "service" / "crowds.py").open("a") as file:
@@ -71,13 +71,13 @@ def test_a_worker_with_another_source_is_named(cluster, tmp_path):
     cluster.add(path=str(copy))
     found = connect(cluster.address)
     assert found.count("worker tcp://") == 1
-    assert f"expected {scheduler.installed(KIT)['service']}" in found
+    assert f"expected {dask_scheduler.installed(KIT)['service']}" in found
 
 
 @pytest.mark.parametrize("address", ["nonsense", "nope://127.0.0.1:8786", ""])
 def test_what_is_no_address_is_said_at_once(address):
     expected = pytest.raises(ClusterError, match="expected one such as tcp://host:8786")
-    with expected, scheduler.connect(address, KIT):
+    with expected, dask_scheduler.connect(address, KIT):
         pass
 
 
@@ -91,17 +91,19 @@ def test_no_workers(tmp_path):
 
 
 def test_another_source_or_version_is_a_difference(tmp_path):
-    here = scheduler.installed(KIT)
+    here = dask_scheduler.installed(KIT)
     assert set(here) == {"Python", "service", "numpy", "onnxruntime"}
-    assert scheduler.differences(here, here) == ""
+    assert dask_scheduler.differences(here, here) == ""
     there = {**here, "numpy": "1.0", "service": "source 00000000"}
-    assert scheduler.differences(there, here) == (
+    assert dask_scheduler.differences(there, here) == (
         f"service source 00000000, expected {here['service']}, numpy 1.0, expected {here['numpy']}"
     )
 
 
 def test_what_is_missing_is_none():
-    found = scheduler.installed(scheduler.Kit(("no_such_package",), ("no-such-distribution",)))
+    found = dask_scheduler.installed(
+        dask_scheduler.Kit(("no_such_package",), ("no-such-distribution",))
+    )
     assert (found["no_such_package"], found["no-such-distribution"]) == ("none", "none")
 
 
@@ -109,7 +111,7 @@ def test_what_is_missing_is_none():
 WITHOUT = """
 import sys
 sys.modules["distributed"] = None
-from service.cli import main
+from posefield.cli import main
 main()
 """
 

@@ -114,13 +114,13 @@ def test_nothing_of_our_own_is_patched():
 @pytest.mark.parametrize(
     "line",
     [
-        "from service.web import caching\nmonkeypatch.setattr(caching, 'version', 1)",
-        "from service.web import caching\nmonkeypatch.setattr(caching.os, 'name', 1)",
-        "import service.web.caching\nmonkeypatch.setattr(service.web.caching, 'version', 1)",
-        "monkeypatch.setattr('service.web.caching.version', 1)",
+        "from posefield.http.middleware import caching\nmonkeypatch.setattr(caching, 'version', 1)",
+        "from posefield.http.middleware import caching\nmonkeypatch.setattr(caching.os, 'name', 1)",
+        "import posefield.http.app\nmonkeypatch.setattr(posefield.http.app, 'version', 1)",
+        "monkeypatch.setattr('posefield.http.middleware.caching.version', 1)",
         "with monkeypatch.context() as patch:\n    patch.setattr(form, 'ordinary', 1)",
         "monkeypatch.setattr(type(model), 'run', 1)",
-        "from model_export import train\ntrain.ROUNDS = 3",
+        "from posefield_train import train\ntrain.ROUNDS = 3",
         "from unittest import mock",
         "import unittest.mock",
         "from unittest.mock import patch",

@@ -8,9 +8,9 @@ from family import Family
 from rows import Row
 from timing import in_turn
 
-from model_export.variogram import Experimental, Fit
 from paper import poses, precomputation
 from paper.measurement import CORE_GOAL, PRECOMPUTE_GOAL, SHOWN, Baseline, Size, Table1
+from posefield_train.kriging.variogram import Experimental, Fit
 
 
 def rows(table: Table1) -> list[Row]:

@@ -12,16 +12,17 @@ from functools import cached_property
 import numpy as np
 from family import Family
 
-from model_export import kriging, ranks
-from model_export.cost import Price
-from model_export.decoder import Decoder
-from model_export.hosvd import Multilinear
-from model_export.kriging import Hyper, Kriging
-from model_export.naive import Naive
-from model_export.ranks import Front, Triple
 from paper import precomputation
-from service.motion import skeleton
-from service.motion.conventions import Floats
+from posefield.common.units import Floats
+from posefield.motion import skeleton
+from posefield_train.graph import ranks
+from posefield_train.graph.ranks import Front, Triple
+from posefield_train.graph.truncation_cost import Price
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.naive_kriging import Naive
+from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.tensor.decoder import Decoder
+from posefield_train.tensor.hosvd import Multilinear
 
 # Control points that the search for ranks uses; control points evaluated together.
 SOME, CHUNK = 100, 100
@@ -60,7 +61,7 @@ class Errors:
 
     def field(self, reduced: Multilinear) -> Kriging:
         """Return the kriging model of a truncation's sample basis."""
-        return kriging.solve(self.hyper, self.made.samples, reduced.bases[2])
+        return universal_kriging.solve(self.hyper, self.made.samples, reduced.bases[2])
 
     def of(self, reduced: Multilinear) -> Poses:
         """Return the pose function of a truncation."""

@@ -9,8 +9,8 @@ from math import exp, sqrt
 
 import numba
 
-from service.motion.conventions import Floats
-from service.motion.covariance import RATE52
+from posefield.common.units import Floats
+from posefield.kriging.covariance import RATE52
 
 compiled = numba.njit(fastmath=True)
 

@@ -1,8 +1,8 @@
 """Table 1 as Markdown: printed figures, measured figures and the definition of each baseline."""
 
-from model_export.cost import Price
 from paper import poses, precomputation
 from paper.measurement import CORE_GOAL, SEARCHED, SHOWN, Baseline, Size, Table1
+from posefield_train.graph.truncation_cost import Price
 
 # Table 1 as printed: threshold, ranks, seconds of precomputation, milliseconds per pose.
 PAPER = (

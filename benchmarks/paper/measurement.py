@@ -13,12 +13,12 @@ import family
 from family import Family
 from timing import in_turn
 
-from model_export import cost
-from model_export.naive import Naive
-from model_export.ranks import Triple
 from paper import errors, poses, precomputation
 from paper.errors import Errors
-from service.motion.conventions import Floats
+from posefield.common.units import Floats
+from posefield_train.graph import truncation_cost
+from posefield_train.graph.ranks import Triple
+from posefield_train.kriging.naive_kriging import Naive
 
 # The paper states no unit for its thresholds: summed distances in m, under two assumptions.
 THRESHOLDS = {"500 cm": 5.0, "750 cm": 7.5, "1000 cm": 10.0, "500 mm": 0.5}
@@ -149,7 +149,7 @@ def _size(
 ) -> Size:
     own = over.made.trained
     found = over.positions(over.of(own.full.truncated(ranks)))
-    compression = cost.compression(own.tensor, ranks, over.made.samples.shape[1])
+    compression = truncation_cost.compression(own.tensor, ranks, over.made.samples.shape[1])
     return Size(
         name,
         ranks,

@@ -13,12 +13,12 @@ import numpy.typing as npt
 from family import Family
 from scipy import linalg
 
-from model_export import kriging
-from model_export.hosvd import Multilinear
-from model_export.kriging import Kriging
-from model_export.naive import Naive
 from paper import kernels
-from service.motion.conventions import Floats
+from posefield.common.units import Floats
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.naive_kriging import Naive
+from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.tensor.hosvd import Multilinear
 
 OURS = (
     "covariances, kriging weights, core, linear interpolation between two rows of the time basis, "
@@ -134,6 +134,6 @@ def lu_factors(systems: Floats) -> tuple[Floats, Floats, Floats]:
 def system(field: Kriging) -> Floats:
     """Return the kriging system (m, m) of one frame with linear drift."""
     n, drift = len(field.samples), np.insert(field.samples, 0, 1.0, axis=1)
-    near = kriging.covariances(field.hyper, field.samples, field.samples)
+    near = universal_kriging.covariances(field.hyper, field.samples, field.samples)
     corner = np.zeros((drift.shape[1], drift.shape[1]))
     return np.block([[near + field.hyper.nugget * np.eye(n), drift], [drift.T, corner]])

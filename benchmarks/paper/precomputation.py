@@ -3,11 +3,13 @@
 import numpy as np
 from family import Family
 
-from model_export import align, hosvd, kriging, tensor, tune, variogram
-from model_export import naive as per_frame
-from model_export.hosvd import Multilinear
-from model_export.kriging import Hyper, Kriging
-from model_export.naive import Fitter, Naive
+from posefield_train.align import time_alignment
+from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
+from posefield_train.kriging import naive_kriging as per_frame
+from posefield_train.kriging.naive_kriging import Fitter, Naive
+from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.tensor import hosvd, motion_tensor
+from posefield_train.tensor.hosvd import Multilinear
 
 OURS = "metric, whitened tensor, HOSVD at the given ranks, one variogram, one kriging system"
 NAIVE = (
@@ -29,18 +31,18 @@ def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[Multilinear, Krigin
     """
     weights = np.ones(len(made.parents))
     chart = made.trained.tensor.chart
-    own = tensor.build(made.vectors, chart, made.parents, made.offsets, weights)
+    own = motion_tensor.build(made.vectors, chart, made.parents, made.offsets, weights)
     reduced = hosvd.decompose_at(own.values, ranks)
-    return reduced, kriging.solve(guess(made, reduced), made.samples, reduced.bases[2])
+    return reduced, universal_kriging.solve(guess(made, reduced), made.samples, reduced.bases[2])
 
 
 def guess(made: Family, reduced: Multilinear) -> Hyper:
     """Return kriging parameters from the variogram of the motions' slices of the core."""
     experimental = variogram.of_residuals(made.samples, reduced.motions, 1)
-    return tune.first_guess(experimental, made.samples.shape[1], "matern52", (1,))
+    return kriging_tuning.first_guess(experimental, made.samples.shape[1], "matern52", (1,))
 
 
 def naive(made: Family, fitter: Fitter) -> Naive:
     """Return the per-frame kriging model of the family's pose vectors."""
-    positions = align.positions(made.trained.aligned, made.parents, made.offsets)
+    positions = time_alignment.positions(made.trained.aligned, made.parents, made.offsets)
     return per_frame.fit(made.samples, positions, made.numbers, "matern52", fitter)

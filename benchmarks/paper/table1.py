@@ -17,9 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from paper import markdown, measurement
 from paper.measurement import Table1
-from service.cli.answers import as_json
-from service.motion import files
-from service.motion.errors import FileError
+from posefield.common import atomic_files
+from posefield.common.errors import FileError
+from posefield.console.output import as_json
 
 
 def main(
@@ -32,7 +32,7 @@ def main(
     typer.echo(markdown.text(table))
     if json_file:
         try:
-            files.write(as_json(facts(table)).encode(), json_file)
+            atomic_files.write(as_json(facts(table)).encode(), json_file)
         except FileError as error:
             sys.exit(f"table1: {error}")
 

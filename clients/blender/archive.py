@@ -8,7 +8,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-ADDON = Path(__file__).with_name("posefield")
+ADDON = Path(__file__).with_name("addon")
 LICENCE = Path(__file__).parents[2] / "LICENSE"
 
 # Earliest time of a zip archive, so that the bytes depend on the files alone.

@@ -17,9 +17,13 @@ function licences(): Plugin {
   };
 }
 
-// One file, the service's answer to `/docs`: see service/web/pages/standalone.py.
+// One file, the service's answer to `/docs`: see service/posefield/http/pages/standalone.py.
 export default defineConfig({
   plugins: [viteSingleFile({ removeViteModuleLoader: true }), licences()],
-  build: { outDir: "../../service/web/docs", emptyOutDir: true, modulePreload: false },
+  build: {
+    outDir: "../../service/posefield/http/pages/docs",
+    emptyOutDir: true,
+    modulePreload: false,
+  },
   server: { proxy: { "/v1": "http://127.0.0.1:8000", "/openapi.json": "http://127.0.0.1:8000" } },
 });

@@ -18,12 +18,12 @@ function runtime(): Plugin {
   };
 }
 
-// What a page without a service loads, beside it: see service/page.py.
+// What a page without a service loads, beside it: see service/posefield/cli/command_page.py.
 export default defineConfig({
   plugins: [runtime()],
   resolve: { conditions: ["onnxruntime-web-use-extern-wasm", "import", "module", "browser"] },
   build: {
-    outDir: "../../service/web/offline",
+    outDir: "../../service/posefield/http/pages/offline",
     emptyOutDir: true,
     modulePreload: false,
     lib: { entry: "src/offline/entry.ts", formats: ["es"], fileName: () => "offline.js" },

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from paper import errors, markdown, measurement, precomputation, table1
 
-from model_export import cost, fidelity
+from posefield_train.graph import truncation_cost
+from posefield_train.tensor import truncation_error
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks/paper/table1.py"
 
@@ -44,9 +45,9 @@ def test_full_rank_has_no_error_and_fewer_ranks_have_more(over, made):
 def test_at_the_samples_without_nugget_the_motions_are_the_clips(over, made, small_recipe):
     """With mean bones for all, as Table 1 has them."""
     at_samples = replace(over, points=made.samples, hyper=replace(over.hyper, nugget=0.0))
-    judge = fidelity.judge(small_recipe, made.examples, made.trained.tensor)
+    judge = truncation_error.judge(small_recipe, made.examples, made.trained.tensor)
     bones = np.broadcast_to(made.offsets.mean(axis=0), made.offsets.shape)
-    clips = fidelity.positions(
+    clips = truncation_error.positions(
         judge.own_tensor, judge.own_tensor.values, judge.parents, np.array(bones)
     )
     assert np.abs(at_samples.whole - clips).max() < 1e-6
@@ -80,7 +81,7 @@ def test_every_size_says_what_it_costs(measured, made):
     for asked, limit in measurement.THRESHOLDS.items():
         size = named[asked]
         assert size.error <= limit
-        compression = cost.compression(made.trained.tensor, size.ranks, 4)
+        compression = truncation_cost.compression(made.trained.tensor, size.ranks, 4)
         assert (size.core, size.stored) == (compression.core, compression.stored)
     assert named["500 cm"].core < named["1000 cm"].core
     assert all(size.from_naive > 0.5 * measured.full_from_naive for size in measured.sizes)

@@ -5,7 +5,7 @@ import pytest
 from paper import kernels, poses, precomputation
 from timing import in_turn
 
-from model_export.decoder import Decoder
+from posefield_train.tensor.decoder import Decoder
 
 # Compiling the kernels takes longer than a unit test may.
 pytestmark = pytest.mark.system

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from service.web import contract
+from posefield.http.api import contract
 
 Node = Mapping[str, Any]
 

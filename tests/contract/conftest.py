@@ -8,17 +8,17 @@ import yaml
 from asking import Ask, asker
 from starlette.types import ASGIApp
 
-from service.synthesis import library
-from service.synthesis.library import Library
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.registry import model_registry
+from posefield.registry.model_registry import Library
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
 def loaded(models) -> Library:
-    return library.load([models])
+    return model_registry.load([models])
 
 
 @pytest.fixture(scope="session")

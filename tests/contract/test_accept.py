@@ -4,8 +4,8 @@ from urllib.parse import urlencode
 
 import pytest
 
-from service.encode import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
-from service.encode.packs import PACKS
+from posefield.encode.archives import PACKS
+from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
 
 REACH = "/v1/models/reach"
 WALK = "/v1/models/walk/crowd"

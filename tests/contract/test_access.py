@@ -13,12 +13,12 @@ import pytest
 from asking import asker
 from cryptography.hazmat.primitives.asymmetric import rsa
 
-from service.motion.errors import FileError, InvalidField
-from service.synthesis.library import Library
-from service.web import contract
-from service.web.access import keys
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.common.errors import FileError, InvalidField
+from posefield.http.access import api_keys
+from posefield.http.api import contract
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.registry.model_registry import Library
 
 SCOPES = {
     "every": ["read:*"],
@@ -30,12 +30,12 @@ SCOPES = {
 
 @pytest.fixture(scope="module")
 def issued():
-    return {name: keys.make() for name in SCOPES}
+    return {name: api_keys.make() for name in SCOPES}
 
 
 @pytest.fixture(scope="module")
 def lines(issued):
-    return "\n".join(keys.line(name, SCOPES[name], key) for name, key in issued.items())
+    return "\n".join(api_keys.line(name, SCOPES[name], key) for name, key in issued.items())
 
 
 @pytest.fixture(scope="module")
@@ -222,7 +222,7 @@ def test_each_refusal_is_one_line_without_secrets(guarded, as_, issued, caplog):
         as_("reach", "GET", "/v1/models/walk")
         as_("reach", "GET", "/v1/models/anna-from-accounts")
         as_("reach", "GET", "/v1/models/reach")
-    said = [r.getMessage() for r in caplog.records if r.name == "service.web.access.audit"]
+    said = [r.getMessage() for r in caplog.records if r.name == "posefield.http.access.audit"]
     path = "/v1/models/{model}"
     asked = {"audit": "refused", "method": "GET"}
     assert json.loads(said[0]) == {
@@ -303,7 +303,7 @@ def test_the_command_makes_a_key_whose_line_lets_it_in(loaded, tmp_path):
     assert names(answer) == ["walk"]
     told = subprocess.run([*command, "--json"], capture_output=True, text=True, check=True)
     made = json.loads(told.stdout)
-    assert keys.read(made["line"], "KEYS").find(made["key"]).name == "blender"
+    assert api_keys.read(made["line"], "KEYS").find(made["key"]).name == "blender"
 
 
 @pytest.mark.system

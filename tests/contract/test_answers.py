@@ -9,14 +9,14 @@ import pytest
 from asking import asker
 from pxr import Usd
 
-from service.motion import card as cards
-from service.question.motion_question import PoseQuestion
-from service.synthesis import poses
-from service.synthesis.library import Library
-from service.web import contract
-from service.web.app import build
-from service.web.operations import OPERATIONS
-from service.web.settings import Settings
+from posefield.http.api import contract
+from posefield.http.api.settings import Settings
+from posefield.http.app import build
+from posefield.http.operations import OPERATIONS
+from posefield.model_file import model_card as cards
+from posefield.question.motion_question import PoseQuestion
+from posefield.registry.model_registry import Library
+from posefield.synthesis import poses
 
 CLIP = "/v1/models/reach/clip"
 FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack")

@@ -3,11 +3,11 @@
 import pytest
 from asking import asker
 
-from service.motion.errors import InvalidField
-from service.synthesis.library import Library
-from service.web import browser
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.common.errors import InvalidField
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.middleware import security_headers
+from posefield.registry.model_registry import Library
 
 PAGE = "https://a.example"
 ANSWERS = [
@@ -37,10 +37,10 @@ def test_every_answer_is_data_and_nothing_to_run(method, path, status, ask):
 
 
 def test_a_page_of_our_own_says_what_it_loads():
-    policy = browser.page("'self'", "'self'")["Content-Security-Policy"]
+    policy = security_headers.page("'self'", "'self'")["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "http" not in policy and "*" not in policy
-    assert b"content-security-policy" not in dict(browser.of("text/html"))
-    assert b"content-security-policy" in dict(browser.of("application/json"))
+    assert b"content-security-policy" not in dict(security_headers.of("text/html"))
+    assert b"content-security-policy" in dict(security_headers.of("application/json"))
 
 
 @pytest.mark.parametrize(("method", "path", "status"), ANSWERS)

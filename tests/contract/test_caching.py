@@ -8,11 +8,11 @@ import pytest
 import recorded
 from asking import asker
 
-from service.synthesis import library
-from service.synthesis.library import Library
-from service.web import caching
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.middleware import caching
+from posefield.registry import model_registry
+from posefield.registry.model_registry import Library
 
 PURE = ("pose?time=0.25&", "clip.usdc?", "clip.json?", "clip.usda?", "clip.bvh?")
 
@@ -95,7 +95,7 @@ def test_an_operator_may_let_caches_use_a_name_unasked(loaded, controls):
 
 def test_another_model_under_the_same_name_has_other_tags(models, tmp_path, ask, controls):
     shutil.copy(models / "walk.onnx", tmp_path / "reach.onnx")
-    other = asker(create_app(library.load([tmp_path]), Settings()))
+    other = asker(create_app(model_registry.load([tmp_path]), Settings()))
     first, second = (a("GET", "/v1/models/reach").headers["etag"] for a in (ask, other))
     assert first != second
 

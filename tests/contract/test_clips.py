@@ -7,10 +7,10 @@ import jsonschema
 import pytest
 from asking import asker, unpacked
 
-from service.encode import ENCODERS
-from service.encode.packs import PACKS
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.encode.archives import PACKS
+from posefield.encode.formats import ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
 
 CLIPS = "/v1/models/reach/clips"
 JSON = {"content-type": "application/json"}

@@ -6,7 +6,7 @@ import pytest
 from asking import unpacked
 from typer.testing import CliRunner
 
-from service.cli import app as commands
+from posefield.cli import app as commands
 
 QUESTIONS = [
     {"name": "first", "fps": 24.0, "start": 0.1},

@@ -13,14 +13,14 @@ import pytest
 from asking import listening
 from test_server import address, process
 
-from service.encode import ENCODERS
-from service.encode.packs import PACKS
-from service.export.pack import CLIPS
-from service.web import contract
-from service.web.app import build
-from service.web.operations import OPERATIONS, query_clips
-from service.web.service import Formatted
-from service.web.settings import Settings
+from posefield.batch.clip_archive import CLIPS
+from posefield.encode.archives import PACKS
+from posefield.encode.formats import ENCODERS
+from posefield.http.api import contract
+from posefield.http.api.settings import Settings
+from posefield.http.app import build
+from posefield.http.operations import OPERATIONS, query_clips
+from posefield.http.service import Formatted
 
 PATH = "/v1/models/reach/clips"
 MANY = 1000

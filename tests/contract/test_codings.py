@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 import pytest
 from backports import zstd
 
-from service.web import compression
+from posefield.http.middleware import compression
 
 UNPACK = {"zstd": zstd.decompress, "gzip": gzip.decompress}
 

@@ -8,13 +8,13 @@ import pytest
 import yaml
 from asking import asker
 
-from service.encode import ENCODERS
-from service.synthesis.library import Library
-from service.web import contract, problems
-from service.web.app import build, create_app
-from service.web.operations import OPERATIONS
-from service.web.service import Formatted
-from service.web.settings import Settings
+from posefield.encode.formats import ENCODERS
+from posefield.http.api import contract, problems
+from posefield.http.api.settings import Settings
+from posefield.http.app import build, create_app
+from posefield.http.operations import OPERATIONS
+from posefield.http.service import Formatted
+from posefield.registry.model_registry import Library
 
 
 def test_the_contract_is_valid_openapi(spec):

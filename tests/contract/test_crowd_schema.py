@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from service.encode import CROWD_ENCODERS
-from service.motion.crowd import CrowdPoses
-from service.motion.errors import FormError, InvalidField
-from service.motion.skeleton import Skeleton
-from service.web import crowd_query
+from posefield.common.errors import FormError, InvalidField
+from posefield.encode.formats import CROWD_ENCODERS
+from posefield.http.decoding import crowd_query
+from posefield.motion.crowd_clip import CrowdPoses
+from posefield.motion.skeleton import Skeleton
 
 
 def checker(spec, name):

@@ -10,9 +10,9 @@ import pytest
 from asking import asker
 from pxr import Usd, UsdSkel
 
-from service.web import crowd_query
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.decoding import crowd_query
 
 CROWD = "/v1/models/reach/crowd"
 WALK = "/v1/models/walk/crowd"

@@ -14,9 +14,9 @@ pytestmark = pytest.mark.system
 
 PLAIN = """
 import socket, sys, uvicorn
-from service.synthesis import library
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.registry import model_registry as library
+from posefield.http.app import create_app
+from posefield.http.api.settings import Settings
 own = socket.create_server(("127.0.0.1", 0), backlog=2048)
 print("at http://127.0.0.1:%d" % own.getsockname()[1], flush=True)
 app = create_app(library.load([sys.argv[1]]), Settings())

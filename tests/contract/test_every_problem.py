@@ -9,14 +9,14 @@ import jsonschema
 import pytest
 from asking import Answer, asker
 
-from service.synthesis.library import Library
-from service.web import contract, problems
-from service.web.access import keys
-from service.web.app import build, create_app
-from service.web.operations import OPERATIONS
-from service.web.pages import problems as page
-from service.web.problems import KINDS
-from service.web.settings import Settings
+from posefield.http.access import api_keys
+from posefield.http.api import contract, problems
+from posefield.http.api.problems import KINDS
+from posefield.http.api.settings import Settings
+from posefield.http.app import build, create_app
+from posefield.http.operations import OPERATIONS
+from posefield.http.pages import problems_page as page
+from posefield.registry.model_registry import Library
 
 MODEL = "/v1/models/reach"
 CLIP = f"{MODEL}/clip.json"
@@ -33,12 +33,12 @@ def answered(response):
     return Answer(response.status_code, dict(response.headers), response.content)
 
 
-KEY = keys.make()
+KEY = api_keys.make()
 
 
 def with_key(**headers):
     """Provoke at a service with one key, which may not read metrics."""
-    closed = create_app(Library({}), Settings(keys=keys.line("one", ["read:*"], KEY)))
+    closed = create_app(Library({}), Settings(keys=api_keys.line("one", ["read:*"], KEY)))
     return lambda app: answered(asker(closed)("GET", "/metrics", headers=headers))
 
 

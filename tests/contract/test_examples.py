@@ -6,7 +6,7 @@ import pytest
 from asking import contains
 from contract_examples import EXAMPLES, OPERATIONS, each_example
 
-from service.web import contract
+from posefield.http.api import contract
 
 
 def test_every_operation_has_an_example_and_every_example_an_operation():

@@ -3,7 +3,7 @@
 import contract_examples
 from contract_examples import OPERATIONS, each_example
 
-from service.web import contract
+from posefield.http.api import contract
 
 # Of every answer of HTTP, or said once for all of them in the contract's introduction.
 USUAL = {

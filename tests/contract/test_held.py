@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from asking import asker, unpacked
 
-from service.motion import skeleton
-from service.synthesis.library import Library
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.motion import skeleton
+from posefield.registry.model_registry import Library
 
 MODEL = "/v1/models/reach"
 CONTROLS = {"stature": 1.72, "hip_height": 0.9, "turn": 20.0, "target_height": 1.1}

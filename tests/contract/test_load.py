@@ -7,11 +7,12 @@ import httpx
 import pytest
 from starlette.responses import Response
 
-from service.synthesis.library import Library
-from service.web import contract, deadline
-from service.web.app import build
-from service.web.operations import OPERATIONS
-from service.web.settings import Settings
+from posefield.http.api import contract
+from posefield.http.api.settings import Settings
+from posefield.http.app import build
+from posefield.http.middleware import deadline
+from posefield.http.operations import OPERATIONS
+from posefield.registry.model_registry import Library
 
 SOON = {"prefer": "respond-async, wait=1"}
 

@@ -4,16 +4,16 @@ import jsonschema
 import pytest
 from asking import asker
 
-from service.motion import measure
-from service.motion.measure import MOMENTS, QUANTITIES, Measure
-from service.synthesis import library
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.motion import measures
+from posefield.motion.measures import MOMENTS, QUANTITIES, Measure
+from posefield.registry import model_registry
 
 
 @pytest.fixture(scope="module")
 def card(measured_walk_path):
-    app = create_app(library.load([measured_walk_path]), Settings())
+    app = create_app(model_registry.load([measured_walk_path]), Settings())
     return asker(app)("GET", "/v1/models/measured").json()
 
 
@@ -40,6 +40,6 @@ def test_the_contract_knows_all_that_can_be_measured(spec):
     known = spec["components"]["schemas"]["Measure"]["properties"]
     assert tuple(known["quantity"]["enum"]) == QUANTITIES
     assert tuple(known["at"]["enum"]) == MOMENTS
-    valid(spec, "Measure", measure.plain(Measure("height", (3, 4), "landmark", 0.25)))
+    valid(spec, "Measure", measures.plain(Measure("height", (3, 4), "landmark", 0.25)))
     with pytest.raises(jsonschema.ValidationError):
         valid(spec, "Measure", {"quantity": "pace"})

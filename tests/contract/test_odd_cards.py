@@ -16,16 +16,17 @@ import jsonschema
 import pytest
 from asking import asker
 
-from service.motion.errors import ModelError
-from service.synthesis import card_check, card_reader, onnx_check, ports, runtime
-from service.synthesis import session as sessions
-from service.synthesis.library import Library
-from service.synthesis.session import Session
-from service.synthesis.shelf import Fixed
-from service.synthesis.synthesizer import Synthesizer
-from service.web.app import create_app
-from service.web.readiness import Readiness
-from service.web.settings import Settings
+from posefield.common.errors import ModelError
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.readiness import Readiness
+from posefield.inference import graph_ports, onnx_runtime
+from posefield.inference import session as sessions
+from posefield.inference.session import Session
+from posefield.model_file import card_check, card_reader, onnx_check
+from posefield.registry.model_registry import Library
+from posefield.registry.model_reload import Fixed
+from posefield.synthesis.synthesizer import Synthesizer
 
 DEEP = "[" * 300 + "]" * 300
 VALUES = ("null", "true", '"x"', "-1", "0", "1e400", "1e300", "1e-300", "[]", "{}", DEEP, "[null]")
@@ -83,7 +84,7 @@ class Tried:
 
     def __init__(self, content: bytes, spec: dict[str, Any]) -> None:
         self.onnx = onnx_check.check(content)
-        self.runtime = runtime.start(content, "whole")
+        self.runtime = onnx_runtime.start(content, "whole")
         self.session: Session = sessions.open_bytes(content, "odd.onnx")
         self.models = Fixed(Library({}))
         self.ask = asker(create_app(Readiness(self.models), Settings()))
@@ -96,7 +97,7 @@ class Tried:
         entries = {**self.onnx.metadata, f"posefield.{name}": text.encode()}
         card = card_reader.decode(entries)
         card_check.check_graph(card, self.onnx.shapes, self.onnx.values)
-        ports.check(self.runtime, card, "odd.onnx")
+        graph_ports.check(self.runtime, card, "odd.onnx")
         return replace(self.session, card=card)
 
     def get(self, path: str = "", **query: Any) -> Any:

@@ -10,16 +10,16 @@ import pytest
 import yaml
 from asking import asker
 
-from service.web import contract, pages
-from service.web.access import keys
-from service.web.app import create_app
-from service.web.pages import standalone, templates
-from service.web.pages.problems import example
-from service.web.pages.texts import TEXTS
-from service.web.problems import KINDS
-from service.web.settings import Settings
+from posefield.http import pages
+from posefield.http.access import api_keys
+from posefield.http.api import contract
+from posefield.http.api.problems import KINDS
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.pages import static_page, templates
+from posefield.http.pages.problems_page import TEXTS, example
 
-BUILT = {"/": standalone.VIEWER, "/docs": standalone.DOCS}
+BUILT = {"/": static_page.VIEWER, "/docs": static_page.DOCS}
 NO_ICON = '<link rel="icon" href="data:,"'
 ALL = ["/openapi.yaml", "/openapi.json", "/problems", *BUILT]
 
@@ -58,7 +58,9 @@ def test_the_tag_is_of_what_the_page_says(app):
 
 
 def test_a_closed_service_shows_its_pages_to_everybody(loaded):
-    ask = asker(create_app(loaded, Settings(keys=keys.line("one", ["read:*"], keys.make()))))
+    ask = asker(
+        create_app(loaded, Settings(keys=api_keys.line("one", ["read:*"], api_keys.make())))
+    )
     assert ask("GET", "/v1/models").status_code == 401
     for path in ALL:
         answer = ask("GET", path)
@@ -102,15 +104,15 @@ def test_what_a_page_would_load_is_seen():
 
 def test_only_scripts_and_styles_of_the_page_itself_are_named():
     page = b"<script>a = '<style>b</style>'</script><style>c</style>"
-    policy = standalone.headers(page)["Content-Security-Policy"]
+    policy = static_page.headers(page)["Content-Security-Policy"]
     for tag, text in {"script": "a = '<style>b</style>'", "style": "c"}.items():
         digest = b64encode(sha256(text.encode()).digest()).decode()
         assert f"{tag}-src 'sha256-{digest}';" in policy
-    other = standalone.headers(page.replace(b"a =", b"a  ="))["Content-Security-Policy"]
+    other = static_page.headers(page.replace(b"a =", b"a  ="))["Content-Security-Policy"]
     assert other.partition("style-src")[0] != policy.partition("style-src")[0]
     assert (
         "script-src 'none'; style-src 'none'"
-        in standalone.headers(b"<p>")["Content-Security-Policy"]
+        in static_page.headers(b"<p>")["Content-Security-Policy"]
     )
 
 
@@ -151,11 +153,11 @@ def test_text_in_a_template_is_text():
 
 
 def test_a_page_that_was_not_built_says_how_to_build_it(tmp_path):
-    content = standalone.built(tmp_path / "index.html")
+    content = static_page.built(tmp_path / "index.html")
     assert b"make page" in content and loads(content.decode().replace(NO_ICON, "")) == []
     there = tmp_path / "index.html"
     there.write_bytes(b"built")
-    assert standalone.built(there) == b"built"
+    assert static_page.built(there) == b"built"
 
 
 @pytest.mark.parametrize("path", BUILT)

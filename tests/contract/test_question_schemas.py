@@ -3,16 +3,16 @@
 import msgspec
 import pytest
 
-from service.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
-from service.question.motion_question import (
+from posefield.http.api import contract
+from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
+from posefield.question.motion_question import (
     ClipsQuestion,
     FileQuestion,
     NamedClipQuestion,
     PoseQuestion,
 )
-from service.question.walk_question import WalkQuestion
-from service.question.words import parameters
-from service.web import contract
+from posefield.question.text_decoding import parameters
+from posefield.question.walk_question import WalkQuestion
 
 SCHEMAS = {
     "PoseQuestion": PoseQuestion,

@@ -9,12 +9,12 @@ import pytest
 from asking import asker
 from model_files import numbered
 
-from service.synthesis import library
-from service.synthesis.library import Bounds, Library
-from service.synthesis.shelf import Fixed, Shelf
-from service.web.app import create_app
-from service.web.readiness import Readiness
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.readiness import Readiness
+from posefield.registry import model_registry
+from posefield.registry.model_registry import Bounds, Library
+from posefield.registry.model_reload import Fixed, Shelf
 
 
 @pytest.fixture
@@ -169,4 +169,4 @@ def test_versions_are_listed_and_each_answers_under_its_hash(models, tmp_path):
 
 
 def test_a_library_of_files_is_ready_at_once(told, models):
-    assert told(library.load([models])).status_code == 200
+    assert told(model_registry.load([models])).status_code == 200

@@ -9,10 +9,10 @@ import pytest
 import recorded
 from asking import asker
 
-from service.synthesis import library
-from service.synthesis.library import Library
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.registry import model_registry
+from posefield.registry.model_registry import Library
 
 CLIP = "/v1/models/reach/clip.json"
 POSE = "/v1/models/reach/pose"
@@ -180,7 +180,7 @@ def test_a_wrong_body_is_pointed_at(content, status, kind, pointer, assert_refus
 
 
 def test_a_model_that_knows_no_performers_refuses_every_name(model_path, controls):
-    ask = asker(create_app(library.load([model_path]), Settings()))
+    ask = asker(create_app(model_registry.load([model_path]), Settings()))
     asked = urlencode({**controls, "time": 0, "performer": "tall"})
     answer = ask("GET", f"/v1/models/reaching/pose?{asked}")
     assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")

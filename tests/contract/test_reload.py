@@ -9,7 +9,7 @@ import pytest
 from model_files import numbered
 from serving import address, process, within
 
-from service.synthesis import model_file
+from posefield.model_file import checked_file
 
 pytestmark = pytest.mark.system
 
@@ -33,7 +33,7 @@ def replace(folder, models):
         content = numbered(plain, number)
         (folder / "aside").write_bytes(content)
         (folder / "aside").rename(folder / "reach.onnx")
-        return f"reach@{model_file.digest(content)}"
+        return f"reach@{checked_file.digest(content)}"
 
     return by
 

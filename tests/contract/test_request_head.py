@@ -3,11 +3,11 @@
 import pytest
 from asking import asker
 
-from service.motion.errors import InvalidField
-from service.synthesis.library import Library
-from service.web.app import create_app
-from service.web.problems import LONGEST
-from service.web.settings import Settings
+from posefield.common.errors import InvalidField
+from posefield.http.api.problems import LONGEST
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.registry.model_registry import Library
 
 
 def kind(answer):

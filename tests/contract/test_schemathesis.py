@@ -19,10 +19,10 @@ from schemathesis.config import PositiveDataAcceptanceConfig as Acceptance
 from schemathesis.engine import Status, events, from_schema
 from schemathesis.generation import GenerationMode
 
-from service.synthesis.library import Library
-from service.web import contract
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api import contract
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.registry.model_registry import Library
 
 SEED = 1
 

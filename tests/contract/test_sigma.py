@@ -9,8 +9,8 @@ import pyarrow as pa
 import pytest
 from asking import asker
 
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
 
 SIGMA = "/v1/models/reach/sigma"
 ASKED = "across=turn&along=target_height&columns=5&rows=3&margin=0.5&hip_height=0.9"

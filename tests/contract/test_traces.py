@@ -14,12 +14,12 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from serving import address, process
 
-from service.motion.errors import InvalidField
-from service.web import tracing
-from service.web.app import create_app
-from service.web.settings import Settings
-from service.web.telling import Telling
-from service.web.tracing import Tracer
+from posefield.common.errors import InvalidField
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.telemetry import tracing
+from posefield.http.telemetry.telemetry import Telling
+from posefield.http.telemetry.tracing import Tracer
 
 PARENT = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"
 

@@ -11,10 +11,10 @@ import pytest
 from asking import asker
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.web import log, metrics
-from service.web.app import create_app
-from service.web.settings import Settings
-from service.web.telling import Telling
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.telemetry import log, metrics
+from posefield.http.telemetry.telemetry import Telling
 
 
 def value(page, name, **labels):

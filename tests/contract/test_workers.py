@@ -13,22 +13,22 @@ import httpx
 import pytest
 from serving import address, children, host_and_port, process, started, within
 
-from service.motion.cores import ALONE
-from service.web import server
+from posefield.common.cpu_cores import ALONE
+from posefield.http import server
 
 pytestmark = pytest.mark.system
 
 BLOCKED = """
 import socket, threading, time, uvicorn
 from functools import partial
-from service.synthesis.library import Bounds, Library
-from service.synthesis.shelf import Shelf
-from service.web import contract
-from service.web.app import build
-from service.web.lifespan import Announcement, lifespan
-from service.web.operations import OPERATIONS
-from service.web.settings import Settings
-from service.web.telling import SILENT
+from posefield.registry.model_registry import Bounds, Library
+from posefield.registry.model_reload import Shelf
+from posefield.http.api import contract
+from posefield.http.app import build
+from posefield.http.lifespan import Announcement, lifespan
+from posefield.http.operations import OPERATIONS
+from posefield.http.api.settings import Settings
+from posefield.http.telemetry.telemetry import SILENT
 async def block_the_loop(service, request):
     time.sleep(100)
 own = socket.create_server(("127.0.0.1", 0))

@@ -18,8 +18,8 @@ def tell(event, arguments):
 
 sys.addaudithook(tell)
 
-from service import cli  # noqa: E402
-from service.synthesis.library import Library  # noqa: E402
+from posefield import cli  # noqa: E402
+from posefield.registry.model_registry import Library  # noqa: E402
 
 if os.environ.get("PLANT"):
     find = Library.find

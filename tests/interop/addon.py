@@ -21,11 +21,12 @@ import numpy as np
 import trained
 from compare import FURTHEST, TURNED
 
-from service.motion import quat, skeleton
-from service.motion.clip import Clip, assemble
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference import session
+from posefield.motion import quat, skeleton
+from posefield.motion.clip import Clip, assemble
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

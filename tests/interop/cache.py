@@ -16,11 +16,12 @@ import proxy
 import running
 import trained
 
-from service.motion import checksum
-from service.synthesis import protobuf
+from posefield.model_file import checksum, protobuf_wire
 
 # Another file of the same model: one more entry of metadata, field 14 of onnx.proto.
-REMARK = protobuf.nested(14, protobuf.nested(1, b"remark") + protobuf.nested(2, b"x"))
+REMARK = protobuf_wire.nested(
+    14, protobuf_wire.nested(1, b"remark") + protobuf_wire.nested(2, b"x")
+)
 # Seconds: of POSEFIELD_ALIAS_SECONDS and _RELOAD, and until what hangs on them must have happened.
 AGAIN, PATIENCE = 1, 20.0
 # Clips that twenty ask for at once: of one alone, chance may keep the others until it is there.

@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import trained
 
-from service.encode import ENCODERS, names
-from service.motion import clip as clips
-from service.motion import quat, skeleton
-from service.motion.answer import ClipAnswer, Trust
-from service.motion.clip import Clip
-from service.motion.skeleton import Skeleton
+from posefield.encode.character import joint_names
+from posefield.encode.formats import ENCODERS
+from posefield.motion import clip as clips
+from posefield.motion import quat, skeleton
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield.question.results import ClipAnswer, Trust
 
 FORMATS = ("usda", "usdc", "usdz", "glb")
 CONTROL = "control"
@@ -103,13 +104,13 @@ def matrices_of(clip: Clip) -> dict[str, np.ndarray]:
     matrices = np.zeros((*positions.shape[:-1], 4, 4))
     matrices[..., :3, :3], matrices[..., :3, 3] = quat.to_matrix(turns), positions
     matrices[..., 3, 3] = 1.0
-    return {"joints": np.array(names.legal(clip.skeleton.names)), "matrices": matrices}
+    return {"joints": np.array(joint_names.legal(clip.skeleton.names)), "matrices": matrices}
 
 
 def _names(clip: Clip, extension: str) -> np.ndarray:
     """What joints are called in a format: glTF allows any names."""
     own = clip.skeleton.names
-    return np.array(own if extension == "glb" else names.legal(own))
+    return np.array(own if extension == "glb" else joint_names.legal(own))
 
 
 def _answer(frames: int, rate: float) -> ClipAnswer:

@@ -17,13 +17,13 @@ import running
 import trained
 from image import Image
 
-from service import __version__
-from service.encode import ENCODERS, POSE_ENCODERS
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, poses
-from service.synthesis.synthesizer import Synthesizer
-from service.web.access import keys
-from service.web.pages import standalone
+from posefield import __version__
+from posefield.encode.formats import ENCODERS, POSE_ENCODERS
+from posefield.http.access import api_keys
+from posefield.http.pages import static_page
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 # What the Dockerfile adds to its base: 334 MB were measured, 428 before anything was left out.
 BUDGET = 350_000_000
@@ -108,7 +108,7 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
     models, temporary = _places(folder)
     model, content = trained.family()
     (models / "reaching.onnx").write_bytes(content)
-    port, key = str(running.ports(1)[0]), keys.make()
+    port, key = str(running.ports(1)[0]), api_keys.make()
     told = {"POSEFIELD_PORT": port}
     health = built.config["Healthcheck"]["Test"][1:]
     command = [*built.config["Entrypoint"], *built.config["Cmd"]]
@@ -116,7 +116,7 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
         yield "healthy before it was started"
     if "POSEFIELD_KEYS" not in (said := _run(built, command, folder, **told)[1]):
         yield f"without keys it says {said!r}"
-    told["POSEFIELD_KEYS"] = keys.line("somebody", ["read:*"], key)
+    told["POSEFIELD_KEYS"] = api_keys.line("somebody", ["read:*"], key)
     began = time.monotonic()
     with built.start(command, models, temporary, **told) as jail:
         line = jail.stdout.readline().decode() if jail.stdout else ""
@@ -153,7 +153,7 @@ def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
         for path in ("/livez", "/readyz"):
             if (status := client.get(path).status_code) != httpx.codes.OK:
                 yield f"{path} answers {status}"
-        for path, built in (("/", standalone.VIEWER), ("/docs", standalone.DOCS)):
+        for path, built in (("/", static_page.VIEWER), ("/docs", static_page.DOCS)):
             if client.get(path).content != built.read_bytes():
                 yield f"{path} is not the page that was built here"
         for path, content in expected.items():

@@ -8,18 +8,18 @@ from pathlib import Path
 import cases
 import numpy as np
 
-from service.encode import crowd
-from service.encode.crowd import writer
-from service.motion import clip as clips
-from service.motion import quat
-from service.motion.crowd import CrowdClip, Motions, Placement
+from posefield.encode import usd_crowd
+from posefield.encode.usd_crowd import crowd_writer
+from posefield.motion import clip as clips
+from posefield.motion import quat
+from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 
 MOTION = np.array([0, 1, 2, 3, 4, 2, 0, 1])
 FRAMES = 20
 CONTROL = "crowd_turned"
 """Name of the crowd whose characters all face ahead."""
 FILES = [
-    *((f"crowd_{instancing}", "usdc", instancing) for instancing in crowd.INSTANCING),
+    *((f"crowd_{instancing}", "usdc", instancing) for instancing in usd_crowd.INSTANCING),
     ("crowd_folder", "usd", "references"),
     ("crowd_archive", "usdz", "references"),
     ("crowd_flatten", "usda", "flatten"),
@@ -40,9 +40,9 @@ def write(folder: Path) -> dict[str, dict[str, Path]]:
     for index, path in enumerate(expectations.values()):
         np.savez(path, **_expected(made, placement, index))
     ahead = Placement(placement.positions, np.zeros(len(MOTION)))
-    writer.write(_crowd(made, ahead), folder / f"{CONTROL}.usdc", "flatten")
+    crowd_writer.write(_crowd(made, ahead), folder / f"{CONTROL}.usdc", "flatten")
     for name, ending, instancing in FILES:
-        writer.write(_crowd(made, placement), folder / f"{name}.{ending}", instancing)
+        crowd_writer.write(_crowd(made, placement), folder / f"{name}.{ending}", instancing)
     names = [f"{CONTROL}.usdc", *(f"{name}.{ending}" for name, ending, _ in FILES)]
     return dict.fromkeys(names, expectations)
 

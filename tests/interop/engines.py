@@ -20,8 +20,8 @@ import numpy as np
 import running
 import trained
 
-from service.synthesis.ports import OUTPUTS
-from service.synthesis.session import Session
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.session import Session
 
 HERE = Path(__file__).parent
 VENV = environment.ROOT / ".venv-engines"

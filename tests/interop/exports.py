@@ -10,10 +10,10 @@ import cases
 import numpy as np
 import trained
 
-from service.check import check
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips
-from service.synthesis.synthesizer import Synthesizer
+from posefield.check import check
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
 
 CLIPS, READ = 1000, 20
 ENDINGS = ("usdc", "usda", "usdz")

@@ -5,16 +5,19 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from model_export import export, ingest, recipe, train
-from model_export.recipe import Recipe
-from model_export.sample import stroll, write
-from service.motion.answer import ClipAnswer
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference import session
+from posefield.question.motion_question import ClipQuestion
+from posefield.question.results import ClipAnswer
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.sample import sample_files, sample_walk
+from posefield_train.source import ingest, recipe
+from posefield_train.source.recipe import Recipe
 
 ROOT = Path(__file__).parents[2]
-RECIPES = sorted((ROOT / "model_export/recipes").glob("*.toml"))
+RECIPES = sorted((ROOT / "model_export/posefield_train/recipes").glob("*.toml"))
 DATA = Path(os.environ.get("POSEFIELD_DATA", ROOT.parent / "shared/data"))
 
 
@@ -32,7 +35,7 @@ def answers() -> list[tuple[str, ClipAnswer]]:
 def family() -> tuple[Synthesizer, bytes]:
     """Model of the procedural family, and its file's content."""
     with tempfile.TemporaryDirectory() as name:
-        path = write.family(Path(name) / "reaching")
+        path = sample_files.family(Path(name) / "reaching")
         return _trained(path, path.parent)
 
 
@@ -42,15 +45,15 @@ def real(name: str) -> bytes | None:
     if not DATA.exists():
         print(f"no motion capture in {DATA}: set POSEFIELD_DATA")
         return None
-    return _trained(ROOT / f"model_export/recipes/{name}.toml", DATA)[1]
+    return _trained(ROOT / f"model_export/posefield_train/recipes/{name}.toml", DATA)[1]
 
 
 @cache
 def walk() -> bytes:
     """File of the model of the procedural walk."""
     with tempfile.TemporaryDirectory() as name:
-        stroll.write(Path(name))
-        return _of(stroll.recipe(), Path(name))[1]
+        sample_walk.write(Path(name))
+        return _of(sample_walk.recipe(), Path(name))[1]
 
 
 @cache
@@ -60,7 +63,7 @@ def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
 
 def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
     examples, notes = ingest.ingest(own, data)
-    exported = export.export(own, train.train(own, examples, lambda _: None), notes)
+    exported = onnx_export.export(own, train.train(own, examples, lambda _: None), notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))
     return model, exported.content
 

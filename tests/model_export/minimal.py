@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from model_export.recipe import Recipe
-from service.motion import bvh_writer, quat
-from service.motion.clip import Clip, assemble
-from service.motion.skeleton import Skeleton
+from posefield.motion import bvh_writer, quat
+from posefield.motion.clip import Clip, assemble
+from posefield.motion.skeleton import Skeleton
+from posefield_train.source.recipe import Recipe
 
 TOML = """\
 schema = 1

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from minimal import plain_recipe, small_clip, write_clips
 
-from model_export.recipe import Recipe
-from service.motion.clip import Clip
+from posefield.motion.clip import Clip
+from posefield_train.source.recipe import Recipe
 
 CLIPS = 15
 # How far each performer's swing is ahead of a.

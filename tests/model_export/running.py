@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import onnxruntime
 
-from model_export.net import Net
-from service.motion.conventions import Floats
+from posefield.common.units import Floats
+from posefield_train.onnx_graph.graph_builder import Net
 
 
 def outputs(

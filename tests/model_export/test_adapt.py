@@ -6,25 +6,25 @@ import newcomers
 import numpy as np
 import pytest
 
-from model_export import (
-    adapt,
-    canonical,
-    export,
-    extend,
-    hosvd,
-    ingest,
-    kriging,
-    new_fields,
-    phase,
-    reopen,
-    train,
+from posefield.common.errors import TrainingError
+from posefield.motion import quat
+from posefield_train import train
+from posefield_train.adapt import (
+    adaptation,
+    canonical_clips,
+    extended_models,
+    model_reconstruction,
+    tensor_extension,
 )
-from model_export.evaluate import errors, methods, motion
-from model_export.evaluate.methods import Asked
-from model_export.field_bank import Constant
-from model_export.sample import stroll
-from service.motion import quat
-from service.motion.errors import TrainingError
+from posefield_train.align import phase_alignment
+from posefield_train.evaluate import compared_motion, methods, motion_errors
+from posefield_train.evaluate.methods import Asked
+from posefield_train.graph import onnx_export
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.kriging_bank import Constant
+from posefield_train.sample import sample_walk
+from posefield_train.source import ingest
+from posefield_train.tensor import hosvd
 
 SHOWN, ASKED = (2.0, 7.0, 12.0), (4.0, 9.5)
 
@@ -42,7 +42,7 @@ def trained(recipe, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def known(recipe, trained):
-    return canonical.known(recipe, trained)
+    return canonical_clips.known(recipe, trained)
 
 
 def examples(trained, who, controls):
@@ -62,7 +62,7 @@ def examples(trained, who, controls):
 
 @pytest.fixture(scope="module")
 def adapted(trained, known):
-    return adapt.adapt(known, examples(trained, "cy", SHOWN), "cy")
+    return adaptation.adapt(known, examples(trained, "cy", SHOWN), "cy")
 
 
 def misses(recipe, trained, model, name):
@@ -73,7 +73,9 @@ def misses(recipe, trained, model, name):
     pairs = zip(made, asked, strict=True)
     return np.mean(
         [
-            errors.compare(own, motion.of_clip(e.clip, None), ()).plain_relative.mean
+            motion_errors.compare(
+                own, compared_motion.of_clip(e.clip, None), ()
+            ).plain_relative.mean
             for own, e in pairs
         ]
     )
@@ -85,12 +87,12 @@ def test_a_newcomer_is_met_by_name_and_nobody_else_is(recipe, trained, known, ad
     assert own < 0.35 * unknown
     # Negative controls: another name, and another's clips under the newcomer's name.
     assert misses(recipe, trained, adapted.model, "a") > 2.0 * own
-    others = adapt.adapt(known, examples(trained, "b", SHOWN), "cy")
+    others = adaptation.adapt(known, examples(trained, "b", SHOWN), "cy")
     assert misses(recipe, trained, others.model, "cy") > 2.0 * own
 
 
 def test_more_clips_are_nearer(recipe, trained, known, adapted):
-    one = adapt.adapt(known, examples(trained, "cy", SHOWN[1:2]), "cy")
+    one = adaptation.adapt(known, examples(trained, "cy", SHOWN[1:2]), "cy")
     three = misses(recipe, trained, adapted.model, "cy")
     assert three < misses(recipe, trained, one.model, "cy")
 
@@ -146,7 +148,7 @@ def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(kno
 def test_a_model_that_was_cut_nowhere_takes_up_no_rounding_errors(known, adapted):
     whole = replace(known, truncation=0.0)
     moved, parents = adapted.moved, known.skeleton.parents
-    found = extend.extend(whole.model, parents, known.joint_weights, moved.numbers, 0.0)
+    found = tensor_extension.extend(whole.model, parents, known.joint_weights, moved.numbers, 0.0)
     gaps = (moved.numbers - found.tensor.mean) @ found.tensor.whiten.T
     said = found.full.truncated(found.ranks).restored()[:, :, -len(SHOWN) :]
     assert np.sqrt(np.mean(np.sum((gaps - said.transpose(2, 1, 0)) ** 2, axis=-1))) < 1e-3
@@ -158,7 +160,9 @@ def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
     def extended():
         numbers = adapted.moved.numbers
         parents, weights = known.skeleton.parents, known.joint_weights
-        return extend.extend(known.model, parents, weights, numbers, known.truncation).tensor
+        return tensor_extension.extend(
+            known.model, parents, weights, numbers, known.truncation
+        ).tensor
 
     own, eigh, qr = extended(), np.linalg.eigh, np.linalg.qr
 
@@ -182,7 +186,7 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     """The same distances in a longer unit: the old samples alone give the very same field."""
     bank = known.model.bank
     far = examples(trained, "cy", (30.0,))
-    laid = new_fields.lay(bank, known.groups, far, "cy")
+    laid = extended_models.lay(bank, known.groups, far, "cy")
     assert (laid.low, laid.high) == (0.0, 30.0) and laid.growth == pytest.approx(30 / 14)
     n, values = len(bank.pose.samples), bank.pose.values
     rng = np.random.Generator(np.random.PCG64(1))
@@ -191,7 +195,7 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     before = bank.pose.predict(bank.points(controls, nobody))
 
     def after(hyper):
-        solved = kriging.solve(hyper, laid.samples.points[:n], values)
+        solved = universal_kriging.solve(hyper, laid.samples.points[:n], values)
         grown = replace(bank, low=laid.low, high=laid.high)
         return solved.predict(grown.points(controls, np.zeros((50, 4))))
 
@@ -205,8 +209,8 @@ def test_what_the_controls_do_not_explain_is_the_mean_of_all(trained, known):
     bank = known.model.bank
     others = bank.others | {"duration": Constant(np.array([0.5]))}
     flat = replace(bank, others=others)
-    laid = new_fields.lay(flat, known.groups, examples(trained, "cy", SHOWN), "cy")
-    field = new_fields.solve(laid, flat, "duration", np.array([[1.0], [1.5], [2.0]]))
+    laid = extended_models.lay(flat, known.groups, examples(trained, "cy", SHOWN), "cy")
+    field = extended_models.solve(laid, flat, "duration", np.array([[1.0], [1.5], [2.0]]))
     assert field.mean == pytest.approx((newcomers.CLIPS * 0.5 + 4.5) / (newcomers.CLIPS + 3))
 
 
@@ -214,9 +218,9 @@ def test_what_the_controls_do_not_explain_is_the_mean_of_all(trained, known):
 def test_bones_that_were_all_alike_are_told_apart_by_name(trained, known, size):
     mean = trained.model.proportions.mean
     bank = replace(known.model.bank, others=known.model.bank.others | {"offsets": flat(trained)})
-    laid = new_fields.lay(bank, known.groups, examples(trained, "cy", SHOWN), "cy")
+    laid = extended_models.lay(bank, known.groups, examples(trained, "cy", SHOWN), "cy")
     own = np.repeat((size * mean)[None], len(SHOWN), axis=0)
-    field, longer = new_fields.bones(laid, bank, trained.model.proportions, own)
+    field, longer = extended_models.bones(laid, bank, trained.model.proportions, own)
     assert isinstance(field, Constant) == (size == 1.0)
     points = np.array([[-0.5, 0, 1, 0, 0], [-0.5, 0, 0, 1, 0]], dtype=float)
     found = longer.numpy(field.predict(points))
@@ -239,18 +243,18 @@ def test_sigma_says_that_the_newcomer_is_known(adapted):
 
 def test_a_clip_of_another_action_is_refused_with_the_numbers(trained, known):
     good = examples(trained, "cy", SHOWN)
-    canonical.refuse_strangers(known, canonical.move(known, good))
+    canonical_clips.refuse_strangers(known, canonical_clips.move(known, good))
     rotations = good[1].clip.rotations.copy()
     rotations[:, 1] = quat.about(np.array([1.0, 0.0, 0.0]), np.array(2.0))
     strange = [good[0], replace(good[1], clip=replace(good[1].clip, rotations=rotations))]
     with pytest.raises(TrainingError, match=r"cy7\.bvh: lies \d+\.\d cm .* times the .* at most 2"):
-        canonical.refuse_strangers(known, canonical.move(known, strange))
+        canonical_clips.refuse_strangers(known, canonical_clips.move(known, strange))
 
 
 @pytest.mark.parametrize("size", [0.18, 0.6, 1.6, 5.6])
 def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
-    good = canonical.move(known, examples(trained, "cy", SHOWN))
-    canonical.refuse_strangers(known, good)
+    good = canonical_clips.move(known, examples(trained, "cy", SHOWN))
+    canonical_clips.refuse_strangers(known, good)
 
     def of_size(size):
         first, own, last = good.examples
@@ -258,15 +262,15 @@ def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
         return replace(good, examples=(first, replace(own, clip=scaled), last))
 
     with pytest.raises(TrainingError, match=r"cy7\.bvh: its bones are .* at most 1\.5 times "):
-        canonical.refuse_strangers(known, of_size(size))
+        canonical_clips.refuse_strangers(known, of_size(size))
     # Negative control: a performer of another stature is none.
-    canonical.refuse_strangers(known, of_size(1.1))
+    canonical_clips.refuse_strangers(known, of_size(1.1))
 
 
 def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, adapted):
-    content = export.export(recipe, trained, []).content
-    reopened = reopen.reopen(content, "small.onnx").known
-    found = adapt.adapt(reopened, examples(trained, "cy", SHOWN), "cy").model
+    content = onnx_export.export(recipe, trained, []).content
+    reopened = model_reconstruction.reopen(content, "small.onnx").known
+    found = adaptation.adapt(reopened, examples(trained, "cy", SHOWN), "cy").model
     rng = np.random.Generator(np.random.PCG64(2))
     question = (
         rng.uniform(0, 14, (60, 1)),
@@ -279,7 +283,7 @@ def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, 
         found.evaluate(*question).positions(parents) - expected, axis=-1
     ).max() < (1e-4)
     # Negative control: one clip fewer is another model.
-    fewer = adapt.adapt(reopened, examples(trained, "cy", SHOWN[:2]), "cy").model
+    fewer = adaptation.adapt(reopened, examples(trained, "cy", SHOWN[:2]), "cy").model
     gaps = np.linalg.norm(fewer.evaluate(*question).positions(parents) - expected, axis=-1)
     assert gaps.max() > 1e-3
 
@@ -287,7 +291,7 @@ def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, 
 @pytest.fixture(scope="module")
 def walkers(strides):
     """A walk of two walkers who are told apart, and strides that a third shows."""
-    plain = stroll.recipe()
+    plain = sample_walk.recipe()
     told = plain.kriging.model_copy(update={"label": "performer"})
     recipe = plain.model_copy(update={"kriging": told})
     named = [
@@ -299,7 +303,7 @@ def walkers(strides):
 
 def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
     recipe, trained, shown = walkers
-    model = adapt.adapt(canonical.known(recipe, trained), shown, "new").model
+    model = adaptation.adapt(canonical_clips.known(recipe, trained), shown, "new").model
     who = np.eye(3)[[model.bank.performers.index("new")]]
     for example in shown:
         seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]
@@ -316,11 +320,11 @@ def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
 
 def test_a_cycle_that_was_cut_elsewhere_is_begun_with_the_family(walkers):
     recipe, trained, shown = walkers
-    known = canonical.known(recipe, trained)
-    late = [phase.begin(example, 0.3) for example in shown]
-    assert canonical.begin(replace(known, in_phase=False), late) == tuple(late)
-    found = canonical.begin(replace(known, in_phase=True), late)
-    cut, begun, right = (canonical.move(known, clips) for clips in (late, found, shown))
+    known = canonical_clips.known(recipe, trained)
+    late = [phase_alignment.begin(example, 0.3) for example in shown]
+    assert canonical_clips.begin(replace(known, in_phase=False), late) == tuple(late)
+    found = canonical_clips.begin(replace(known, in_phase=True), late)
+    cut, begun, right = (canonical_clips.move(known, clips) for clips in (late, found, shown))
     assert begun.distances.max() < 1.5 * right.distances.max()
     assert cut.distances.min() > 2.0 * begun.distances.max()
     assert [round(example.shift, 1) for example in begun.examples] == [-0.3] * 3

@@ -6,11 +6,15 @@ import newcomers
 import numpy as np
 import pytest
 
-from model_export import export, ingest, train
-from model_export.recipe import Recipe
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, model_file, session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference import session
+from posefield.model_file import checked_file
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.source import ingest
+from posefield_train.source.recipe import Recipe
 
 SHOWN = (2.0, 7.0, 12.5)
 SAID = ("--performer", "cy", "--unit", "1", "--up", "y", "--licence", "CC0-1.0")
@@ -26,7 +30,7 @@ def base(folder):
     recipe = newcomers.recipe()
     trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
     path = folder / "small.onnx"
-    path.write_bytes(export.export(recipe, trained, []).content)
+    path.write_bytes(onnx_export.export(recipe, trained, []).content)
     return path
 
 
@@ -54,14 +58,14 @@ def test_the_new_file_says_who_it_knows_and_where_that_comes_from(base, adapted)
     assert new.sources[-1] == "2.bvh" and len(new.left_out) == new.samples
     assert len(new.levels) == len(old.levels) and new.skeleton.same_tree(old.skeleton)
     step = new.provenance["adapted"][0]
-    assert step["parent_sha256"] == model_file.sha256(base.read_bytes())
+    assert step["parent_sha256"] == checked_file.sha256(base.read_bytes())
     assert (step["performer"], step["clips"], step["licence"]) == ("cy", 3, "CC0-1.0")
     assert "adapted from small@" not in new.diagnostics["notes"][0]
     assert (
-        f"adapted from tiny@{model_file.digest(base.read_bytes())} to 'cy' by 3 clips"
+        f"adapted from tiny@{checked_file.digest(base.read_bytes())} to 'cy' by 3 clips"
         in (new.diagnostics["notes"][-1])
     )
-    assert 0.0 < facts["parity_m"] < export.ALLOWED
+    assert 0.0 < facts["parity_m"] < onnx_export.ALLOWED
 
 
 def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp_path):
@@ -162,7 +166,7 @@ def measuring(folder):
     recipe = Recipe.model_validate({**plain, "controls": asked})
     trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
     path = folder / "measuring.onnx"
-    path.write_bytes(export.export(recipe, trained, []).content)
+    path.write_bytes(onnx_export.export(recipe, trained, []).content)
     return path
 
 

@@ -6,16 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_export import align, dtw, fields, ingest
-from model_export.ingest import Example
-from model_export.recipe import Kriging
-from model_export.samples import Samples
-from model_export.table import Row
-from model_export.warp import DENSE, WarpBasis
-from service.motion import clip, quat
-from service.motion.conventions import UP
-from service.motion.field import half_ranges
-from service.motion.skeleton import Skeleton
+from posefield.common.units import UP
+from posefield.kriging.kriging_model import half_ranges
+from posefield.motion import clip, quat
+from posefield.motion.skeleton import Skeleton
+from posefield_train.align import dtw, time_alignment
+from posefield_train.align.warp import DENSE, WarpBasis
+from posefield_train.kriging import coefficient_models
+from posefield_train.kriging.sample_points import Samples
+from posefield_train.source import ingest
+from posefield_train.source.clip_table import Row
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Kriging
 
 PARENTS = (-1, 0, 1, 2)
 JOINTS = Skeleton(
@@ -74,11 +76,11 @@ def to_the_prediction(family):
     sizes = np.array([e.controls for e in family])
     laid = Samples(half_ranges(sizes, sizes.min(axis=0), sizes.max(axis=0)), 1, np.arange(CLIPS))
     settings = Kriging(drift=1, covariance="matern52")
-    return lambda v: v - fields.tuned(settings, "matern52", laid, v).residuals
+    return lambda v: v - coefficient_models.tuned(settings, "matern52", laid, v).residuals
 
 
 def aligned(family, rounds=2, basis=BASIS, weights=WEIGHTS, predict=to_the_mean):
-    return align.align(family, FRAMES, basis, rounds, weights, predict)
+    return time_alignment.align(family, FRAMES, basis, rounds, weights, predict)
 
 
 def disagreement(found, true):
@@ -165,12 +167,12 @@ def positions(rotations, path):
 def test_alignment_does_not_multiply_acceleration(family, found):
     offsets = np.tile(JOINTS.offsets, (CLIPS, 1, 1))
     truth = np.stack([positions(*poses(CANONICAL, e.controls[0])) for e in family])
-    joints = align.positions(found, PARENTS, offsets)
+    joints = time_alignment.positions(found, PARENTS, offsets)
     assert acceleration(joints) < 1.2 * acceleration(truth)
-    even = np.stack([positions(*align.resample(e.clip, CANONICAL)) for e in family])
+    even = np.stack([positions(*time_alignment.resample(e.clip, CANONICAL)) for e in family])
     paths = dtw.warp(even.reshape(CLIPS, FRAMES, -1), truth[5].reshape(FRAMES, -1))
     by_path = [
-        positions(*align.resample(e.clip, np.interp(CANONICAL, path, CANONICAL)))
+        positions(*time_alignment.resample(e.clip, np.interp(CANONICAL, path, CANONICAL)))
         for e, path in zip(family, paths, strict=True)
     ]
     assert acceleration(np.stack(by_path)) > 1.2 * acceleration(truth)
@@ -182,7 +184,7 @@ def test_aligned_clips_differ_by_their_controls_and_no_longer_by_their_timing(fa
     uniform = np.stack(
         [
             clip.assemble(
-                JOINTS, *align.resample(e.clip, CANONICAL), JOINTS.offsets, 1.0
+                JOINTS, *time_alignment.resample(e.clip, CANONICAL), JOINTS.offsets, 1.0
             ).positions()
             for e in family
         ]
@@ -196,7 +198,7 @@ def test_aligned_clips_differ_by_their_controls_and_no_longer_by_their_timing(fa
         left = flat - sizes @ np.linalg.lstsq(sizes, flat, rcond=None)[0]
         return np.sqrt(np.mean(np.sum(left.reshape(hands.shape) ** 2, axis=-1)))
 
-    assert scatter(align.positions(found, PARENTS, offsets)) < 0.2 * scatter(uniform)
+    assert scatter(time_alignment.positions(found, PARENTS, offsets)) < 0.2 * scatter(uniform)
 
 
 def test_rounds_to_the_mean_better_the_one_to_the_medoid(family, logs):
@@ -247,10 +249,10 @@ def test_half_a_turn_of_all_clips_changes_nothing(family):
 
 def test_resampled_clip_meets_its_frames_and_keeps_within_its_ends(family):
     own = family[0].clip
-    rotations, path = align.resample(own, np.linspace(0.0, 1.0, len(own)))
+    rotations, path = time_alignment.resample(own, np.linspace(0.0, 1.0, len(own)))
     assert np.max(np.abs(path - own.root_path)) < 1e-12
     assert np.max(np.abs(quat.to_matrix(rotations) - quat.to_matrix(own.rotations))) < 1e-12
-    _, outside = align.resample(own, np.array([-1.0, 2.0]))
+    _, outside = time_alignment.resample(own, np.array([-1.0, 2.0]))
     assert np.array_equal(outside, own.root_path[[0, -1]])
 
 

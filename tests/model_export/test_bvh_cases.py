@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from model_export import bvh
+from posefield_train.source import bvh
 
 # Both sides compute in float64 from the same decimals.
 TOLERANCE = 1e-9

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from model_export import bvh
-from service.motion import bvh_writer, quat
-from service.motion.clip import Clip
-from service.motion.errors import BvhError
-from service.motion.skeleton import Skeleton
+from posefield.common.errors import BvhError
+from posefield.motion import bvh_writer, quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.source import bvh
 
 # Metres and radians, of each joint and of the end of a chain of 31 joints of a metre and more.
 TOLERANCE = 1e-6

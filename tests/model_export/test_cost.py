@@ -7,8 +7,8 @@ import onnx
 import pytest
 from onnx import numpy_helper
 
-from model_export import cost
-from model_export.cost import Price
+from posefield_train.graph import truncation_cost
+from posefield_train.graph.truncation_cost import Price
 
 RANKS = (3, 4, 5)
 
@@ -39,7 +39,7 @@ def test_numbers_are_those_that_the_file_holds(held, trained):
     motion = sum(held[name].size for name in ("core", "directions", "time_basis", "pose_weights"))
     # Those of one and of the controls stand side by side for all fields.
     drift = ranks[2] * len(held["drift_weights"])
-    assert motion + drift == cost.numbers(trained.tensor, 4).of(*ranks)
+    assert motion + drift == truncation_cost.numbers(trained.tensor, 4).of(*ranks)
     assert motion + drift < sum(own.size for own in held.values()), "sigma's matrix is the largest"
 
 
@@ -62,11 +62,11 @@ def test_levels_read_what_the_file_holds_for_them(held, exported):
 def test_compression_is_the_raw_tensor_over_what_is_stored(trained):
     freedoms, frames, samples = trained.tensor.values.shape
     raw = freedoms * frames * samples
-    found = cost.compression(trained.tensor, (22, 6, 24), 4)
+    found = truncation_cost.compression(trained.tensor, (22, 6, 24), 4)
     bases = freedoms * 22 + frames * 6 + (samples + 5) * 24
     assert found.core == pytest.approx(raw / (22 * 6 * 24))
     assert found.stored == pytest.approx(raw / (22 * 6 * 24 + bases))
-    assert cost.compression(trained.tensor, (22, 6, 25), 4).stored < found.stored
+    assert truncation_cost.compression(trained.tensor, (22, 6, 25), 4).stored < found.stored
 
 
 def test_papers_core_is_267_times_smaller_and_106_times_with_its_bases():
@@ -86,13 +86,13 @@ def test_operations_are_those_of_the_products_of_one_pose(trained):
         "time": r1 * r2,
         "decoding": r1 * (4 * joints + 3),
     }
-    assert cost.operations(trained.tensor, 4).of(*RANKS) == sum(products.values())
+    assert truncation_cost.operations(trained.tensor, 4).of(*RANKS) == sum(products.values())
 
 
 def test_the_card_tells_the_compression_and_every_distance(exported, trained):
     told = exported.card.diagnostics
     ranks = trained.model.decoder.reduced.core.shape
-    expected = asdict(cost.compression(trained.tensor, ranks, 4))
+    expected = asdict(truncation_cost.compression(trained.tensor, ranks, 4))
     assert told["compression"] == pytest.approx(expected, rel=1e-3)
     distances = {name: told[f"truncation_{name}_m"] for name in asdict(trained.fidelity)}
     assert distances == pytest.approx(asdict(trained.fidelity), rel=1e-3)

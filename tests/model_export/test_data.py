@@ -8,8 +8,8 @@ import zlib
 
 import pytest
 
-from model_export import bvh, data
-from service.motion.errors import BvhError, RecipeError
+from posefield.common.errors import BvhError, RecipeError
+from posefield_train.source import bvh, data_folder
 
 NAME = "takes/bvh/walk.bvh"
 
@@ -21,7 +21,7 @@ def write_zip(path, entries):
 
 
 def text(place):
-    return data.read(place, 1000, "a file").decode()
+    return data_folder.read(place, 1000, "a file").decode()
 
 
 @pytest.fixture(params=["folder", "zip with the top folder", "zip without the top folder"])
@@ -38,12 +38,12 @@ def filled(request, tmp_path):
 
 def test_a_file_is_found(filled):
     folder, content = filled
-    assert text(data.find(folder, NAME)) == content
+    assert text(data_folder.find(folder, NAME)) == content
 
 
 def test_a_place_can_be_sent_to_another_process(filled):
     folder, content = filled
-    place = data.find(folder, NAME)
+    place = data_folder.find(folder, NAME)
     sent = pickle.loads(pickle.dumps(place))
     assert (sent, str(sent), sent.name) == (place, str(place), "walk.bvh")
     assert text(sent) == content
@@ -53,13 +53,13 @@ def test_a_folder_goes_before_a_zip(tmp_path):
     write_zip(tmp_path / "takes.zip", [NAME])
     (tmp_path / NAME).parent.mkdir(parents=True)
     (tmp_path / NAME).write_text("unpacked")
-    assert text(data.find(tmp_path, NAME)) == "unpacked"
+    assert text(data_folder.find(tmp_path, NAME)) == "unpacked"
 
 
 def test_what_is_not_there_is_refused_with_every_place_that_was_tried(tmp_path):
     write_zip(tmp_path / "takes.zip", ["bvh/run.bvh"])
     with pytest.raises(RecipeError, match=r"no file 'takes/bvh/walk\.bvh'") as caught:
-        data.find(tmp_path, NAME)
+        data_folder.find(tmp_path, NAME)
     tried = caught.value.message.partition("tried ")[2].split(", ")
     archive = tmp_path / "takes.zip"
     assert tried == [f"{tmp_path / NAME}", f"{archive}/{NAME}", f"{archive}/bvh/walk.bvh"]
@@ -67,14 +67,14 @@ def test_what_is_not_there_is_refused_with_every_place_that_was_tried(tmp_path):
 
 def test_without_a_zip_only_the_folder_was_tried(tmp_path):
     with pytest.raises(RecipeError) as caught:
-        data.find(tmp_path, NAME)
+        data_folder.find(tmp_path, NAME)
     assert caught.value.message.endswith(f"tried {tmp_path / NAME}")
 
 
 def test_a_folder_is_no_file(filled):
     folder, _ = filled
     with pytest.raises(RecipeError, match="no file"):
-        data.find(folder, "takes/bvh")
+        data_folder.find(folder, "takes/bvh")
 
 
 @pytest.mark.parametrize(
@@ -84,34 +84,34 @@ def test_paths_that_leave_the_folder_are_refused(tmp_path, name):
     (tmp_path / "data").mkdir()
     (tmp_path / "secret.bvh").write_text("secret")
     with pytest.raises(RecipeError, match="expected a path below the data folder") as caught:
-        data.find(tmp_path / "data", name)
+        data_folder.find(tmp_path / "data", name)
     assert repr(name) in caught.value.message
 
 
 def test_a_zip_entry_cannot_be_reached_by_a_path_that_leaves(tmp_path):
     write_zip(tmp_path / "takes.zip", ["../secret.bvh", "bvh/walk.bvh"])
     with pytest.raises(RecipeError, match="expected a path below"):
-        data.find(tmp_path, "takes/../secret.bvh")
-    assert text(data.find(tmp_path, NAME)) == "content of bvh/walk.bvh"
+        data_folder.find(tmp_path, "takes/../secret.bvh")
+    assert text(data_folder.find(tmp_path, NAME)) == "content of bvh/walk.bvh"
 
 
 def test_a_zip_that_is_none_is_refused_by_name(tmp_path):
     (tmp_path / "takes.zip").write_text("no zip at all")
     with pytest.raises(RecipeError, match=r"takes\.zip: not a zip file"):
-        data.find(tmp_path, NAME)
+        data_folder.find(tmp_path, NAME)
 
 
 def test_members_of_every_method_are_read(tmp_path, method):
     content = b"many words " * 50_000
     with zipfile.ZipFile(tmp_path / "takes.zip", "w", method) as archive:
         archive.writestr(NAME, content)
-    place = data.find(tmp_path, NAME)
-    assert data.read(place, len(content), "a file") == content
+    place = data_folder.find(tmp_path, NAME)
+    assert data_folder.read(place, len(content), "a file") == content
     with pytest.raises(RecipeError, match=r"found more than 549 kB, expected a file of at most"):
-        data.read(place, len(content) - 1, "a file")
+        data_folder.read(place, len(content) - 1, "a file")
 
 
-@pytest.fixture(params=data.METHODS, ids=data.METHODS.values())
+@pytest.fixture(params=data_folder.METHODS, ids=data_folder.METHODS.values())
 def method(request):
     return request.param
 
@@ -134,7 +134,7 @@ def raw(folder, content, entry=NAME, **changed):
     central = b"PK\1\2" + struct.pack("<H", 20) + fields + rest + name
     end = b"PK\5\6" + struct.pack("<4H2IH", 0, 0, 1, 1, len(central), len(local), 0)
     (folder / "takes.zip").write_bytes(local + central + end)
-    return data.find(folder, entry)
+    return data_folder.find(folder, entry)
 
 
 def deflated(content):
@@ -208,7 +208,7 @@ def test_a_table_that_unpacks_to_gigabytes_is_refused_before_it_is_held(tmp_path
 
     def run():
         with pytest.raises(RecipeError, match="found more than 16000 kB, expected a table of at"):
-            data.read(place, 16_000_000, "a table")
+            data_folder.read(place, 16_000_000, "a table")
 
     assert peak(run) < 40_000_000
 

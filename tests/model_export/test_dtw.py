@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from model_export import dtw
+from posefield_train.align import dtw
 
 TOLERANCE = 1e-9
 LEAST, MOST = 1.0 / 3.0, 3.0

@@ -13,19 +13,19 @@ import pytest
 from clusters import started, wait_for
 from minimal import TOML, small_clip, write_clips
 
-import model_export
-import service
+import posefield
+import posefield_train
 
 pytestmark = pytest.mark.system
 
 CLIPS = 5
-MAIN = "from service.cli import main; main()"
+MAIN = "from posefield.cli import main; main()"
 # Jobs that leave a mark for each run, and one that kills its worker.
 JOBS = """
 import os, sys, time
 from pathlib import Path
 from model_export import cluster
-from service.motion.errors import ClusterError
+from posefield.common.errors import ClusterError
 
 class Shared:
     def __init__(self, folder):
@@ -146,7 +146,7 @@ def test_the_last_worker_may_be_replaced(cluster, jobs):
 
 def test_a_worker_that_joins_with_another_source_is_refused(cluster, jobs, tmp_path):
     start, marks = jobs
-    for package in (model_export, service):
+    for package in (posefield_train, posefield):
         shutil.copytree(Path(package.__file__).parent, tmp_path / "older" / package.__name__)
     with (tmp_path / "older" / "service" / "crowds.py").open("a") as file:
         file.write("# one more line\n")

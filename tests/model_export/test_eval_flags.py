@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export.evaluate import flags
-from model_export.evaluate.flags import Flags
-from model_export.evaluate.folds import Fold
-from service.motion import support
-from service.motion.errors import InvalidField
+from posefield.common.errors import InvalidField
+from posefield.kriging import support
+from posefield_train.evaluate import support_flags
+from posefield_train.evaluate.folds import Fold
+from posefield_train.evaluate.support_flags import Flags
 
 NAMES = ("left", "up")
 RAISED = np.array([0.0, 30.0, 0.0, 0.0])
@@ -26,14 +26,14 @@ def parts():
 
 
 def test_what_is_captured_evenly_is_seldom_flagged_and_what_is_beyond_always(controls, parts):
-    found = flags.measure(controls, NAMES, parts)
+    found = support_flags.measure(controls, NAMES, parts)
     assert found.alarms < 0.15
     assert found.beyond == {"left": 1.0, "up": 1.0}
 
 
 def test_a_fold_does_not_know_what_it_holds_out(controls, parts):
     alone = np.vstack([controls, [[5.0, 1.0]], [[5.0, 1.1]]])
-    apart = flags.measure(alone, NAMES, [*parts, Fold((60, 61))])
+    apart = support_flags.measure(alone, NAMES, [*parts, Fold((60, 61))])
     # Both strangers of the last fold are flagged, who stand far beyond what all others know.
     assert apart.alarms >= 2 / 62
     assert (support.of(alone).beyond(alone[60:]) == 0.0).all()
@@ -41,7 +41,7 @@ def test_a_fold_does_not_know_what_it_holds_out(controls, parts):
 
 def test_two_families_are_joined_by_what_both_have_and_their_gap_is_flagged(small_recipe, examples):
     up = [replace(e, controls=e.controls + RAISED) for e in examples]
-    found = flags.joined(small_recipe, examples, small_recipe, up)
+    found = support_flags.joined(small_recipe, examples, small_recipe, up)
     assert found.gap is not None
     control, share = found.gap
     assert (control, share) == ("hip_height", 1.0)
@@ -51,7 +51,7 @@ def test_two_families_are_joined_by_what_both_have_and_their_gap_is_flagged(smal
 
 def test_families_without_a_gap_cannot_be_joined(small_recipe, examples):
     with pytest.raises(InvalidField, match="overlap in stature, hip_height"):
-        flags.joined(small_recipe, examples[::2], small_recipe, examples[1::2])
+        support_flags.joined(small_recipe, examples[::2], small_recipe, examples[1::2])
 
 
 def test_it_is_said_in_a_sentence_and_in_figures():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import RBFInterpolator
 
-from model_export.evaluate import peers
-from model_export.evaluate.peers import PEERS
-from model_export.samples import Samples
+from posefield_train.evaluate import interpolation_peers
+from posefield_train.evaluate.interpolation_peers import PEERS
+from posefield_train.kriging.sample_points import Samples
 
 EXACT = 1e-8
 
@@ -82,11 +82,11 @@ def test_thin_plates_are_scipys_own(points, queries):
 
 def test_smoothing_is_chosen_by_what_is_left_out(points, queries, rng):
     noisy = linear(points) + 0.3 * rng.standard_normal((24, 2))
-    smoothed = peers.thin_plate_smoothed(laid(points), noisy, queries)
+    smoothed = interpolation_peers.thin_plate_smoothed(laid(points), noisy, queries)
     plain = PEERS["thin_plate"][0](laid(points), noisy, queries)
     truth = linear(queries)
     assert np.abs(smoothed - truth).mean() < 0.7 * np.abs(plain - truth).mean()
-    clean = peers.thin_plate_smoothed(laid(points), linear(points), queries)
+    clean = interpolation_peers.thin_plate_smoothed(laid(points), linear(points), queries)
     assert np.abs(clean - truth).max() < 1e-6
 
 
@@ -106,9 +106,9 @@ def test_the_nearest_of_the_same_performer_is_taken(points):
     values = np.arange(24.0)[:, None]
     asked = np.hstack([points[:1], [[0.0, 1.0]]])
     own = 12 + int(np.argmin(np.linalg.norm(points[12:] - points[0], axis=1)))
-    assert peers.nearest_same(laid(points, labels), values, asked) == own
+    assert interpolation_peers.nearest_same(laid(points, labels), values, asked) == own
     nobody = np.hstack([points[:1], [[0.0, 0.0]]])
-    assert peers.nearest_same(laid(points, labels), values, nobody) == 0
+    assert interpolation_peers.nearest_same(laid(points, labels), values, nobody) == 0
 
 
 def test_the_process_tells_performers_apart_where_it_is_told(points, queries):
@@ -116,8 +116,10 @@ def test_the_process_tells_performers_apart_where_it_is_told(points, queries):
     values = linear(points) + 5.0 * labels[:, :1]
     asked = np.hstack([queries, np.tile([0.0, 1.0], (7, 1))])
     truth = linear(queries)
-    told = np.abs(peers.gp(laid(points, labels), values, asked) - truth).mean()
-    untold = np.abs(peers.gp_controls(laid(points, labels), values, asked) - truth).mean()
+    told = np.abs(interpolation_peers.gp(laid(points, labels), values, asked) - truth).mean()
+    untold = np.abs(
+        interpolation_peers.gp_controls(laid(points, labels), values, asked) - truth
+    ).mean()
     assert told < 0.3 * untold
 
 
@@ -125,12 +127,14 @@ def test_outside_the_hull_the_nearest_is_taken(points):
     values = curved(points)
     far = np.array([[9.0, 9.0, 9.0]])
     nearest = np.argmin(np.linalg.norm(points - far, axis=1))
-    found = peers.linear_coefficients(laid(points), values, far)
+    found = interpolation_peers.linear_coefficients(laid(points), values, far)
     assert np.array_equal(found[0], values[nearest])
 
 
 def test_one_control_is_interpolated_on_its_line():
     points = np.array([[0.5], [-1.0], [1.0]])
     values = np.array([[2.0], [0.0], [3.0]])
-    found = peers.linear_coefficients(laid(points), values, np.array([[0.75], [-0.25]]))
+    found = interpolation_peers.linear_coefficients(
+        laid(points), values, np.array([[0.75], [-0.25]])
+    )
     assert found.ravel() == pytest.approx([2.5, 1.0])

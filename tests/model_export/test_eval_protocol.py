@@ -11,29 +11,28 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from minimal import TOML, plain_recipe, small_clip, write_clips
 
-from model_export import ingest
-from model_export.evaluate import (
-    charts,
+from posefield import cli
+from posefield.common.errors import TrainingError
+from posefield_train.evaluate import (
+    compared_motion,
+    corrected_answers,
     corrections,
-    errors,
-    evaluation_page,
-    exact,
+    evaluation_summary,
     folds,
     ground_truth,
-    learning,
+    learning_curves,
     methods,
-    motion,
-    newcomers,
+    motion_errors,
+    new_performers,
     protocol,
-    summary,
 )
-from model_export.evaluate.methods import Asked
-from model_export.jobs import Processes
-from model_export.recipe import Recipe
-from model_export.report import chart
-from model_export.train import train
-from service import cli
-from service.motion.errors import TrainingError
+from posefield_train.evaluate.methods import Asked
+from posefield_train.evaluate.pages import evaluation_charts, evaluation_page
+from posefield_train.parallel.jobs import Processes
+from posefield_train.report.drawing import svg_chart
+from posefield_train.source import ingest
+from posefield_train.source.recipe import Recipe
+from posefield_train.train import train
 
 CLIPS = 12
 # In this process: starting others takes longer, and other tests do.
@@ -133,18 +132,18 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
     """The protocol's errors are those of a model that never saw the clip."""
     held = 4
     by_hand = answers(recipe, family, held)
-    event = motion.Event(recipe_joint(family), 1.0)
-    true = motion.of_clip(family[held].clip, event)
+    event = compared_motion.Event(recipe_joint(family), 1.0)
+    true = compared_motion.of_clip(family[held].clip, event)
     feet = (recipe_joint(family),)
     for name, points in by_hand.items():
-        own = motion.Motion(points, 1.0, None)
-        expected = errors.compare(own, true, feet).relative.mean
+        own = compared_motion.Motion(points, 1.0, None)
+        expected = motion_errors.compare(own, true, feet).relative.mean
         assert results[0][0].errors[name][held].relative.mean == pytest.approx(expected, abs=1e-9)
     # Negative control: a model that saw it comes nearer.
     trained = train(recipe, family, lambda _: None)
     asked = Asked(family[held].controls[None], [family[held].row.performer])
     seen = methods.answers(recipe, trained, asked).motions["thin_plate"][0]
-    told = errors.compare(seen, true, feet).relative.mean
+    told = motion_errors.compare(seen, true, feet).relative.mean
     assert told < 0.5 * results[0][0].errors["thin_plate"][held].relative.mean
 
 
@@ -157,14 +156,14 @@ def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
     ordered = trained.examples
     asked = Asked(np.stack([e.controls for e in ordered]), [e.row.performer for e in ordered])
     found = methods.answers(recipe, trained, asked).motions["thin_plate"]
-    event = motion.Event(recipe_joint(family), 1.0)
-    captured = [motion.of_clip(example.clip, event) for example in ordered]
+    event = compared_motion.Event(recipe_joint(family), 1.0)
+    captured = [compared_motion.of_clip(example.clip, event) for example in ordered]
     for own, true in zip(found, captured, strict=True):
         assert own.duration == pytest.approx(true.duration)
 
     def farthest(motions):
         pairs = zip(motions, captured, strict=True)
-        return max(errors.compare(own, true, ()).plain_absolute.mean for own, true in pairs)
+        return max(motion_errors.compare(own, true, ()).plain_absolute.mean for own, true in pairs)
 
     # What is lost is resampling to 20 frames and back.
     assert farthest(found) < 0.005
@@ -174,8 +173,8 @@ def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
 def test_all_methods_are_asked_the_same_clips(results):
     (clips, performers), _ = results
     peers = {"posefield", "posefield_exact", "naive", *methods.PEERS}
-    assert set(clips.errors) == {*peers, newcomers.NOBODY}
-    assert set(performers.errors) == {*peers, *newcomers.SHOWN}
+    assert set(clips.errors) == {*peers, new_performers.NOBODY}
+    assert set(performers.errors) == {*peers, *new_performers.SHOWN}
     assert all(len(found) == CLIPS for r in (clips, performers) for found in r.errors.values())
     assert clips.protocol == "leave_one_clip_out"
     assert performers.protocol == "leave_one_performer_out"
@@ -199,22 +198,24 @@ def test_places_a_metre_off_are_told_to_be_out_of_reach(results):
     """Arms of the small skeleton are shorter than that."""
     found = [c for result in results[0] for c in result.corrections]
     assert not any(c.far.reached for c in found)
-    assert all(len(c.beyond) == len(exact.BEYOND) for c in found)
+    assert all(len(c.beyond) == len(corrected_answers.BEYOND) for c in found)
     assert any(c.reached for c in found)
     assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in found)
 
 
 def test_ours_is_drawn_in_orange_however_it_is_asked(results):
-    found, figure = summary.of(results[0][1]), Figure()
-    charts.paint_bars(found, figure)
+    found, figure = evaluation_summary.of(results[0][1]), Figure()
+    evaluation_charts.paint_bars(found, figure)
     orange = {
         one.name
         for one, bar in zip(found, figure.axes[0].patches, strict=True)
-        if to_hex(bar.get_facecolor()) == to_hex(chart.ORANGE)
+        if to_hex(bar.get_facecolor()) == to_hex(svg_chart.ORANGE)
     }
-    assert orange == {methods.OURS, methods.EXACT, *newcomers.SHOWN} & {one.name for one in found}
+    assert orange == {methods.OURS, methods.EXACT, *new_performers.SHOWN} & {
+        one.name for one in found
+    }
     # Negative control: there are others, who are not.
-    assert {methods.OURS, *newcomers.SHOWN} <= orange < {one.name for one in found}
+    assert {methods.OURS, *new_performers.SHOWN} <= orange < {one.name for one in found}
 
 
 def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
@@ -224,7 +225,9 @@ def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
     assert all(c.beyond == () and c.far is None for c in found.corrections)
     facts = corrections.facts(found)
     assert all(np.isfinite(value) for value in facts.values())
-    before, after = (summary.facts(found)["methods"][n] for n in (methods.OURS, methods.EXACT))
+    before, after = (
+        evaluation_summary.facts(found)["methods"][n] for n in (methods.OURS, methods.EXACT)
+    )
     assert after["effector_cm"] < 0.5 * before["effector_cm"]
     assert not any("far" in name or name.startswith("out_of_reach_") for name in facts)
 
@@ -234,13 +237,13 @@ def test_without_an_event_nothing_is_held(recipe, family):
     found = protocol.run(plain, family, "performer", JOBS, lambda done, parts: None)
     assert found.corrections == ()
     assert methods.EXACT not in found.errors
-    assert "exact" not in str(summary.facts(found)["methods"].keys())
+    assert "exact" not in str(evaluation_summary.facts(found)["methods"].keys())
     assert len(corrections.rows(found)) == 0
 
 
 def test_what_was_held_stands_in_table_and_json(results):
     (clips, _), _ = results
-    told = summary.facts(clips)["methods"]["posefield_exact"]["exact"]
+    told = evaluation_summary.facts(clips)["methods"]["posefield_exact"]["exact"]
     steps = [c.steps for c in clips.corrections]
     assert told["steps_worst"] == max(steps)
     assert told["steps"] == pytest.approx(np.mean(steps), abs=1e-3)
@@ -256,7 +259,7 @@ def test_an_unknown_performer_is_trusted_less(results):
 def test_a_name_is_worth_something_and_so_are_clips(results):
     """Three clips say more than one, and a name than none; the figures are those of the rows."""
     (clips, performers), _ = results
-    facts = summary.performer_facts([clips, performers])
+    facts = evaluation_summary.performer_facts([clips, performers])
     one, three = (facts[f"posefield_adapt_{count}"] for count in (1, 3))
     assert facts["named_nearer"] > 0.0
     assert three["relative_cm"] < one["relative_cm"] < three["shown_none_cm"]
@@ -266,8 +269,11 @@ def test_a_name_is_worth_something_and_so_are_clips(results):
     assert three["farther_than_all"] == pytest.approx(
         three["relative_cm"] / three["shown_all_cm"] - 1.0, abs=1e-4
     )
-    assert summary.performer_facts([clips]) == {} and summary.performer_text([performers]) == []
-    assert len(summary.performer_text([clips, performers])) == 4
+    assert (
+        evaluation_summary.performer_facts([clips]) == {}
+        and evaluation_summary.performer_text([performers]) == []
+    )
+    assert len(evaluation_summary.performer_text([clips, performers])) == 4
 
 
 def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take(family):
@@ -275,24 +281,26 @@ def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take
         replace(e, row=replace(e.row, place=family[i // 2].row.place)) for i, e in enumerate(family)
     ]
     for asked in range(CLIPS):
-        shown = newcomers.choose(held, asked, 5)
+        shown = new_performers.choose(held, asked, 5)
         takes = [i // 2 for i in shown]
         assert len(shown) == 5 == len(set(takes)) and asked // 2 not in takes
-        three = newcomers.choose(held, asked, 3)
+        three = new_performers.choose(held, asked, 3)
         assert set(three) <= set(shown)
         controls = np.array([held[i].controls[0] for i in three])
         assert np.ptp(controls) >= 7
     # No more than there are other takes.
-    assert len(newcomers.choose(held, 0, 20)) == CLIPS // 2 - 1
+    assert len(new_performers.choose(held, 0, 20)) == CLIPS // 2 - 1
 
 
 def test_who_has_too_few_takes_is_shown_nobodys_clips(recipe, family):
     trained = train(recipe, family[:9], lambda _: None)
     few = [replace(e, row=replace(e.row, performer="z")) for e in family[9:]]
-    assert newcomers.adapted(recipe, trained, few) == {n: [None] * 3 for n in newcomers.SHOWN}
+    assert new_performers.adapted(recipe, trained, few) == {
+        n: [None] * 3 for n in new_performers.SHOWN
+    }
     # Negative control: of one take more, each clip is asked for.
     more = [replace(e, row=replace(e.row, performer="z")) for e in family[8:]]
-    found = newcomers.adapted(recipe, trained, more)
+    found = new_performers.adapted(recipe, trained, more)
     assert all(len(m) == 4 and None not in m for m in found.values())
 
 
@@ -300,17 +308,17 @@ def test_clips_that_a_method_was_not_asked_for_are_counted_and_left_out_of_its_r
     whole = results[0][1]
     some = [e if i > 2 else None for i, e in enumerate(whole.errors["posefield_adapt_3"])]
     result = replace(whole, errors={**whole.errors, "posefield_adapt_3": tuple(some)})
-    row = next(one for one in summary.of(result) if one.name == "posefield_adapt_3")
+    row = next(one for one in evaluation_summary.of(result) if one.name == "posefield_adapt_3")
     assert (row.clips, row.left_out) == (CLIPS - 3, 3)
     assert row.facts()["clips_left_out"] == 3
-    assert f"| posefield_adapt_3 ({CLIPS - 3} clips) " in summary.table(result)
+    assert f"| posefield_adapt_3 ({CLIPS - 3} clips) " in evaluation_summary.table(result)
     ours, own = (
-        summary.relative(result.of(name, range(3, CLIPS)))
+        evaluation_summary.relative(result.of(name, range(3, CLIPS)))
         for name in ("posefield", "posefield_adapt_3")
     )
     assert row.worse == pytest.approx(float(np.mean(own - ours)))
     # Negative control: beside all of ours it would be another figure.
-    everyone = summary.relative(result.of("posefield", range(CLIPS)))
+    everyone = evaluation_summary.relative(result.of("posefield", range(CLIPS)))
     assert row.worse != pytest.approx(float(own.mean() - everyone.mean()))
 
 
@@ -341,7 +349,7 @@ def test_the_order_in_which_jobs_finish_changes_nothing(recipe, family):
     )
     assert any(None in own for own in found.errors.values())
     # Text, as a NaN is not equal to itself; the order of the methods counts too.
-    assert str(summary.facts(found)) == str(summary.facts(backwards))
+    assert str(evaluation_summary.facts(found)) == str(evaluation_summary.facts(backwards))
     assert np.array_equal(found.joint_sigma, backwards.joint_sigma)
 
 
@@ -369,7 +377,7 @@ def test_a_recipe_says_what_can_be_asked(recipe, family):
 
 def test_facts_are_what_was_measured(results):
     result = results[0][0]
-    facts = summary.facts(result)
+    facts = evaluation_summary.facts(result)
     assert (facts["family"], facts["protocol"], facts["clips"]) == (
         "tiny",
         "leave_one_clip_out",
@@ -391,7 +399,7 @@ def test_facts_are_what_was_measured(results):
 
 def test_sigma_of_each_joint_is_compared_with_that_joint(results):
     result = results[0][0]
-    found = summary.facts(result)["joint_sigma_ratio"]
+    found = evaluation_summary.facts(result)["joint_sigma_ratio"]
     assert tuple(found) == result.joints
     joint = len(result.joints) - 1
     errors = [error.joints[joint] for error in result.errors["posefield"]]
@@ -404,14 +412,14 @@ def test_sigma_of_each_joint_is_compared_with_that_joint(results):
 
 def test_the_flag_is_held_to_its_promise_on_the_same_folds(results):
     result = results[0][0]
-    found = summary.facts(result)["support"]
+    found = evaluation_summary.facts(result)["support"]
     assert result.flags is not None and found["false_alarms"] == result.flags.alarms
-    text = summary.trust_text(result)
+    text = evaluation_summary.trust_text(result)
     assert len(text) == 2 and text[1].startswith("support: ")
 
 
 def test_the_table_has_a_row_for_every_method(results):
-    lines = summary.table(results[0][0]).splitlines()
+    lines = evaluation_summary.table(results[0][0]).splitlines()
     assert len({len(line) for line in lines[2:]}) == 1
     rows = [line.split("|")[1].strip() for line in lines[4:]]
     assert rows == list(results[0][0].errors)
@@ -440,8 +448,11 @@ def test_the_page_escapes_the_names_of_clips_and_the_description(results):
 
 def test_the_page_has_the_learning_curve(results):
     near, far = np.array([[0.04, 0.02], [0.03, 0.01]]), np.array([[0.04, 0.03], [0.03, 0.02]])
-    trials = {learning.SUGGESTED: np.stack([near, near]), learning.CHANCE: np.stack([far, far])}
-    curve = learning.Learning((40, 92), trials)
+    trials = {
+        learning_curves.SUGGESTED: np.stack([near, near]),
+        learning_curves.CHANCE: np.stack([far, far]),
+    }
+    curve = learning_curves.Learning((40, 92), trials)
     text = evaluation_page.html("small motions", results[0], curve).decode()
     assert text.count("<img ") == 4 * len(results[0]) + 1
     assert '<section id="learning">' in text
@@ -454,19 +465,19 @@ def truth_result(small_recipe, examples):
 
 
 def test_truth_is_asked_where_bodies_can_be_and_is_reproducible():
-    from model_export.sample import controls
+    from posefield_train.sample import sample_controls
 
     points = ground_truth.points(200)
     assert np.array_equal(points[:10], ground_truth.points(10))
     for point in points:
-        controls.parse(list(point))
-    low, high = np.array([r[:2] for r in controls.RANGES.values()]).T
+        sample_controls.parse(list(point))
+    low, high = np.array([r[:2] for r in sample_controls.RANGES.values()]).T
     spread = (points - low) / (high - low)
     assert (spread.std(axis=0) > 0.2).all()
 
 
 def test_the_truth_is_nearer_to_a_model_than_to_the_mean(truth_result):
-    means = {one.name: one.mean.relative.mean for one in summary.of(truth_result)}
+    means = {one.name: one.mean.relative.mean for one in evaluation_summary.of(truth_result)}
     assert means["posefield"] < 0.5 * means["mean"]
     assert means["posefield"] < means["nearest"]
 

@@ -13,12 +13,14 @@ import onnx
 import onnxruntime
 import pytest
 
-from model_export import export, ingest, recipe, train
-from model_export.model import Outputs
-from service.motion import quat
-from service.motion.errors import ExportRefused
-from service.synthesis import session
-from service.synthesis.ports import OUTPUTS
+from posefield.common.errors import ExportRefused
+from posefield.inference import session
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.motion import quat
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.graph.float_model import Outputs
+from posefield_train.source import ingest, recipe
 
 # The gate's figure, m: float32 against float64.
 GATE = 1e-4
@@ -78,7 +80,7 @@ def asked(exported, opened):
 def made_in_this_process(path, folder):
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, folder)
-    return export.export(own, train.train(own, examples, lambda _: None), notes).content
+    return onnx_export.export(own, train.train(own, examples, lambda _: None), notes).content
 
 
 @pytest.mark.system
@@ -102,7 +104,7 @@ def test_other_data_give_other_bytes(quick_recipe, reaching_folder):
     path[:, 0, 1] += 1e-3
     moved = [replace(examples[0], clip=replace(examples[0].clip, translations=path)), *examples[1:]]
     made = [
-        export.export(own, train.train(own, these, lambda _: None), notes).content
+        onnx_export.export(own, train.train(own, these, lambda _: None), notes).content
         for these in (examples, moved)
     ]
     assert made[0] != made[1]
@@ -156,8 +158,8 @@ def test_the_card_says_what_the_motion_is_for(full_family):
 
 
 def test_graph_and_reference_agree_at_ten_thousand_points(exported, model_path, opened):
-    assert export.POINTS == 10_000 and export.ALLOWED == GATE
-    worst = export.gate(exported.model, model_path.read_bytes(), opened.card)
+    assert onnx_export.POINTS == 10_000 and onnx_export.ALLOWED == GATE
+    worst = onnx_export.gate(exported.model, model_path.read_bytes(), opened.card)
     assert 0.0 < worst < GATE
     assert opened.card.diagnostics["parity_m"] == float(f"{worst:.1e}")
 
@@ -195,7 +197,7 @@ def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(exported, model_p
     for joint, parent in enumerate(parents):
         hanging |= {joint} if parent in hanging else set()
     with pytest.raises(ExportRefused) as caught:
-        export.gate(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
+        onnx_export.gate(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
     found = re.match(r"the graph puts (\w+) ([0-9.]+) cm from", str(caught.value))
     assert names.index(found[1]) in hanging - {arm}
     # A forearm with its hand is some 0.4 m long: a hundredth of a radian moves its end by 0.4 cm.
@@ -213,9 +215,9 @@ def test_the_gate_lies_where_it_says(exported, model_path, opened, metres, refus
     moved = replace(exported.model, decoder=replace(decoder, mean=mean))
     if refused:
         with pytest.raises(ExportRefused, match=r"0\.02\d\d cm from where"):
-            export.gate(moved, model_path.read_bytes(), opened.card)
+            onnx_export.gate(moved, model_path.read_bytes(), opened.card)
     else:
-        worst = export.gate(moved, model_path.read_bytes(), opened.card)
+        worst = onnx_export.gate(moved, model_path.read_bytes(), opened.card)
         assert metres * 0.5 < worst < GATE
 
 
@@ -225,7 +227,9 @@ def test_the_gate_refuses_damaged_weights_of_the_field(exported, model_path, ope
     dual[7] *= 1.01
     damaged = replace(bank, pose=replace(bank.pose, dual=dual))
     with pytest.raises(ExportRefused, match=r"cm from where the reference does"):
-        export.gate(replace(exported.model, bank=damaged), model_path.read_bytes(), opened.card)
+        onnx_export.gate(
+            replace(exported.model, bank=damaged), model_path.read_bytes(), opened.card
+        )
 
 
 def test_the_gate_refuses_a_wrong_duration(exported, model_path, opened):
@@ -235,7 +239,7 @@ def test_the_gate_refuses_a_wrong_duration(exported, model_path, opened):
     others = bank.others | {"duration": slower}
     with pytest.raises(ExportRefused):
         model = replace(exported.model, bank=replace(bank, others=others))
-        export.gate(model, model_path.read_bytes(), opened.card)
+        onnx_export.gate(model, model_path.read_bytes(), opened.card)
 
 
 @pytest.fixture(scope="module")

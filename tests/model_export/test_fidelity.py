@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import align, cost, fidelity, ranks, train
-from model_export.recipe import Event
-from service.motion.errors import TrainingError
+from posefield.common.errors import TrainingError
+from posefield_train import train
+from posefield_train.align import time_alignment
+from posefield_train.graph import ranks, truncation_cost
+from posefield_train.source.recipe import Event
+from posefield_train.tensor import truncation_error
 
 # Rounding of the kinematics in float64, m.
 EXACT = 1e-9
@@ -15,7 +18,7 @@ EXACT = 1e-9
 
 @pytest.fixture(scope="module")
 def judge(small_recipe, trained):
-    return fidelity.judge(small_recipe, trained.examples, trained.tensor)
+    return truncation_error.judge(small_recipe, trained.examples, trained.tensor)
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +29,16 @@ def reduced(trained):
 @pytest.fixture(scope="module")
 def gaps(trained, judge, reduced):
     """Distances (N, T, J) of that truncation, m."""
-    found = fidelity.positions(judge.own_tensor, reduced.restored(), judge.parents, judge.offsets)
+    found = truncation_error.positions(
+        judge.own_tensor, reduced.restored(), judge.parents, judge.offsets
+    )
     return np.linalg.norm(found - judge.whole, axis=-1)
 
 
 def test_whole_tensor_is_the_aligned_clips(trained, judge):
-    clips = align.positions(trained.aligned, judge.parents, judge.offsets)
+    clips = time_alignment.positions(trained.aligned, judge.parents, judge.offsets)
     assert np.abs(judge.whole - clips).max() < EXACT
-    shuffled = align.positions(trained.aligned, judge.parents, judge.offsets[::-1])
+    shuffled = time_alignment.positions(trained.aligned, judge.parents, judge.offsets[::-1])
     assert np.abs(judge.whole - shuffled).max() > 1e-2
 
 
@@ -65,8 +70,10 @@ def test_joint_weights_weigh_the_rms_alone(judge, reduced, gaps):
 
 def test_without_an_event_there_is_no_effector(small_recipe, trained, reduced):
     plain = small_recipe.model_copy(update={"event": None})
-    assert fidelity.judge(plain, trained.examples, trained.tensor).of(reduced).effector is None
-    assert fidelity.event(plain, trained.examples) is None
+    assert (
+        truncation_error.judge(plain, trained.examples, trained.tensor).of(reduced).effector is None
+    )
+    assert truncation_error.event(plain, trained.examples) is None
 
 
 def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, trained):
@@ -77,8 +84,8 @@ def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, traine
     for at in ("lift", "touch", "end"):
         event = Event(joint="LeftHand", at=at)
         own = small_recipe.model_copy(update={"clips": clips, "event": event})
-        frames[at] = fidelity.judge(own, marked, trained.tensor).moment.frame
-        told = fidelity.event(own, marked)
+        frames[at] = truncation_error.judge(own, marked, trained.tensor).moment.frame
+        told = truncation_error.event(own, marked)
         assert trained.skeleton.names[told.joint] == "LeftHand"
         shares[at] = told.share
     assert frames == {"lift": 4, "touch": 16, "end": 39}
@@ -88,14 +95,14 @@ def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, traine
 def test_a_joint_that_is_not_there_is_refused_by_name(small_recipe, trained):
     own = small_recipe.model_copy(update={"event": Event(joint="Tail", at="end")})
     with pytest.raises(TrainingError, match=r"event\.joint 'Tail', expected one of Hips, .*Head"):
-        fidelity.judge(own, trained.examples, trained.tensor)
+        truncation_error.judge(own, trained.examples, trained.tensor)
 
 
 def chosen(own, trained, judge, **size):
     """Fidelity and cost of the ranks that a size asks for."""
     empty = {"rms_budget_cm": None, "p99_budget_cm": None, "effector_budget_cm": None}
     asked = own.size.model_copy(update={**empty, **size})
-    price = cost.PRICES[asked.cost](trained.tensor, 4)
+    price = truncation_cost.PRICES[asked.cost](trained.tensor, 4)
     found = ranks.choose(asked, trained.full, price, judge)
     return judge.of(trained.full.truncated(found)), price.of(*found), found
 
@@ -119,7 +126,7 @@ def test_all_budgets_given_are_kept(small_recipe, trained, judge):
 
 
 def test_cost_decides_which_ranks_are_the_cheapest(small_recipe, trained, judge):
-    numbers, operations = (price(trained.tensor, 4) for price in cost.PRICES.values())
+    numbers, operations = (price(trained.tensor, 4) for price in truncation_cost.PRICES.values())
     fronts = [ranks.front(trained.full.core, price) for price in (numbers, operations)]
     pairs = []
     for error in np.geomspace(1e-4, 0.1, 12) * np.sum(trained.full.core**2):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from model_export import fields, tune, variogram
-from model_export.field_bank import Constant
-from model_export.kriging import Kriging as Field
-from model_export.recipe import Kriging
-from model_export.samples import Samples
+from posefield_train.kriging import coefficient_models, kriging_tuning, variogram
+from posefield_train.kriging.kriging_bank import Constant
+from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.universal_kriging import Kriging as Field
+from posefield_train.source.recipe import Kriging
 
 
 @pytest.fixture
@@ -31,8 +31,8 @@ def candidates(laid, values, covariances=("matern52", "gaussian"), drifts=((1,),
     for covariance in covariances:
         for own in drifts:
             experimental = variogram.of_residuals(laid.points, values, max(own))
-            guess = tune.first_guess(experimental, laid.controls, covariance, own)
-            found[covariance, own] = tune.tune(guess, laid, values, None)
+            guess = kriging_tuning.first_guess(experimental, laid.controls, covariance, own)
+            found[covariance, own] = kriging_tuning.tune(guess, laid, values, None)
     return found
 
 
@@ -45,8 +45,8 @@ def test_the_least_left_out_is_chosen_and_gaussian_only_where_clearly_so(laid, v
 
     leasts = {covariance: least(covariance) for covariance in ("matern52", "gaussian")}
     matern, gaussian = (tried[leasts[name]].unexplained for name in leasts)
-    best = leasts["gaussian" if gaussian < fields.CLEARLY * matern else "matern52"]
-    chosen = fields.chosen(Kriging(), laid, values)
+    best = leasts["gaussian" if gaussian < coefficient_models.CLEARLY * matern else "matern52"]
+    chosen = coefficient_models.chosen(Kriging(), laid, values)
     assert (chosen.hyper.covariance, chosen.hyper.drifts) == best
     assert chosen.unexplained == tried[best].unexplained
     assert len({field.unexplained for field in tried.values()}) > 1
@@ -55,29 +55,29 @@ def test_the_least_left_out_is_chosen_and_gaussian_only_where_clearly_so(laid, v
 @pytest.mark.parametrize(("drift", "drifts"), [(0, (0,)), (1, (1,)), ("mixed", (0, 1, 1))])
 def test_what_the_recipe_names_is_not_chosen_again(laid, values, drift, drifts):
     settings = Kriging(covariance="exponential", drift=drift)
-    chosen = fields.chosen(settings, laid, values)
+    chosen = coefficient_models.chosen(settings, laid, values)
     assert (chosen.hyper.covariance, chosen.hyper.drifts) == ("exponential", drifts)
 
 
 def test_fields_beside_the_pose_choose_their_drift_and_not_their_covariance(laid, values):
     tried = candidates(laid, values, ("gaussian",))
     best = min(tried, key=lambda name: tried[name].unexplained)
-    found = fields.fit(Kriging(), "gaussian", laid, values).field
+    found = coefficient_models.fit(Kriging(), "gaussian", laid, values).field
     assert isinstance(found, Field)
     assert (found.hyper.covariance, found.hyper.drifts) == best
 
 
 def test_noise_is_answered_with_its_mean_and_a_field_is_not(laid, rng):
     noise = rng.normal(size=(24, 2))
-    found = fields.fit(Kriging(), "matern52", laid, noise)
+    found = coefficient_models.fit(Kriging(), "matern52", laid, noise)
     assert isinstance(found.field, Constant)
     assert np.array_equal(found.field.mean, noise.mean(axis=0))
     assert np.array_equal(found.residuals, laid.from_mean(noise))
-    kept = fields.fit(Kriging(nugget=0.1), "matern52", laid, noise)
+    kept = coefficient_models.fit(Kriging(nugget=0.1), "matern52", laid, noise)
     assert isinstance(kept.field, Field)
 
 
 def test_values_that_never_change_are_a_constant(laid):
-    found = fields.fit(Kriging(), "matern52", laid, np.full((24, 2), 3.0))
+    found = coefficient_models.fit(Kriging(), "matern52", laid, np.full((24, 2), 3.0))
     assert isinstance(found.field, Constant)
     assert found.explained == 0.0 and not found.residuals.any()

@@ -5,8 +5,8 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from model_export import hosvd
-from service.motion.errors import TrainingError
+from posefield.common.errors import TrainingError
+from posefield_train.tensor import hosvd
 
 SHAPES = [(5, 4, 3), (3, 7, 4), (2, 9, 3), (4, 3, 2, 5)]
 # Roundings of sums of a few hundred products of numbers of size one.

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from minimal import SKELETON, recipe_with, small_clip, write_clips
 
-from model_export import ingest
-from service.motion import quat
-from service.motion.clip import Clip
-from service.motion.conventions import UP
-from service.motion.errors import BvhError, RecipeError
-from service.motion.skeleton import Skeleton
+from posefield.common.errors import BvhError, RecipeError
+from posefield.common.units import UP
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.source import ingest
 
 # A file keeps a millionth of a degree and of a metre: what comes back is off by less than this, m.
 WRITTEN = 1e-5

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from model_export.jobs import Processes
-from service.motion.errors import TrainingError
+from posefield.common.errors import TrainingError
+from posefield_train.parallel.jobs import Processes
 
 
 def divide(dividend, divisor):

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import kriging
-from model_export.covariance import COVARIANCES
-from model_export.kriging import Hyper, LeaveOneOut
-from service.motion.errors import TrainingError
+from posefield.common.errors import TrainingError
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.universal_kriging import Hyper, LeaveOneOut
 
 # The systems here have condition numbers below 1e5.
 TOLERANCE = 1e-9
@@ -54,15 +54,15 @@ def linear(points):
 
 
 def test_without_nugget_data_come_back_at_the_data_points(hyper, samples, values):
-    exact = kriging.solve(replace(hyper, nugget=0.0), samples, values)
+    exact = universal_kriging.solve(replace(hyper, nugget=0.0), samples, values)
     assert far(exact.predict(samples), values) < TOLERANCE
     assert far(exact.variance(samples), 0.0) < TOLERANCE
-    smoothed = kriging.solve(hyper, samples, values)
+    smoothed = universal_kriging.solve(hyper, samples, values)
     assert far(smoothed.predict(samples), values) > 1e-2
 
 
 def test_field_with_a_nugget_is_continuous_at_the_data_points(hyper, samples, values):
-    field = kriging.solve(hyper, samples, values)
+    field = universal_kriging.solve(hyper, samples, values)
     beside = field.predict(samples + 1e-9)
     assert far(field.predict(samples), beside) < 1e-6
     # A nugget that stands in the query as well would jump to the data there.
@@ -70,7 +70,9 @@ def test_field_with_a_nugget_is_continuous_at_the_data_points(hyper, samples, va
 
 
 def test_drift_is_reproduced(hyper, samples, points):
-    field = kriging.solve(hyper, samples, np.hstack([np.full((30, 1), 5.0), linear(samples)]))
+    field = universal_kriging.solve(
+        hyper, samples, np.hstack([np.full((30, 1), 5.0), linear(samples)])
+    )
     found = field.predict(points)
     assert far(found[:, 0], 5.0) < TOLERANCE
     away = far(found[:, 1:], linear(points))
@@ -78,53 +80,56 @@ def test_drift_is_reproduced(hyper, samples, points):
 
 
 def test_weights_add_up_to_one_and_reproduce_the_drift(hyper, samples, points):
-    weights = kriging.solve(hyper, samples, samples).weights(points)
+    weights = universal_kriging.solve(hyper, samples, samples).weights(points)
     assert far(weights.sum(axis=1), 1.0) < TOLERANCE
     away = far(weights @ samples, points)
     assert away < TOLERANCE if hyper.drifts == (1,) else away > 1e-2
-    near = kriging.covariances(hyper, points, samples)
+    near = universal_kriging.covariances(hyper, points, samples)
     assert far(near.sum(axis=1), 1.0) > 1e-2
 
 
 def test_weights_are_another_way_to_predict(hyper, samples, values, points):
-    field = kriging.solve(hyper, samples, values)
+    field = universal_kriging.solve(hyper, samples, values)
     assert far(field.weights(points) @ values, field.predict(points)) < TOLERANCE
     assert far(field.weights(points) @ values[::-1], field.predict(points)) > 1e-2
 
 
 def test_vector_is_kriged_as_its_components(hyper, samples, values, points):
-    together = kriging.solve(hyper, samples, values).predict(points)
-    alone = [kriging.solve(hyper, samples, column[:, None]).predict(points) for column in values.T]
+    together = universal_kriging.solve(hyper, samples, values).predict(points)
+    alone = [
+        universal_kriging.solve(hyper, samples, column[:, None]).predict(points)
+        for column in values.T
+    ]
     assert far(together, np.hstack(alone)) < 1e-12
     assert far(together, np.hstack(alone[::-1])) > 1e-2
 
 
 def test_order_of_samples_does_not_matter(hyper, samples, values, points, rng):
     order = rng.permutation(30)
-    field = kriging.solve(hyper, samples, values)
-    shuffled = kriging.solve(hyper, samples[order], values[order])
+    field = universal_kriging.solve(hyper, samples, values)
+    shuffled = universal_kriging.solve(hyper, samples[order], values[order])
     assert far(shuffled.predict(points), field.predict(points)) < TOLERANCE
     assert far(shuffled.variance(points), field.variance(points)) < TOLERANCE
     assert far(shuffled.weights(points), field.weights(points)[:, order]) < TOLERANCE
-    mixed = kriging.solve(hyper, samples[order], values)
+    mixed = universal_kriging.solve(hyper, samples[order], values)
     assert far(mixed.predict(points), field.predict(points)) > 1e-2
 
 
 def test_scales_stretch_the_controls(hyper, samples, values, points):
-    scaled = kriging.solve(
+    scaled = universal_kriging.solve(
         replace(hyper, scales=np.ones(3)), samples * hyper.scales, values
     ).predict(points * hyper.scales)
-    field = kriging.solve(hyper, samples, values)
+    field = universal_kriging.solve(hyper, samples, values)
     assert far(scaled, field.predict(points)) < TOLERANCE
-    even = kriging.solve(replace(hyper, scales=np.ones(3)), samples, values)
+    even = universal_kriging.solve(replace(hyper, scales=np.ones(3)), samples, values)
     assert far(even.predict(points), field.predict(points)) > 1e-2
 
 
 def test_variance_is_that_of_the_error_of_the_weights(hyper, samples, values, points):
-    field = kriging.solve(hyper, samples, values)
+    field = universal_kriging.solve(hyper, samples, values)
     w = field.weights(points)
-    own = kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
-    cross = kriging.covariances(hyper, points, samples)
+    own = universal_kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
+    cross = universal_kriging.covariances(hyper, points, samples)
     expected = 1.0 - 2.0 * np.sum(w * cross, axis=1) + np.sum((w @ own) * w, axis=1)
     assert far(field.variance(points), expected) < TOLERANCE
     simple = 1.0 - np.sum(cross @ np.linalg.inv(own) * cross, axis=1)
@@ -132,11 +137,11 @@ def test_variance_is_that_of_the_error_of_the_weights(hyper, samples, values, po
 
 
 def test_weights_are_the_best_unbiased_ones(hyper, samples, values, points, rng):
-    field = kriging.solve(hyper, samples, values)
-    own = kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
-    cross = kriging.covariances(hyper, points, samples)
+    field = universal_kriging.solve(hyper, samples, values)
+    own = universal_kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
+    cross = universal_kriging.covariances(hyper, points, samples)
     best = field.weights(points)
-    functions = kriging.drift(samples, 3, max(hyper.drifts))
+    functions = universal_kriging.drift(samples, 3, max(hyper.drifts))
     free = np.linalg.qr(functions, mode="complete")[0][:, functions.shape[1] :]
 
     def error(w):
@@ -147,14 +152,15 @@ def test_weights_are_the_best_unbiased_ones(hyper, samples, values, points, rng)
         assert all(np.all(error(other) > error(best)) for other in others)
     else:
         # Averaged weights are no optimum: those of the constant drift alone have less variance.
-        constant = kriging.solve(each_drift(hyper)[0], samples, values)
+        constant = universal_kriging.solve(each_drift(hyper)[0], samples, values)
         assert np.all(error(constant.weights(points)) < error(best))
 
 
 def test_two_drifts_predict_the_mean_of_both(hyper, samples, values, points):
-    field = kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
+    field = universal_kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
     alone = [
-        kriging.solve(own, samples, values) for own in each_drift(replace(hyper, drifts=(0, 1)))
+        universal_kriging.solve(own, samples, values)
+        for own in each_drift(replace(hyper, drifts=(0, 1)))
     ]
     predicted = [own.predict(points) for own in alone]
     weighed = [own.weights(points) for own in alone]
@@ -171,21 +177,26 @@ def test_with_one_drift_the_variance_is_one_minus_the_systems_own_form(
     hyper, samples, values, points
 ):
     for own, degree in zip(each_drift(hyper), hyper.drifts, strict=True):
-        functions = kriging.drift(samples, 3, degree)
+        functions = universal_kriging.drift(samples, 3, degree)
         k = functions.shape[1]
         system = np.block(
-            [[kriging.noisy(own, samples), functions], [functions.T, np.zeros((k, k))]]
+            [[universal_kriging.noisy(own, samples), functions], [functions.T, np.zeros((k, k))]]
         )
-        b = np.hstack([kriging.covariances(own, points, samples), kriging.drift(points, 3, degree)])
+        b = np.hstack(
+            [
+                universal_kriging.covariances(own, points, samples),
+                universal_kriging.drift(points, 3, degree),
+            ]
+        )
         expected = 1.0 - np.sum(b @ np.linalg.inv(system) * b, axis=1)
-        field = kriging.solve(own, samples, values)
+        field = universal_kriging.solve(own, samples, values)
         assert far(field.variance(points), expected) < TOLERANCE
-        both = kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
+        both = universal_kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
         assert far(both.variance(points), expected) > 1e-6
 
 
 def test_variance_grows_away_from_the_samples(hyper, samples, values):
-    field = kriging.solve(hyper, samples, values)
+    field = universal_kriging.solve(hyper, samples, values)
     inside, outside = field.variance(np.array([[0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]))
     assert 0.0 < inside < outside
     assert outside > 1.0
@@ -196,7 +207,7 @@ def left_out_one_by_one(hyper, samples, values, groups):
     residuals, variances = np.empty_like(values), np.empty(len(samples))
     for group in np.unique(groups):
         own = groups == group
-        field = kriging.solve(hyper, samples[~own], values[~own])
+        field = universal_kriging.solve(hyper, samples[~own], values[~own])
         residuals[own] = values[own] - field.predict(samples[own])
         variances[own] = field.variance(samples[own]) + hyper.nugget
     return residuals, variances
@@ -211,16 +222,16 @@ TAKES = np.repeat(ALONE, [5, 4, 3, 3, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1] + 14 *
 
 @pytest.mark.parametrize("groups", [ALONE, TAKES], ids=["alone", "takes"])
 def test_leaving_out_in_closed_form_is_what_leaving_out_gives(hyper, samples, values, groups):
-    matrix = kriging.leave_out(hyper, samples, groups)
+    matrix = universal_kriging.leave_out(hyper, samples, groups)
     residuals, variances = left_out_one_by_one(hyper, samples, values, groups)
     assert far(matrix @ values, residuals) < TOLERANCE
-    own = np.sum((matrix @ kriging.noisy(hyper, samples)) * matrix, axis=1)
+    own = np.sum((matrix @ universal_kriging.noisy(hyper, samples)) * matrix, axis=1)
     assert far(own, variances) < TOLERANCE
     # Negative controls: nothing left out, and others left out together.
-    fitted = values - kriging.solve(hyper, samples, values).predict(samples)
+    fitted = values - universal_kriging.solve(hyper, samples, values).predict(samples)
     assert far(fitted, residuals) > 1e-2
     other = TAKES if groups is ALONE else ALONE
-    assert far(kriging.leave_out(hyper, samples, other) @ values, residuals) > 1e-2
+    assert far(universal_kriging.leave_out(hyper, samples, other) @ values, residuals) > 1e-2
 
 
 def test_one_leave_one_out_serves_fields_of_all_parameters(hyper, samples):
@@ -231,23 +242,23 @@ def test_one_leave_one_out_serves_fields_of_all_parameters(hyper, samples):
         replace(hyper, drifts=(0,) if hyper.drifts == (1,) else (1,)),
     ]
     first = shared.matrix(hyper)
-    assert np.array_equal(first, kriging.leave_out(hyper, samples, TAKES))
+    assert np.array_equal(first, universal_kriging.leave_out(hyper, samples, TAKES))
     for other in others:
         found = shared.matrix(other)
-        assert np.array_equal(found, kriging.leave_out(other, samples, TAKES))
+        assert np.array_equal(found, universal_kriging.leave_out(other, samples, TAKES))
         assert far(found, first) > 1e-3
     assert np.array_equal(shared.matrix(hyper), first)
 
 
 def test_names_of_groups_do_not_matter(hyper, samples):
     renamed = np.array([7, 3, 100, -2, *range(200, 226)])[TAKES]
-    expected = kriging.leave_out(hyper, samples, TAKES)
-    assert np.array_equal(kriging.leave_out(hyper, samples, renamed), expected)
-    assert far(kriging.leave_out(hyper, samples, np.roll(TAKES, 1)), expected) > 1e-2
+    expected = universal_kriging.leave_out(hyper, samples, TAKES)
+    assert np.array_equal(universal_kriging.leave_out(hyper, samples, renamed), expected)
+    assert far(universal_kriging.leave_out(hyper, samples, np.roll(TAKES, 1)), expected) > 1e-2
 
 
 def check(samples, degree=1, nugget_is_zero=False, names=NAMES):
-    return kriging.check(samples, names[: samples.shape[1]], degree, nugget_is_zero)
+    return universal_kriging.check(samples, names[: samples.shape[1]], degree, nugget_is_zero)
 
 
 def refusal(*given, **more):
@@ -299,5 +310,5 @@ def test_two_samples_at_one_point_are_refused_without_a_nugget(samples):
 def test_two_samples_at_one_point_are_averaged_by_a_nugget(hyper, samples, values):
     twice = np.vstack([samples, samples[:1]])
     both = np.vstack([values, -values[:1]])
-    field = kriging.solve(hyper, twice, both)
+    field = universal_kriging.solve(hyper, twice, both)
     assert far(*field.weights(samples[:1])[0, [0, 30]]) < TOLERANCE

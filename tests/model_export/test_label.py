@@ -10,16 +10,17 @@ from model_files import written
 from numpy.random import PCG64, Generator
 from running import outputs
 
-from model_export import export, field_graph, kriging
-from model_export.covariance import COVARIANCES
-from model_export.field_bank import Constant, FieldBank
-from model_export.kriging import Hyper
-from model_export.ladder import Ladder
-from model_export.model import Outputs
-from service.motion import card
-from service.motion.errors import ExportRefused, ModelError
-from service.synthesis import session
-from service.synthesis.ports import OUTPUTS
+from posefield.common.errors import ExportRefused, ModelError
+from posefield.inference import session
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.model_file import model_card
+from posefield_train.graph import onnx_export
+from posefield_train.graph.float_model import Outputs
+from posefield_train.kriging import kriging_graph, universal_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_bank import Constant, FieldBank
+from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.onnx_graph.level_tables import Ladder
 
 SAMPLES, CONTROLS, BATCH = 25, 3, 40
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
@@ -47,7 +48,7 @@ def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=()
         scales, nugget = own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3)
         hyper = Hyper(covariance, drifts, scales, nugget, label)
         values = own.normal(size=(SAMPLES, size))
-        solved = kriging.solve(hyper, samples, values)
+        solved = universal_kriging.solve(hyper, samples, values)
         fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
     return FieldBank(LOW, HIGH, names, fields.pop("pose"), fields, 0.04)
 
@@ -64,8 +65,8 @@ def graph_of(bank, rank=6):
     """Function of controls, and of labels where they are given, that runs the fields and sigma."""
 
     def build(net, controls, *_):
-        ends = Ladder(field_graph.entries(bank, [rank])).onnx(net)
-        return tuple(field_graph.onnx(bank, net, controls, ends).values())
+        ends = Ladder(kriging_graph.entries(bank, [rank])).onnx(net)
+        return tuple(kriging_graph.onnx(bank, net, controls, ends).values())
 
     return lambda controls, **labels: outputs(build, (2, 2, 2, 1), controls=controls, **labels)
 
@@ -133,7 +134,9 @@ def test_a_batch_of_several_performers_is_each_of_them_alone():
 
 def test_performers_of_no_distance_are_not_told_apart():
     bank = labelled_bank()
-    pose = kriging.solve(replace(bank.pose.hyper, label=0.0), bank.pose.samples, np.eye(SAMPLES))
+    pose = universal_kriging.solve(
+        replace(bank.pose.hyper, label=0.0), bank.pose.samples, np.eye(SAMPLES)
+    )
     run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)), SAMPLES)
     assert apart(run(asked()), run(asked(), performer=mixed(len(NAMES)))) < 1e-6
 
@@ -166,10 +169,10 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(
     def away(answer):
         return np.abs(answer.positions(parents) - found.positions(parents)).max()
 
-    assert away(expected) < export.ALLOWED
+    assert away(expected) < onnx_export.ALLOWED
     assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-3
     assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
-    assert away(labelled_exported.model.evaluate(points, times)) > 10 * export.ALLOWED
+    assert away(labelled_exported.model.evaluate(points, times)) > 10 * onnx_export.ALLOWED
     # Of somebody who was seen more is known, as a rule, than of anybody.
     nobody = Outputs(*opened.run(points, times, *OUTPUTS))
     seen = labels.any(axis=1)
@@ -179,7 +182,9 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(
 
 def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     content = labelled_path.read_bytes()
-    assert 0.0 < export.gate(labelled_exported.model, content, opened.card) < export.ALLOWED
+    assert (
+        0.0 < onnx_export.gate(labelled_exported.model, content, opened.card) < onnx_export.ALLOWED
+    )
     bank = labelled_exported.model.bank
     # Two performers change places: nobody would notice who asks for controls alone.
     samples = bank.pose.samples.copy()
@@ -190,7 +195,7 @@ def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     before, after = (m.evaluate(points, times).rotations for m in (labelled_exported.model, model))
     assert np.array_equal(before, after)
     with pytest.raises(ExportRefused, match=r"at (middle|short), \{'stature': "):
-        export.gate(model, content, opened.card)
+        onnx_export.gate(model, content, opened.card)
 
 
 def question_of_nobody(opened):
@@ -240,11 +245,13 @@ def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_pat
 
 
 def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, labelled_path):
-    again = export.export(labelled_recipe, labelled, []).content
+    again = onnx_export.export(labelled_recipe, labelled, []).content
     assert again == labelled_path.read_bytes()
     others = ("anna", *labelled.model.bank.performers[1:])
     renamed = replace(labelled.model, bank=replace(labelled.model.bank, performers=others))
-    assert export.export(labelled_recipe, replace(labelled, model=renamed), []).content != again
+    assert (
+        onnx_export.export(labelled_recipe, replace(labelled, model=renamed), []).content != again
+    )
 
 
 def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, labelled_exported):
@@ -265,7 +272,7 @@ def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, label
 
 @pytest.mark.parametrize("names", [("ada", "bob"), ("ada", "bob", "cyd", "dee")])
 def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_path, opened, names):
-    entries = card.dump(replace(opened.card, performers=names, moved_by=(0,) * 46))
+    entries = model_card.dump(replace(opened.card, performers=names, moved_by=(0,) * 46))
     graph = onnx.load(labelled_path)
     for entry in graph.metadata_props:
         entry.value = entries.get(entry.key, entry.value)
@@ -275,7 +282,7 @@ def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_pat
 
 
 def test_a_card_without_the_performers_that_the_graph_takes_is_refused(labelled_path, opened):
-    entries = card.dump(replace(opened.card, performers=(), moved_by=()))
+    entries = model_card.dump(replace(opened.card, performers=(), moved_by=()))
     graph = onnx.load(labelled_path)
     for entry in graph.metadata_props:
         entry.value = entries.get(entry.key, entry.value)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from model_export import ingest, recipe
-from model_export.evaluate import learning
-from model_export.evaluate.learning import CHANCE, SUGGESTED, Learning
-from model_export.sample import family, write
+from posefield_train.evaluate import learning_curves
+from posefield_train.evaluate.learning_curves import CHANCE, SUGGESTED, Learning
+from posefield_train.sample import sample_family, sample_files
+from posefield_train.source import ingest, recipe
 
 SIZES = (40, 60, 80, 100)
 
@@ -28,8 +28,8 @@ def test_it_is_as_fast_as_it_comes_to_where_chance_ends():
 
 def test_random_samples_that_do_not_help_give_no_ratio():
     found = curve([4.0, 3.0, 2.0, 1.0], [4.0, 4.5, 4.5, 4.5])
-    assert found.faster is None and learning.facts(found)["faster"] is None
-    assert "nothing to compare with" in learning.table(found)
+    assert found.faster is None and learning_curves.facts(found)["faster"] is None
+    assert "nothing to compare with" in learning_curves.table(found)
 
 
 def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
@@ -41,9 +41,9 @@ def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
 def test_it_is_told_as_a_table_and_as_figures():
     found = curve([4.0, 2.0, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
     row = "| suggested, global   | 4.00 ± 0.10 | 2.00 ± 0.10 | 1.50 ± 0.10 | 1.00 ± 0.10 |"
-    assert row in learning.table(found)
-    assert "3.0 times as fast" in learning.table(found)
-    facts = learning.facts(found)
+    assert row in learning_curves.table(found)
+    assert "3.0 times as fast" in learning_curves.table(found)
+    facts = learning_curves.facts(found)
     assert facts["at_random"] == {
         "global_cm": [4, 3, 2.5, 2],
         "relative_cm": [4, 3, 2.5, 2],
@@ -54,8 +54,8 @@ def test_it_is_told_as_a_table_and_as_figures():
 
 
 def test_samples_of_ones_own_are_a_family(tmp_path):
-    chosen = list(family.samples())[3:6]
-    file = write.family(tmp_path / "own", chosen)
+    chosen = list(sample_family.samples())[3:6]
+    file = sample_files.family(tmp_path / "own", chosen)
     found, _ = ingest.ingest(recipe.read(file), file.parent)
     expected = [[*vars(sample.controls).values()] for sample in chosen]
     assert [example.controls.tolist() for example in found] == expected

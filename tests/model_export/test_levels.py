@@ -8,13 +8,15 @@ import onnx
 import onnxruntime
 import pytest
 
-from model_export import exams, kriging, levels, thin
-from model_export.field_bank import VARIANCE
-from model_export.recipe import Detail
-from service.motion import skeleton
-from service.motion.errors import TrainingError
-from service.synthesis import freeze, session
-from service.synthesis.ports import OUTPUTS
+from posefield.common.errors import TrainingError
+from posefield.inference import session
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.model_file import subgraph
+from posefield.motion import skeleton
+from posefield_train.graph import level_errors, levels
+from posefield_train.kriging import thinning, universal_kriging
+from posefield_train.kriging.kriging_bank import VARIANCE
+from posefield_train.source.recipe import Detail
 
 HAND = "LeftHand"
 
@@ -25,7 +27,7 @@ def with_levels(recipe, *details):
 
 @pytest.fixture(scope="module")
 def exam(small_recipe, trained):
-    return exams.of(small_recipe, trained, 2_000)
+    return level_errors.of(small_recipe, trained, 2_000)
 
 
 @pytest.fixture(scope="module")
@@ -102,9 +104,9 @@ def test_durations_are_those_of_whole_answers(exported, exam):
 
 
 def test_samples_are_asked_in_the_order_in_which_they_say_most(trained):
-    bank = thin.ordered(trained.model.bank)
+    bank = thinning.ordered(trained.model.bank)
     own = bank.pose
-    matrix = kriging.covariances(own.hyper, own.samples, own.samples)
+    matrix = universal_kriging.covariances(own.hyper, own.samples, own.samples)
 
     def unsaid(first):
         known = matrix[first][:, first]
@@ -118,7 +120,7 @@ def test_samples_are_asked_in_the_order_in_which_they_say_most(trained):
 def test_the_order_of_samples_changes_no_answer(trained, rng):
     bank = trained.model.bank
     points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
-    before, after = bank.numpy(points), thin.ordered(bank).numpy(points)
+    before, after = bank.numpy(points), thinning.ordered(bank).numpy(points)
     for name, values in before.items():
         assert np.abs(after[name] - values).max() < 1e-9
     other = replace(bank, pose=replace(bank.pose, samples=bank.pose.samples[::-1]))
@@ -127,13 +129,13 @@ def test_the_order_of_samples_changes_no_answer(trained, rng):
 
 def test_as_many_covariances_as_there_are_answer_exactly(trained, rng):
     """Least squares over the whole basis finds the weights of kriging again."""
-    bank = thin.ordered(trained.model.bank)
+    bank = thinning.ordered(trained.model.bank)
     rank = bank.pose.dual.shape[1]
     points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
     exact = bank.numpy(points)
 
     def away(columns):
-        own = replace(bank, coarse=(thin.lesson(bank).weights(columns, rank, 0.0),)).numpy(
+        own = replace(bank, coarse=(thinning.lesson(bank).weights(columns, rank, 0.0),)).numpy(
             points, 1
         )
         return max(np.abs(own[name] - exact[name]).max() for name in exact if name != VARIANCE)
@@ -225,7 +227,7 @@ def test_who_feeds_no_level_gets_the_finest(model_path, question):
 
 def test_a_frozen_file_has_no_level_to_feed(model_path):
     content = model_path.read_bytes()
-    frozen = runtime(freeze.at_level(content, 2))
+    frozen = runtime(subgraph.at_level(content, 2))
     assert [port.name for port in frozen.get_overridable_initializers()] == []
     assert frozen.get_modelmeta().custom_metadata_map  # all else is still there
 
@@ -233,12 +235,12 @@ def test_a_frozen_file_has_no_level_to_feed(model_path):
 @pytest.mark.parametrize("cut", [1, 100, 10_000])
 def test_half_a_file_cannot_be_frozen(model_path, cut):
     with pytest.raises(ValueError):
-        freeze.at_level(model_path.read_bytes()[:-cut], 0)
+        subgraph.at_level(model_path.read_bytes()[:-cut], 0)
 
 
 def test_what_leads_to_one_output_is_less_than_half_of_the_graph(model_path):
     whole = onnx.load(model_path)
-    part = onnx.load_from_string(freeze.for_outputs(model_path.read_bytes(), "duration"))
+    part = onnx.load_from_string(subgraph.for_outputs(model_path.read_bytes(), "duration"))
     assert 0 < len(part.graph.node) < len(whole.graph.node) / 2
     assert [port.name for port in part.graph.output] == ["duration"]
     onnx.checker.check_model(part)
@@ -249,4 +251,4 @@ def test_the_worst_pose_is_off_by_no_more_than_some_times_the_rest(exported, sma
     budget = small_recipe.size.budgets["rms"]
     for times, level in zip((2, 4, 8), exported.card.levels[1:], strict=True):
         # Others than it was tried with may be somewhat worse.
-        assert level.rms < level.pose < 1.3 * exams.TAIL * times * budget
+        assert level.rms < level.pose < 1.3 * level_errors.TAIL * times * budget

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from model_export import metric
-from service.motion import quat, skeleton
+from posefield.motion import quat, skeleton
+from posefield_train.tensor import pose_metric
 
 PARENTS = (-1, 0, 1, 2, 1, 4)
 JOINTS, POSES = 6, 5
@@ -29,7 +29,7 @@ def skin(means, numbers, bones):
     rotations = quat.mul(means, quat.exp(numbers[3:].reshape(-1, 3)))
     translations = np.vstack([numbers[:3], bones[1:]])
     positions, orientations = skeleton.forward(PARENTS, rotations, translations)
-    axes = metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
+    axes = pose_metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
     return (positions[:, None] + quat.rotate(orientations[:, None], axes)).reshape(-1, 3)
 
 
@@ -52,7 +52,7 @@ def by_differences(means, vectors, translations, weights):
 
 def gram(means, vectors, translations, weights):
     rotations = quat.mul(means, quat.exp(vectors))
-    return metric.gram(PARENTS, rotations, vectors, translations, weights)
+    return pose_metric.gram(PARENTS, rotations, vectors, translations, weights)
 
 
 def test_gram_matrix_is_that_of_finite_differences(family, weights):
@@ -61,7 +61,7 @@ def test_gram_matrix_is_that_of_finite_differences(family, weights):
     assert np.max(np.abs(gram(*family, weights) - expected)) < TOLERANCE * scale
     assert np.max(np.abs(gram(*family, np.ones(JOINTS)) - expected)) > 1e-2 * scale
     means, vectors, translations = family
-    no_curvature = metric.gram(
+    no_curvature = pose_metric.gram(
         PARENTS, quat.mul(means, quat.exp(vectors)), 0.0 * vectors, translations, weights
     )
     assert np.max(np.abs(no_curvature - expected)) > 1e-2 * scale
@@ -70,8 +70,8 @@ def test_gram_matrix_is_that_of_finite_differences(family, weights):
 def test_turn_about_a_bone_counts_by_the_skin():
     """A lone joint: only its own sphere moves, by two thirds of its squared radius."""
     still = np.zeros((1, 1, 3)), np.zeros((1, 1, 3))
-    found = metric.gram((-1,), quat.exp(still[0]), *still, np.array([2.0]))
-    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * metric.SHELL**2] * 3)
+    found = pose_metric.gram((-1,), quat.exp(still[0]), *still, np.array([2.0]))
+    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * pose_metric.SHELL**2] * 3)
     assert np.max(np.abs(found - expected)) < 1e-15
 
 
@@ -112,8 +112,8 @@ def test_root_moves_the_whole_mass(family, weights):
 
 def test_whitening_is_the_square_root_and_its_inverse(family, weights):
     found = gram(*family, weights)
-    root, inverse = metric.whitening(found)
-    assert np.linalg.eigvalsh(found)[0] > metric.FLOOR * np.linalg.eigvalsh(found)[-1]
+    root, inverse = pose_metric.whitening(found)
+    assert np.linalg.eigvalsh(found)[0] > pose_metric.FLOOR * np.linalg.eigvalsh(found)[-1]
     assert np.max(np.abs(root @ root.T - found)) < 1e-12 * np.max(found)
     assert np.max(np.abs(root @ inverse - np.eye(len(found)))) < 1e-10
     assert np.max(np.abs(root - root.T)) < 1e-12 * np.max(root)
@@ -122,7 +122,7 @@ def test_whitening_is_the_square_root_and_its_inverse(family, weights):
 
 def test_direction_that_moves_nothing_is_held_at_the_floor(rng):
     basis = np.linalg.qr(rng.normal(size=(4, 4)))[0]
-    root, inverse = metric.whitening((basis * [4.0, 1.0, 1e-9, 0.0]) @ basis.T)
+    root, inverse = pose_metric.whitening((basis * [4.0, 1.0, 1e-9, 0.0]) @ basis.T)
     values = np.sort(np.linalg.eigvalsh(root))
     assert np.allclose(values, [2e-3, 2e-3, 1.0, 2.0], rtol=1e-9)
     assert np.max(np.abs(root @ inverse - np.eye(4))) < 1e-10

@@ -5,8 +5,8 @@ import pytest
 from running import outputs
 from scipy.interpolate import RBFInterpolator
 
-from model_export import kriging, naive, variogram
-from model_export.covariance import COVARIANCES
+from posefield_train.kriging import naive_kriging, universal_kriging, variogram
+from posefield_train.kriging.covariance_graph import COVARIANCES
 
 SAMPLES, FRAMES, JOINTS = 25, 6, 4
 
@@ -32,7 +32,7 @@ def values(positions, rng):
 
 @pytest.fixture(params=COVARIANCES)
 def own(request, points, positions, values):
-    return naive.fit(points, positions, values, request.param, variogram.fit)
+    return naive_kriging.fit(points, positions, values, request.param, variogram.fit)
 
 
 @pytest.mark.parametrize("form", ["onnx", "onnx_dual"])
@@ -53,13 +53,13 @@ def test_frames_are_kriged_each_on_its_own(own, values, rng):
     asked = rng.uniform(-1.0, 1.0, size=(9, 3))
     found = own.numpy(asked)
     for frame, field in enumerate(own.fields):
-        alone = kriging.solve(field.hyper, field.samples, values[:, frame])
+        alone = universal_kriging.solve(field.hyper, field.samples, values[:, frame])
         assert np.max(np.abs(found[:, frame] - alone.predict(asked))) < 1e-8
     assert len({(field.hyper.scales[0], field.hyper.nugget) for field in own.fields}) > 1
 
 
 def test_frame_is_what_scipy_interpolates(points, positions, values, rng):
-    own = naive.fit(points, positions, values, "gaussian", variogram.fit)
+    own = naive_kriging.fit(points, positions, values, "gaussian", variogram.fit)
     asked = rng.uniform(-1.0, 1.0, size=(9, 3))
     found = own.numpy(asked)
     for frame, field in enumerate(own.fields):
@@ -74,7 +74,7 @@ def test_frame_is_what_scipy_interpolates(points, positions, values, rng):
 
 
 def test_nugget_and_range_are_those_of_each_frames_variogram(points, positions, values):
-    own = naive.fit(points, positions, values, "matern52", variogram.fit)
+    own = naive_kriging.fit(points, positions, values, "matern52", variogram.fit)
     for frame, field in enumerate(own.fields):
         left = variogram.residuals(points, positions[:, frame].reshape(SAMPLES, -1), 1)
         fit = variogram.fit(variogram.experimental(points, left), "matern52")
@@ -83,8 +83,8 @@ def test_nugget_and_range_are_those_of_each_frames_variogram(points, positions, 
 
 
 def test_fitter_is_the_one_that_is_given(points, positions, values):
-    by_grid = naive.fit(points, positions, values, "gaussian", variogram.fit)
-    by_search = naive.fit(points, positions, values, "gaussian", variogram.fit_by_search)
+    by_grid = naive_kriging.fit(points, positions, values, "gaussian", variogram.fit)
+    by_search = naive_kriging.fit(points, positions, values, "gaussian", variogram.fit_by_search)
     gaps = [
         abs(np.log(a.hyper.scales[0] / b.hyper.scales[0]))
         for a, b in zip(by_grid.fields, by_search.fields, strict=True)

@@ -6,10 +6,13 @@ import newcomers
 import numpy as np
 import pytest
 
-from model_export import bvh, export, ingest, new_clips, reopen, train
-from model_export.recipe import Source
-from service.motion.errors import RecipeError
-from service.motion.measure import Measure
+from posefield.common.errors import RecipeError
+from posefield.motion.measures import Measure
+from posefield_train import train
+from posefield_train.adapt import model_reconstruction, new_clips
+from posefield_train.graph import onnx_export
+from posefield_train.source import bvh, ingest
+from posefield_train.source.recipe import Source
 
 METRES = Source(metres_per_unit=1.0, up="y")
 
@@ -19,7 +22,9 @@ def reopened(tmp_path_factory):
     folder = newcomers.write(tmp_path_factory.mktemp("family") / "small")
     recipe = newcomers.recipe()
     trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
-    return reopen.reopen(export.export(recipe, trained, []).content, "small.onnx")
+    return model_reconstruction.reopen(
+        onnx_export.export(recipe, trained, []).content, "small.onnx"
+    )
 
 
 @pytest.fixture

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from minimal import SKELETON, recipe_with
 
-from model_export import align, ingest, phase
-from model_export.ingest import Example
-from model_export.table import Row
-from service.motion import quat
-from service.motion.clip import assemble
-from service.motion.conventions import UP
-from service.motion.errors import RecipeError
+from posefield.common.errors import RecipeError
+from posefield.common.units import UP
+from posefield.motion import quat
+from posefield.motion.clip import assemble
+from posefield_train.align import phase_alignment, time_alignment
+from posefield_train.source import ingest
+from posefield_train.source.clip_table import Row
+from posefield_train.source.ingest import Example
 
 CLIPS, FRAMES = 9, 100
 # A shift is whole frames: the rest is half a frame of so many.
@@ -43,7 +44,7 @@ def cuts(rng):
 
 
 def begun(examples, recipe=IN_PHASE):
-    return phase.in_phase(recipe, tuple(examples), np.ones(5))
+    return phase_alignment.in_phase(recipe, tuple(examples), np.ones(5))
 
 
 def around(example):
@@ -52,7 +53,9 @@ def around(example):
 
 def disagreement(examples):
     """Largest distance between joints of the clips at one share of their cycles, m."""
-    return np.ptp([align.trace(example.clip, np.ones(5)) for example in examples], axis=0).max()
+    return np.ptp(
+        [time_alignment.trace(example.clip, np.ones(5)) for example in examples], axis=0
+    ).max()
 
 
 def test_cycles_cut_anywhere_begin_at_one_moment(cuts):
@@ -85,7 +88,7 @@ def test_half_a_cycle_away_is_found_too(cuts):
 @pytest.mark.parametrize("frames", [1, 30, 99, -20])
 def test_what_is_cut_off_goes_on_at_the_other_end(frames):
     """As if the walker had walked on and the cycle had been cut later."""
-    found = phase.begin(cycle(0.0), frames / FRAMES)
+    found = phase_alignment.begin(cycle(0.0), frames / FRAMES)
     # The cycle's own end is where the next begins: the same arc cut elsewhere.
     later = cycle(frames / FRAMES)
     assert np.abs(around(found) - rotated(later, found)).max() < ROUNDING
@@ -103,7 +106,7 @@ def rotated(example, like):
 def test_the_line_of_the_heading_goes_on():
     """A pelvis swings: fitted anew, the line would depend on where in the swing it begins."""
     whole = cycle(0.0)
-    quarter = phase.begin(whole, 0.25)
+    quarter = phase_alignment.begin(whole, 0.25)
     expected = ingest.heading(whole.clip)[25] - 0.25 * 0.3
     assert ingest.heading(quarter.clip)[0] == pytest.approx(expected, abs=1e-6)
     fitted = ingest.heading(ingest.set_out(quarter.clip))[0]
@@ -112,12 +115,12 @@ def test_the_line_of_the_heading_goes_on():
 
 def test_a_whole_cycle_later_is_the_same_clip():
     whole = cycle(0.0)
-    assert phase.begin(whole, 1.0) is whole
-    assert phase.begin(whole, 0.3 * HALF_A_FRAME) is whole
+    assert phase_alignment.begin(whole, 1.0) is whole
+    assert phase_alignment.begin(whole, 0.3 * HALF_A_FRAME) is whole
 
 
 def test_landmarks_move_with_the_cycle():
-    found = phase.begin(cycle(0.0, landmarks=(0.2, 0.9)), 0.1)
+    found = phase_alignment.begin(cycle(0.0, landmarks=(0.2, 0.9)), 0.1)
     assert found.landmarks == pytest.approx((0.1, 0.8))
     assert found.shift == pytest.approx(0.1)
 
@@ -137,25 +140,25 @@ def test_a_landmark_that_would_pass_the_cut_is_refused():
 def test_the_frames_say_where_a_cycle_begins_unless_the_recipe_says_else(cuts, begin):
     own = recipe_with(motion={"cyclic": True}, alignment={"begin": begin} if begin else {})
     family = tuple(cycle(cut) for cut in cuts)
-    assert phase.in_phase(own, family, np.ones(5)) is family
+    assert phase_alignment.in_phase(own, family, np.ones(5)) is family
 
 
 def test_what_is_no_cycle_has_a_beginning(cuts):
     family = tuple(cycle(cut) for cut in cuts)
     open_ended = recipe_with(alignment={"begin": "in_phase"})
-    assert phase.in_phase(open_ended, family, np.ones(5)) is family
+    assert phase_alignment.in_phase(open_ended, family, np.ones(5)) is family
 
 
 def test_in_place_stays_in_place():
     walker = cycle(0.0)
     standing = replace(walker, clip=ingest.stay(walker.clip))
-    kept = phase.begin(standing, 0.3, in_place=True).clip.root_path
+    kept = phase_alignment.begin(standing, 0.3, in_place=True).clip.root_path
     assert np.abs((kept[-1] - kept[0]) * (1.0 - UP)).max() < ROUNDING
 
 
 def test_large_shifts_are_noted():
-    found = [phase.begin(cycle(0.0), share) for share in (0.05, 0.2, -0.1)]
-    assert phase.notes(found) == [
+    found = [phase_alignment.begin(cycle(0.0), share) for share in (0.05, 0.2, -0.1)]
+    assert phase_alignment.notes(found) == [
         "line 2, x.bvh: begun 20% of its cycle later than it was cut",
         "line 2, x.bvh: begun 10% of its cycle earlier than it was cut",
     ]

@@ -5,9 +5,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from model_export import hosvd, ranks
-from model_export.cost import Price
-from service.motion.errors import TrainingError
+from posefield.common.errors import TrainingError
+from posefield_train.graph import ranks
+from posefield_train.graph.truncation_cost import Price
+from posefield_train.tensor import hosvd
 
 PER_RANK = (13, 5, 9)
 PRICES = [PER_RANK, (40, 1, 1), (1, 40, 1), (1, 1, 40)]

@@ -9,11 +9,11 @@ import jsonschema
 import pytest
 from minimal import TOML
 
-from model_export import controls, recipe
-from model_export.covariance import COVARIANCES
-from service.motion.errors import RecipeError
+from posefield.common.errors import RecipeError
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.source import control_sources, recipe
 
-RECIPES = Path(recipe.__file__).parent / "recipes"
+RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 SHIPPED = ("hdm05_grab_high", "hdm05_deposit_floor", "cmu_walk")
 MINIMAL = TOML.replace("metres_per_unit = 1.0", "metres_per_unit = 0.01")
 SECOND = """[[controls]]
@@ -264,7 +264,7 @@ def test_an_event_may_be_at_a_landmark(read):
 
 
 def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):
-    for name in controls.RESERVED:
+    for name in control_sources.RESERVED:
         with pytest.raises(RecipeError, match=f"controls.0.name.*'{name}'"):
             read(MINIMAL.replace('"speed"', f'"{name}"'))
     assert read(MINIMAL.replace('"speed"', '"pace"')).controls[0].name == "pace"

@@ -8,9 +8,10 @@ import onnx
 import pytest
 from model_files import written
 
-from model_export import canonical, kriging, reopen
-from model_export.field_bank import Constant
-from service.motion.errors import ModelError
+from posefield.common.errors import ModelError
+from posefield_train.adapt import canonical_clips, model_reconstruction
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.kriging_bank import Constant
 
 # What float32 may cost, m.
 SAME = 1e-5
@@ -23,7 +24,7 @@ def content(labelled_path):
 
 @pytest.fixture(scope="module")
 def reopened(content):
-    return reopen.reopen(content, "labelled.onnx")
+    return model_reconstruction.reopen(content, "labelled.onnx")
 
 
 def asked(model, count=200):
@@ -54,7 +55,7 @@ def test_a_reopened_model_answers_as_the_trained_one(labelled_exported, reopened
     bank, reduced = own.model.bank, own.model.decoder.reduced
     values = reduced.bases[2].copy()
     values[3] += 0.01 * np.ptp(values, axis=0)
-    pose = kriging.solve(bank.pose.hyper, bank.pose.samples, values)
+    pose = universal_kriging.solve(bank.pose.hyper, bank.pose.samples, values)
     other = replace(own.model, bank=replace(bank, pose=pose))
     assert farthest(trained, other, parents) > 10 * SAME
 
@@ -80,7 +81,7 @@ def wrong_nuggets(reopened, fields):
     for name in fields:
         field = bank.others[name]
         hyper = replace(field.hyper, nugget=fields[name][0])
-        found[name] = kriging.values(hyper, field.samples, field.dual)
+        found[name] = universal_kriging.values(hyper, field.samples, field.dual)
     return found
 
 
@@ -98,7 +99,7 @@ def test_the_motions_of_the_samples_come_back_in_the_cards_order(labelled, reope
 
 
 def test_what_is_known_is_what_training_knows(labelled_recipe, labelled, reopened):
-    expected, found = canonical.known(labelled_recipe, labelled), reopened.known
+    expected, found = canonical_clips.known(labelled_recipe, labelled), reopened.known
     assert np.array_equal(found.joint_weights, expected.joint_weights)
     assert np.array_equal(found.groups, expected.groups)
     assert found.truncation == pytest.approx(expected.truncation, rel=1e-3)
@@ -121,7 +122,7 @@ def test_a_field_whose_making_is_missing_is_named(content):
         entries["posefield.making"] = entries["posefield.making"].replace("warp", "woof")
 
     with pytest.raises(ModelError, match="does not say what its field 'warp' is made with"):
-        reopen.reopen(rewritten(content, change), "odd.onnx")
+        model_reconstruction.reopen(rewritten(content, change), "odd.onnx")
 
 
 def test_a_card_of_another_graph_is_refused(content):
@@ -134,4 +135,4 @@ def test_a_card_of_another_graph_is_refused(content):
         entries["posefield.examples"] = json.dumps(examples)
 
     with pytest.raises(ModelError, match="lists other samples than its graph holds"):
-        reopen.reopen(rewritten(content, change), "odd.onnx")
+        model_reconstruction.reopen(rewritten(content, change), "odd.onnx")

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from minimal import recipe_with, small_clip, write_clips
 
-from model_export import export, ingest, train
-from model_export.report import levels_of_detail, training_report
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.report import levels_of_detail, training_report
+from posefield_train.source import ingest
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
@@ -16,7 +18,7 @@ def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path, cyclic
     recipe = recipe_with(motion={"cyclic": cyclic})
     examples, notes = ingest.ingest(recipe, write_clips(tmp_path, clips))
     trained = train.train(recipe, examples, lambda _: None)
-    exported = export.export(recipe, trained, notes)
+    exported = onnx_export.export(recipe, trained, notes)
     others = levels_of_detail.alternatives(recipe, trained, exported.card)
     levels = levels_of_detail.of(exported, others)
     facts = json.loads(training_report.render(trained, exported, levels, []).json)

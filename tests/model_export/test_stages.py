@@ -7,17 +7,18 @@ import pytest
 from numpy.random import PCG64, Generator
 from running import outputs
 
-from model_export import field_graph, hosvd, kriging, thin
-from model_export.covariance import COVARIANCES
-from model_export.decoder import MOTIONS, Decoder, Proportions, Rung
-from model_export.field_bank import VARIANCE, Constant, FieldBank
-from model_export.hosvd import Multilinear
-from model_export.kriging import Hyper
-from model_export.ladder import Ladder
-from model_export.timing import Timing
-from model_export.travel import Travel
-from model_export.warp import WarpBasis
-from service.motion import quat
+from posefield.motion import quat
+from posefield_train.align.canonical_timing import Timing
+from posefield_train.align.travel import Travel
+from posefield_train.align.warp import WarpBasis
+from posefield_train.kriging import kriging_graph, thinning, universal_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_bank import VARIANCE, Constant, FieldBank
+from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.tensor import hosvd
+from posefield_train.tensor.decoder import MOTIONS, Decoder, Proportions, Rung
+from posefield_train.tensor.hosvd import Multilinear
 
 SAMPLES, CONTROLS, BATCH, STEPS = 25, 3, 40, 11
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
@@ -55,7 +56,7 @@ def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
         if name == "offsets" and offsets is not None:
             hyper = replace(hyper, drifts=offsets)
         values = own.normal(size=(SAMPLES, size))
-        solved = kriging.solve(hyper, samples, values)
+        solved = universal_kriging.solve(hyper, samples, values)
         fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
     pose = fields.pop("pose")
     return FieldBank(LOW, HIGH, (), pose, fields, 0.04)
@@ -79,8 +80,8 @@ def graph_of(own, ranks):
     """Function that builds the fields of a bank, the pose last, and sigma behind it."""
 
     def build(net, controls):
-        ends = Ladder(field_graph.entries(own, ranks)).onnx(net)
-        return tuple(field_graph.onnx(own, net, controls, ends).values())
+        ends = Ladder(kriging_graph.entries(own, ranks)).onnx(net)
+        return tuple(kriging_graph.onnx(own, net, controls, ends).values())
 
     return build
 
@@ -102,8 +103,8 @@ LEVELS = ((5, 4), (SAMPLES, 3), (3 * SAMPLES, 3), (4 * SAMPLES, 6))
 
 def coarse_bank():
     """A bank of coarser levels that ask some samples, all of them, and further fields."""
-    own = thin.ordered(bank())
-    lesson = thin.lesson(own)
+    own = thinning.ordered(bank())
+    lesson = thinning.lesson(own)
     weights = tuple(lesson.weights(columns, rank, 0.1) for columns, rank in LEVELS)
     return replace(own, coarse=weights)
 
@@ -390,7 +391,7 @@ def test_between_frames_the_root_goes_straight():
 def test_at_full_ranks_and_without_nugget_the_clips_come_back_at_their_controls(trained):
     points = trained.model.bank.pose.samples
     hyper = replace(trained.pose.hyper, nugget=0.0)
-    exact = kriging.solve(hyper, points, trained.full.bases[2])
+    exact = universal_kriging.solve(hyper, points, trained.full.bases[2])
     own = trained.tensor
     whole = Decoder(trained.full, own.mean, own.unwhiten, own.chart.means)
     numbers = own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T
@@ -403,6 +404,6 @@ def test_at_full_ranks_and_without_nugget_the_clips_come_back_at_their_controls(
         return max(np.max(np.abs(turns)), np.max(np.abs(found[1] - root)))
 
     assert away(whole, exact.predict(points)) < 1e-6
-    smoothed = kriging.solve(trained.pose.hyper, points, trained.full.bases[2])
+    smoothed = universal_kriging.solve(trained.pose.hyper, points, trained.full.bases[2])
     assert away(whole, smoothed.predict(points)) > 1e-3
     assert away(trained.model.decoder, trained.model.decoder.reduced.bases[2]) > 1e-3

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import disguise, export, strangers, train
-from model_export.ingest import place
-from service.motion import quat
+from posefield.motion import quat
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.outliers import mirrored_clips
+from posefield_train.source.ingest import place
 
 # A clip from the middle of the family, and one of another performer far from it.
 PLANTED, OTHER = 15, 40
@@ -25,7 +27,7 @@ def reversed_axis(clip):
 
 
 def exchanged(clip):
-    other = list(disguise.others(clip.skeleton.names))
+    other = list(mirrored_clips.others(clip.skeleton.names))
     return replace(
         clip, rotations=clip.rotations[:, other], translations=clip.translations[:, other]
     )
@@ -86,7 +88,7 @@ def planted(recipe, examples, clip):
 
 
 def only_note(trained, example):
-    (note,) = strangers.notes(trained)
+    (note,) = trained.outlier_notes()
     name = f"line {example.row.line}, {example.row.place.name}: "
     assert note.startswith(name)
     return note.removeprefix(name)
@@ -107,7 +109,7 @@ def test_a_stranger_is_named_with_the_right_evidence(small_recipe, examples, pla
     kinds, said = PLANTS[plant]
     trained = planted(small_recipe, examples, plant(examples[PLANTED].clip))
     note = only_note(trained, examples[PLANTED])
-    assert {one.kind for one in trained.strangers} == kinds
+    assert {one.kind for one in trained.outliers} == kinds
     for part in said:
         assert part in note
 
@@ -122,22 +124,22 @@ def test_a_clip_of_another_performer_is_named_with_whose_it_is(small_recipe, exa
 
 
 def test_a_clean_family_has_no_strangers(trained):
-    assert trained.strangers == ()
-    assert strangers.notes(trained) == []
+    assert trained.outliers == ()
+    assert trained.outlier_notes() == []
 
 
 def test_strangers_stand_on_the_card_and_train_on(small_recipe, examples):
     trained = planted(small_recipe, examples, kicking(examples[PLANTED].clip))
     assert len(trained.examples) == len(examples)
-    notes = export.export(small_recipe, trained, ["said before"]).card.diagnostics["notes"]
+    notes = onnx_export.export(small_recipe, trained, ["said before"]).card.diagnostics["notes"]
     assert notes[0] == "said before"
-    assert notes[1] == strangers.notes(trained)[0]
+    assert notes[1] == trained.outlier_notes()[0]
 
 
 def test_two_strangers_are_told_apart_from_those_whom_they_mislead(small_recipe, examples):
     own = list(examples)
     for index, plant in ((PLANTED, kicking), (PLANTED + 2, mirrored)):
         own[index] = replace(own[index], clip=plant(own[index].clip))
-    notes = strangers.notes(train.train(small_recipe, own, lambda _: None))
+    notes = train.train(small_recipe, own, lambda _: None).outlier_notes()
     lines = {f"line {examples[i].row.line}" for i in (PLANTED, PLANTED + 2)}
     assert {note.partition(",")[0] for note in notes} == lines

@@ -12,7 +12,7 @@ from minimal import TOML, small_clip, write_clips
 
 pytestmark = pytest.mark.system
 
-MAIN = "from service.cli import main; main()"
+MAIN = "from posefield.cli import main; main()"
 FRAMES = (12, 16, 20)
 
 

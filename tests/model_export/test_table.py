@@ -5,8 +5,8 @@ import codecs
 import pytest
 from minimal import recipe_with
 
-from model_export import table
-from service.motion.errors import RecipeError
+from posefield.common.errors import RecipeError
+from posefield_train.source import clip_table
 
 FRAMES = {"first_frame": "from", "last_frame": "to"}
 
@@ -20,7 +20,7 @@ def rows(tmp_path):
     def of(text, **clips):
         content = text if isinstance(text, bytes) else text.encode()
         (tmp_path / "clips.csv").write_bytes(content)
-        return table.read(recipe_with(clips=clips), tmp_path)
+        return clip_table.read(recipe_with(clips=clips), tmp_path)
 
     return of
 
@@ -61,7 +61,7 @@ def test_motion_files_stand_beside_the_table(tmp_path):
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "a.bvh").touch()
     (tmp_path / "set" / "clips.csv").write_text("file,v\na.bvh,1\n")
-    (row,) = table.read(recipe_with(clips={"table": "set/clips.csv"}), tmp_path)
+    (row,) = clip_table.read(recipe_with(clips={"table": "set/clips.csv"}), tmp_path)
     assert row.place == tmp_path / "set" / "a.bvh"
 
 
@@ -213,10 +213,10 @@ def test_the_number_of_columns_is_bounded(refused):
 
 
 def test_the_size_of_a_table_is_bounded(refused):
-    fault = refused("file,v\n" + " " * table.MOST_BYTES)
+    fault = refused("file,v\n" + " " * clip_table.MOST_BYTES)
     assert fault.message == "found more than 16000 kB, expected a table of at most 16000 kB"
 
 
 def test_a_missing_table_is_refused(tmp_path):
     with pytest.raises(RecipeError, match=r"no file 'clips\.csv'"):
-        table.read(recipe_with(), tmp_path)
+        clip_table.read(recipe_with(), tmp_path)

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import align, chart, metric, tensor
-from model_export.align import Aligned
-from service.motion import quat, skeleton
+from posefield.motion import quat, skeleton
+from posefield_train.align import time_alignment
+from posefield_train.align.time_alignment import Aligned
+from posefield_train.tensor import motion_tensor, pose_metric, pose_vectors
 
 PARENTS = (-1, 0, 1, 2, 1)
 BONES = np.array([[0, 0, 0], [0, 0.5, 0], [0.3, 0, 0], [0.25, 0, 0], [0, 0.2, 0.05]])
@@ -38,8 +39,8 @@ def offsets(rng):
 
 
 def build(aligned, offsets):
-    numbers, own_chart, _ = tensor.pose_vectors(aligned, PARENTS, offsets)
-    return tensor.build(numbers, own_chart, PARENTS, offsets, WEIGHTS)
+    numbers, own_chart, _ = motion_tensor.pose_vectors(aligned, PARENTS, offsets)
+    return motion_tensor.build(numbers, own_chart, PARENTS, offsets, WEIGHTS)
 
 
 def skin(aligned, offsets):
@@ -47,7 +48,7 @@ def skin(aligned, offsets):
     translations = np.repeat(offsets[:, None], FRAMES, axis=1)
     translations[:, :, 0] = aligned.root_path
     positions, turns = skeleton.forward(PARENTS, aligned.rotations, translations)
-    axes = metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
+    axes = pose_metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
     return positions[..., None, :] + quat.rotate(turns[..., None, :], axes)
 
 
@@ -108,7 +109,7 @@ def test_order_of_clips_is_the_order_of_slices(small, offsets, rng):
     order = rng.permutation(CLIPS)
     # So few frames that the metric is an average over all poses, not over some of them.
     few = replace(small, rotations=small.rotations[:, ::6], root_path=small.root_path[:, ::6])
-    assert CLIPS * len(few.root_path[0]) <= metric.POSES
+    assert CLIPS * len(few.root_path[0]) <= pose_metric.POSES
     shuffled = replace(few, rotations=few.rotations[order], root_path=few.root_path[order])
     first, second = build(few, offsets), build(shuffled, offsets[order])
     assert np.max(np.abs(second.values - first.values[..., order])) < 1e-9
@@ -124,7 +125,7 @@ def test_facing_of_the_whole_family_changes_no_distance(small, offsets):
     near = between_pairs(first.values.transpose(2, 1, 0))
     gap = between_pairs(second.values.transpose(2, 1, 0)) / near - 1.0
     assert np.max(np.abs(gap)) < 1e-6
-    identity = chart.Chart(np.tile(quat.IDENTITY, (5, 1)))
+    identity = pose_vectors.Chart(np.tile(quat.IDENTITY, (5, 1)))
     plain = identity.numbers(small.rotations, small.root_path)
     turned = identity.numbers(rotations, away.root_path)
     assert np.max(np.abs(between_pairs(turned) / between_pairs(plain) - 1.0)) > 1e-2
@@ -135,7 +136,7 @@ def test_poses_of_the_tensor_are_the_aligned_poses(rng, offsets):
     wide = family(rng, 0.6)
     own = build(wide, offsets)
     rotations, root = own.chart.poses(own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T)
-    found = align.positions(
+    found = time_alignment.positions(
         Aligned(rotations, root, wide.logs, wide.durations, 0), PARENTS, offsets
     )
-    assert np.max(np.abs(found - align.positions(wide, PARENTS, offsets))) < 1e-9
+    assert np.max(np.abs(found - time_alignment.positions(wide, PARENTS, offsets))) < 1e-9

@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import ingest, train
-from model_export.evaluate import errors, methods, motion
-from model_export.evaluate.methods import Asked
-from model_export.sample import controls as ranges
-from model_export.sample import truth
-from service.motion import skeleton
-from service.motion.clip import assemble
-from service.motion.conventions import UP
-from service.motion.errors import TrainingError
+from posefield.common.errors import TrainingError
+from posefield.common.units import UP
+from posefield.motion import skeleton
+from posefield.motion.clip import assemble
+from posefield_train import train
+from posefield_train.evaluate import compared_motion, methods, motion_errors
+from posefield_train.evaluate.methods import Asked
+from posefield_train.sample import noise_free
+from posefield_train.sample import sample_controls as ranges
+from posefield_train.source import ingest
 
 # A reference in float64 at the samples themselves: the rounding of one solve, m.
 EXACT = 1e-6
@@ -156,7 +157,7 @@ def unseen(rng, count):
 def true_positions(point, elapsed, figure):
     """Joint positions (S, J, 3) of the noise-free motion in the frame of its first pose, m."""
     point = point.tolist()
-    rotations, path, offsets = truth.poses(point, truth.phases(point, elapsed))
+    rotations, path, offsets = noise_free.poses(point, noise_free.phases(point, elapsed))
     clip = assemble(figure, rotations, path, offsets, 1.0)
     first = clip.root_path[0] * (1.0 - UP)
     return ingest.place(clip, first, ingest.heading(clip)[0]).positions()
@@ -178,7 +179,7 @@ def test_between_the_samples_the_model_is_near_the_truth(trained, examples, rng)
     of_mean = rms(np.mean(seen, axis=0) - expected)
     assert error < 0.028
     assert error < of_mean / 9
-    seconds = np.array([truth.duration(point.tolist()) for point in points])
+    seconds = np.array([noise_free.duration(point.tolist()) for point in points])
     late = np.abs(np.log(durations / seconds))
     of_mean_late = np.abs(np.log(seconds / seconds.mean()))
     # One trial in itself is 4 % early or late, and so is the model.
@@ -207,12 +208,14 @@ def test_clips_aligned_to_what_others_predict_make_the_better_model(
     other = train.train(small_recipe.model_copy(update={"alignment": to_mean}), examples, quiet)
     figure = examples[0].clip.skeleton
     points = unseen(rng, 40)
-    captured = [motion.of_clip(truth.clip(point.tolist(), 120.0), None) for point in points]
+    captured = [
+        compared_motion.of_clip(noise_free.clip(point.tolist(), 120.0), None) for point in points
+    ]
 
     def error(made):
         found = methods.answers(small_recipe, made, Asked(points, [""] * 40)).motions["posefield"]
         pairs = zip(found, captured, strict=True)
-        return errors.mean([errors.compare(a, b, ()) for a, b in pairs]).relative.mean
+        return motion_errors.mean([motion_errors.compare(a, b, ()) for a, b in pairs]).relative.mean
 
     def jerked(made):
         offsets = np.stack([example.offsets for example in made.examples])

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from minimal import SKELETON, TOML, recipe_with, small_clip, write_clips
 
-from model_export import export, ingest, recipe, train
-from service.motion import quat
-from service.motion.clip import assemble
-from service.motion.errors import BvhError, RecipeError, TrainingError
+from posefield.common.errors import BvhError, RecipeError, TrainingError
+from posefield.motion import quat
+from posefield.motion.clip import assemble
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.source import ingest, recipe
 
 EIGHT = tuple(small_clip(0.1 * i, 21 + i % 3) for i in range(8))
 LABELLED = {"clips": {"performer": "who"}, "kriging": {"label": "performer"}}
@@ -28,7 +30,7 @@ def model(tmp_path):
         own = recipe_with(**sections)
         examples, notes = ingest.ingest(own, tmp_path)
         trained = train.train(own, examples, lambda _: None)
-        return trained, export.export(own, trained, notes)
+        return trained, onnx_export.export(own, trained, notes)
 
     return of
 

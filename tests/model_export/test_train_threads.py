@@ -9,7 +9,7 @@ import pytest
 
 pytestmark = pytest.mark.system
 
-RUN = "from service.cli import main; main()"
+RUN = "from posefield.cli import main; main()"
 SHORT = """\
 [clips.where]
 performer = { among = ["tall"] }

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from model_export import travel
-from model_export.align import Aligned
-from service.motion import quat
-from service.motion.conventions import UP
+from posefield.common.units import UP
+from posefield.motion import quat
+from posefield_train.align import travel
+from posefield_train.align.time_alignment import Aligned
 
 ROUNDING = 1e-12
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from model_export import kriging, tune, variogram
-from model_export.kriging import Hyper
-from model_export.samples import Samples
-from model_export.tune import LABELS, NUGGETS, SCALES
+from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
+from posefield_train.kriging.kriging_tuning import LABELS, NUGGETS, SCALES
+from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.universal_kriging import Hyper
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def wave(samples):
 
 def guess(samples, values, covariance="matern52"):
     experimental = variogram.of_residuals(samples, values, 1)
-    return tune.first_guess(experimental, samples.shape[1], covariance, (1,))
+    return kriging_tuning.first_guess(experimental, samples.shape[1], covariance, (1,))
 
 
 def alone(samples):
@@ -31,7 +31,7 @@ def alone(samples):
 
 
 def tuned_at(samples, values, nugget=None):
-    return tune.tune(guess(samples, values), alone(samples), values, nugget)
+    return kriging_tuning.tune(guess(samples, values), alone(samples), values, nugget)
 
 
 def left_out(hyper, samples, values):
@@ -39,7 +39,7 @@ def left_out(hyper, samples, values):
     total = 0.0
     for i in range(len(samples)):
         kept = np.arange(len(samples)) != i
-        field = kriging.solve(hyper, samples[kept], values[kept])
+        field = universal_kriging.solve(hyper, samples[kept], values[kept])
         total += np.sum((values[i] - field.predict(samples[i : i + 1])[0]) ** 2)
     return total
 
@@ -54,7 +54,7 @@ def test_first_guess_keeps_within_the_bounds(samples, rng):
 def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
     values = wave(samples) + 0.2 * rng.normal(size=(50, 2))
     hyper = Hyper("matern52", (1,), np.array([1.0, 0.5]), 0.1, 0.0)
-    found = tune.fixed(hyper, alone(samples), values)
+    found = kriging_tuning.fixed(hyper, alone(samples), values)
     mean_of_others = (values.sum(axis=0) - values) / 49
     share = left_out(hyper, samples, values) / np.sum((values - mean_of_others) ** 2)
     assert abs(found.unexplained - share) < 1e-9
@@ -66,9 +66,11 @@ def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
 def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     samples = rng.uniform(-1.0, 1.0, size=(400, 2))
     hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 0.0)
-    root = np.linalg.cholesky(kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400))
+    root = np.linalg.cholesky(
+        universal_kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400)
+    )
     values = np.sqrt(2.5) * root @ rng.normal(size=(400, 6))
-    found = tune.fixed(hyper, alone(samples), values)
+    found = kriging_tuning.fixed(hyper, alone(samples), values)
     # Summed over six values; 2400 squares scatter by three per cent.
     assert abs(found.sill / (6 * 2.5) - 1.0) < 0.1
     unscaled = np.mean(np.sum(np.square(found.residuals), axis=1))
@@ -83,8 +85,10 @@ def test_tuning_leaves_less_than_any_start(samples, rng):
     for scale in (0.2, 0.5, 1.2):
         for nugget in (0.02, 0.3, 2.0):
             start = Hyper("matern52", (1,), np.full(2, scale), nugget, 0.0)
-            assert best <= np.sum(np.square(tune.fixed(start, alone(samples), values).residuals))
-    assert best <= np.sum(np.square(tune.fixed(own, alone(samples), values).residuals))
+            assert best <= np.sum(
+                np.square(kriging_tuning.fixed(start, alone(samples), values).residuals)
+            )
+    assert best <= np.sum(np.square(kriging_tuning.fixed(own, alone(samples), values).residuals))
 
 
 def test_tuned_parameters_keep_within_the_bounds(samples, rng):
@@ -129,7 +133,7 @@ def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
 
 def test_values_that_never_change_count_as_unexplained(samples):
     hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 0.0)
-    assert tune.fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
+    assert kriging_tuning.fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
 
 
 PEOPLE, TAKES = 4, 20
@@ -154,25 +158,25 @@ def own_ways(samples, people, rng, apart):
 
 
 def tuned_for(samples, people, values, nugget=None):
-    return tune.tune(guess(samples, values), labelled(samples, people), values, nugget)
+    return kriging_tuning.tune(guess(samples, values), labelled(samples, people), values, nugget)
 
 
 def test_groups_are_left_out_together(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
     hyper = Hyper("matern52", (0, 1), np.array([1.0, 0.5]), 0.1, 0.8)
     laid = labelled(samples, people)
-    found = tune.fixed(hyper, laid, values)
+    found = kriging_tuning.fixed(hyper, laid, values)
     residuals, from_mean, variances = np.empty((50, 2)), np.empty((50, 2)), np.empty(50)
     for take in range(TAKES):
         own = people[1] == take
-        field = kriging.solve(hyper, laid.points[~own], values[~own])
+        field = universal_kriging.solve(hyper, laid.points[~own], values[~own])
         residuals[own] = values[own] - field.predict(laid.points[own])
         variances[own] = field.variance(laid.points[own]) + 0.1
         from_mean[own] = values[own] - values[~own].mean(axis=0)
     assert np.max(np.abs(found.residuals - residuals)) < 1e-9
     assert np.max(np.abs(found.variances - variances)) < 1e-9
     assert abs(found.unexplained - np.sum(residuals**2) / np.sum(from_mean**2)) < 1e-9
-    single = tune.fixed(hyper, Samples(laid.points, 2, np.arange(50)), values)
+    single = kriging_tuning.fixed(hyper, Samples(laid.points, 2, np.arange(50)), values)
     assert np.max(np.abs(single.residuals - residuals)) > 1e-2
     assert abs(single.unexplained - found.unexplained) > 1e-3
 
@@ -182,7 +186,9 @@ def test_performers_who_move_differently_are_told_apart(samples, people, rng):
     apart = tuned_for(samples, people, values)
     # What counts is the label beside the nugget: this one is far above what alike ones get.
     assert apart.hyper.label > 4.0 * LABELS[0]
-    blind = tune.tune(guess(samples, values), Samples(samples, 2, people[1]), values, None)
+    blind = kriging_tuning.tune(
+        guess(samples, values), Samples(samples, 2, people[1]), values, None
+    )
     assert apart.unexplained < 0.5 * blind.unexplained
 
 
@@ -205,7 +211,7 @@ def test_tuning_with_labels_leaves_less_than_any_start(samples, people, rng):
     for scale in (0.2, 1.2):
         for label in (0.5, 2.0):
             start = Hyper("matern52", (1,), np.full(2, scale), 0.02, label)
-            found = tune.fixed(start, labelled(samples, people), values).residuals
+            found = kriging_tuning.fixed(start, labelled(samples, people), values).residuals
             assert best <= np.sum(np.square(found))
 
 

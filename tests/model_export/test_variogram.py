@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from model_export import hosvd, variogram
-from model_export.covariance import COVARIANCES
-from model_export.variogram import CACHED, FAR, FEWEST_PAIRS, LAGS, RANGES, Experimental
+from posefield_train.kriging import variogram
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.variogram import CACHED, FAR, FEWEST_PAIRS, LAGS, RANGES, Experimental
+from posefield_train.tensor import hosvd
 
 TOLERANCE = 1e-9
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.interpolate import PchipInterpolator
 
-from model_export.warp import DENSE, FLOOR, WarpBasis
+from posefield_train.align.warp import DENSE, FLOOR, WarpBasis
 
 TOLERANCE = 1e-12
 EVEN = np.ones(len(DENSE))

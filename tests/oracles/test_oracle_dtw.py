@@ -7,7 +7,7 @@ best path is the diagonal, and elsewhere dtaidistance's is a lower bound.
 import numpy as np
 from dtaidistance import dtw_ndim
 
-from model_export import dtw
+from posefield_train.align import dtw
 
 TOLERANCE = 1e-9
 

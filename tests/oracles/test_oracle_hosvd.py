@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pyttb
 
-from model_export import hosvd
+from posefield_train.tensor import hosvd
 
 TOLERANCE = 1e-9
 SHAPES = [(5, 4, 3), (6, 8, 7), (4, 3, 5, 2)]

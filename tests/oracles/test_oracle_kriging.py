@@ -6,9 +6,9 @@ import pytest
 from gstools.krige import Universal
 from scipy.interpolate import RBFInterpolator
 
-from model_export import covariance, kriging
-from model_export.kriging import Hyper
-from service.motion.covariance import RATE52
+from posefield.kriging.covariance import RATE52
+from posefield_train.kriging import covariance_graph, universal_kriging
+from posefield_train.kriging.universal_kriging import Hyper
 
 TOLERANCE = 1e-9
 NUGGET = 0.05
@@ -33,7 +33,9 @@ def points(rng):
 @pytest.mark.parametrize("degree", [0, 1])
 def test_gaussian_field_is_scipys(samples, values, points, degree, nugget):
     scales = np.array([0.8, 1.1, 0.9, 1.4])
-    own = kriging.solve(Hyper("gaussian", (degree,), scales, nugget, 0.0), samples, values)
+    own = universal_kriging.solve(
+        Hyper("gaussian", (degree,), scales, nugget, 0.0), samples, values
+    )
     found = own.predict(points)
 
     def theirs(factor=3.0, smoothing=nugget, other=degree):
@@ -54,7 +56,7 @@ MODELS = {
     "exponential": (gstools.Exponential, {}, 1.0 / 3.0),
     "gaussian": (gstools.Gaussian, {}, 1.0 / np.sqrt(3.0)),
     "spherical": (gstools.Spherical, {}, 1.0),
-    "matern32": (gstools.Matern, {"nu": 1.5}, np.sqrt(1.5) / covariance.RATE32),
+    "matern32": (gstools.Matern, {"nu": 1.5}, np.sqrt(1.5) / covariance_graph.RATE32),
     "matern52": (gstools.Matern, {"nu": 2.5}, np.sqrt(2.5) / RATE52),
 }
 
@@ -75,7 +77,7 @@ def test_value_and_variance_are_those_of_gstools(name, samples, values, points):
         # It is no covariance in four dimensions, and GSTools says so.
         samples, points = samples[:, :3], points[:, :3]
     scales = np.full(samples.shape[1], 1.0 / 1.6)
-    own = kriging.solve(Hyper(name, (1,), scales, NUGGET, 0.0), samples, values)
+    own = universal_kriging.solve(Hyper(name, (1,), scales, NUGGET, 0.0), samples, values)
     found, variance = own.predict(points), own.variance(points)
     for component in (0, 3):
         value, error = theirs(name, 1.6, samples, values[:, component], points)
@@ -92,7 +94,7 @@ def test_value_and_variance_are_those_of_gstools(name, samples, values, points):
 @pytest.mark.parametrize("nugget", [0.0, NUGGET])
 def test_two_drifts_are_the_mean_of_scipys_two_degrees(samples, values, points, nugget):
     scales = np.array([0.8, 1.1, 0.9, 1.4])
-    found = kriging.solve(Hyper("gaussian", (0, 1), scales, nugget, 0.0), samples, values)
+    found = universal_kriging.solve(Hyper("gaussian", (0, 1), scales, nugget, 0.0), samples, values)
     given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": nugget}
     both = [
         RBFInterpolator(samples * scales, values, degree=degree, **given)(points * scales)
@@ -107,7 +109,7 @@ def test_groups_left_out_are_what_scipy_predicts_from_the_rest(samples, values, 
     scales = np.array([0.8, 1.1, 0.9, 1.4])
     groups = np.repeat(np.arange(10), 4)
     hyper = Hyper("gaussian", drifts, scales, NUGGET, 0.0)
-    found = kriging.leave_out(hyper, samples, groups) @ values
+    found = universal_kriging.leave_out(hyper, samples, groups) @ values
     given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": NUGGET}
     for group in range(10):
         own = groups == group
@@ -118,5 +120,5 @@ def test_groups_left_out_are_what_scipy_predicts_from_the_rest(samples, values, 
             for degree in drifts
         ]
         assert np.max(np.abs(found[own] - values[own] + np.mean(predicted, axis=0))) < TOLERANCE
-    alone = kriging.leave_out(hyper, samples, np.arange(40)) @ values
+    alone = universal_kriging.leave_out(hyper, samples, np.arange(40)) @ values
     assert np.max(np.abs(found - alone)) > 1e-2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from service.motion import quat
+from posefield.motion import quat
 
 TOLERANCE = 1e-12
 ORDERS = ["".join(order) for order in permutations("XYZ")]

@@ -11,10 +11,10 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-import service
-from service import cli
+import posefield
+from posefield import cli
 
-DEPLOY = Path(service.__file__).parent / "deploy"
+DEPLOY = Path(posefield.__file__).parent / "deploy"
 BIN = Path(sys.executable).parent
 KUBERNETES = "1.37"
 ROWS, CHUNK, PARTS = 24, 5, 3

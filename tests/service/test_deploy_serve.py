@@ -8,14 +8,15 @@ import kubernetes_validate
 import pytest
 import yaml
 
-import service
-from service.motion.errors import InvalidField
-from service.web import contract, request_head, settings
-from service.web.access import keys, policy
-from service.web.problems import RequestFault
-from service.web.settings import PREFIX, Settings
+import posefield
+from posefield.common.errors import InvalidField
+from posefield.http.access import access_policy, api_keys
+from posefield.http.api import contract, settings
+from posefield.http.api.problems import RequestFault
+from posefield.http.api.settings import PREFIX, Settings
+from posefield.http.middleware import request_head
 
-DEPLOY = Path(service.__file__).parent / "deploy"
+DEPLOY = Path(posefield.__file__).parent / "deploy"
 ROOT = Path(__file__).parents[2]
 KUBERNETES = "1.37"
 KINDS = (
@@ -154,17 +155,17 @@ def test_a_pod_that_goes_has_the_time_it_needs(pod, container):
 def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path):
     """As the service itself checks them before it listens; the address is the image's."""
     mounted = tmp_path / "keys"
-    mounted.write_text(keys.line("blender", ["read:*"], keys.make()) + "\n")
+    mounted.write_text(api_keys.line("blender", ["read:*"], api_keys.make()) + "\n")
     given = environment(container) | {"POSEFIELD_HOST": "0.0.0.0"}
     assert given["POSEFIELD_KEYS_FILE"] == "/keys/keys"
     given["POSEFIELD_KEYS_FILE"] = str(mounted)
     own = settings.read(environ=given)
-    policy.check_exposure(own, policy.of(own))
+    access_policy.check_exposure(own, access_policy.of(own))
     # Negative control.
     del given["POSEFIELD_KEYS_FILE"]
     open_to_all = settings.read(environ=given)
     with pytest.raises(InvalidField, match="POSEFIELD_KEYS_FILE"):
-        policy.check_exposure(open_to_all, policy.of(open_to_all))
+        access_policy.check_exposure(open_to_all, access_policy.of(open_to_all))
 
 
 @pytest.mark.parametrize(
@@ -213,6 +214,6 @@ def test_nobody_is_let_in_or_out_unasked(objects):
 
 
 def test_the_image_is_of_this_version(pod, container):
-    assert container["image"] == f"posefield:{service.__version__}"
-    assert pod["metadata"]["labels"]["app.kubernetes.io/version"] == service.__version__
+    assert container["image"] == f"posefield:{posefield.__version__}"
+    assert pod["metadata"]["labels"]["app.kubernetes.io/version"] == posefield.__version__
     assert container["resources"]["requests"].keys() == {"cpu", "memory"}

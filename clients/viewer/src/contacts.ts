@@ -1,6 +1,6 @@
 /** Feet on the ground: when and where, and how fast they slide there.
  *
- * As the service reckons it (service/motion/ground.py), of the clip that is shown: each foot's lowest
+ * As the service reckons it (service/posefield/motion/foot_skate.py), of the clip that is shown: each foot's lowest
  * is that of this clip, at its frames.
  */
 

@@ -108,7 +108,7 @@ type Ask = (
 
 type Journeys = Pick<Library, "seconds" | "speeds" | "drifts" | "turning">;
 
-/** How far clips lead: an arc, gone evenly (service/synthesis/walk/stride.py says the same). */
+/** How far clips lead: an arc, gone evenly (service/posefield/locomotion/stride.py says the same). */
 async function journeys(rows: readonly Row[], ask: Ask): Promise<Journeys> {
   const start = await ask(rows, { time: 0 });
   const end = await ask(rows, { time: [...start.duration] });

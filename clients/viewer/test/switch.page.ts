@@ -109,7 +109,7 @@ async function people(page: Page, count: string): Promise<void> {
   await until(async () => (await counted()) === Number(count), `there are ${count}`);
 }
 
-/** By service/motion/ground.py, as the page writes it. */
+/** By service/posefield/motion/foot_skate.py, as the page writes it. */
 function sliding(card: ModelCard, clip: Motion): string {
   const { parents } = card.skeleton;
   const at = placed(parents.length);
@@ -118,7 +118,7 @@ function sliding(card: ModelCard, clip: Motion): string {
     return card.feet.map((joint) => [...at.positions.slice(3 * joint, 3 * joint + 3)]);
   });
   const code =
-    "import json, sys, numpy; from service.motion.ground import skate; " +
+    "import json, sys, numpy; from posefield.motion.foot_skate import skate; " +
     "print(f'{100 * skate(numpy.array(json.load(sys.stdin)), 60):.1f} cm/s', end='')";
   return execFileSync(PYTHON, ["-c", code], { cwd: ROOT, input: JSON.stringify(feet) }).toString();
 }

@@ -8,7 +8,7 @@ import pytest
 from misbehaving import Scripted
 
 ROOT = Path(__file__).parents[3]
-ADDON = ROOT / "clients/blender/posefield"
+ADDON = ROOT / "clients/blender/addon"
 sys.path[:0] = [str(ADDON), str(ADDON.parent)]
 
 

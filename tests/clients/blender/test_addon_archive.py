@@ -11,7 +11,7 @@ import archive
 import pytest
 
 ROOT = Path(__file__).parents[3]
-ADDON = ROOT / "clients/blender/posefield"
+ADDON = ROOT / "clients/blender/addon"
 STANDARD = sys.stdlib_module_names | {"numpy"}
 
 

@@ -4,7 +4,7 @@ import gzip
 
 import pytest
 
-from service.web.pages import standalone
+from posefield.http.pages import static_page
 
 TOOLS = "../node_modules/.bin"
 # Bytes that the page may weigh as it travels.
@@ -31,11 +31,11 @@ def test_its_form_is_right(assert_runs):
 
 
 def test_the_built_page_is_small():
-    content = standalone.DOCS.read_bytes()
+    content = static_page.DOCS.read_bytes()
     assert len(gzip.compress(content, 6)) < BUDGET < len(content)
 
 
 def test_the_licences_go_with_the_page():
-    text = standalone.DOCS.with_name("LICENSES.txt").read_text()
+    text = static_page.DOCS.with_name("LICENSES.txt").read_text()
     for part in ("SmartBear", "Apache License", "DOMPurify"):
         assert part in text

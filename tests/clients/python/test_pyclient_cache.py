@@ -24,7 +24,7 @@ from posefield_client.cache import Kept
 from posefield_client.exchange import Copy
 from scripted import answer
 
-from service.web.access import keys
+from posefield.http.access import api_keys
 
 TAG = '"0123456789abcdef0123456789abcdef"'
 IMMUTABLE = "public, max-age=31536000, immutable"
@@ -320,8 +320,10 @@ def test_the_real_service_says_that_nothing_changed(address, controls, tmp_path)
 
 @pytest.mark.system
 def test_a_key_of_the_real_service_sees_its_own(models):
-    one, two = keys.make(), keys.make()
-    told = ";".join([keys.line("one", ["read:*"], one), keys.line("two", ["read:walk"], two)])
+    one, two = api_keys.make(), api_keys.make()
+    told = ";".join(
+        [api_keys.line("one", ["read:*"], one), api_keys.line("two", ["read:walk"], two)]
+    )
     cache = Memory()
     with serving.process(models, POSEFIELD_KEYS=told) as child:
         place = serving.address(child)

@@ -16,11 +16,11 @@ from posefield_client.errors import Problem, Unexpected
 from posefield_client.generated import CONTRACT
 from scripted import Pause, answer, chunked
 
-from service.motion.errors import UnknownModel
-from service.web import problems
-from service.web.access import keys
-from service.web.pages import problems as page
-from service.web.problems import KINDS
+from posefield.common.errors import UnknownModel
+from posefield.http.access import api_keys
+from posefield.http.api import problems
+from posefield.http.api.problems import KINDS
+from posefield.http.pages import problems_page as page
 
 LIST = b'{"models": []}'
 
@@ -131,8 +131,8 @@ def test_the_service_itself_is_understood(ask, kind, address, controls):
 
 @pytest.mark.system
 def test_a_service_that_wants_keys(models):
-    key, other = keys.make(), keys.make()
-    told = keys.line("one", ["read:walk"], key)
+    key, other = api_keys.make(), api_keys.make()
+    told = api_keys.line("one", ["read:walk"], key)
     with serving.process(models, POSEFIELD_KEYS=told) as child:
         place = serving.address(child)
         assert type(raised(place)) is errors.Unauthenticated

@@ -14,9 +14,9 @@ from contract_examples import CASES
 from posefield_client import NOTHING, AsyncClient, Client
 from posefield_client.files import CLIP, CLIPS, CROWD, WALK
 
-from service.synthesis import library
-from service.web.app import create_app
-from service.web.settings import Settings
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.registry import model_registry
 
 # What the client does not ask for, and why.
 ANY_FORMAT = "negotiates the formats that end other paths"
@@ -184,7 +184,7 @@ class Recorder:
 
 @pytest.fixture(scope="module")
 def recorder(models):
-    return Recorder(create_app(library.load([models]), Settings()))
+    return Recorder(create_app(model_registry.load([models]), Settings()))
 
 
 @pytest.fixture(scope="module")

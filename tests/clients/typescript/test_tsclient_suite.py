@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.motion import skeleton
+from posefield.motion import skeleton
 
 PACKAGE = Path(__file__).parents[3] / "clients/typescript"
 REACH = "/v1/models/reach"

@@ -4,7 +4,7 @@ import gzip
 
 import pytest
 
-from service.web.pages import standalone
+from posefield.http.pages import static_page
 
 TOOLS = "../node_modules/.bin"
 # Bytes that a page may weigh as it travels.
@@ -31,5 +31,5 @@ def test_its_form_holds(assert_runs):
 
 
 def test_the_built_page_is_small():
-    content = standalone.VIEWER.read_bytes()
+    content = static_page.VIEWER.read_bytes()
     assert len(gzip.compress(content, 6)) < BUDGET < len(content)

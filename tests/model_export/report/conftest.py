@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture(scope="session")
 def steps():
     """Training steps with their times."""
-    from model_export.report.provenance import Step
+    from posefield_train.report.provenance import Step
 
     return (Step("reading <recipe>", 0.25), Step("fitting the fields", 1.5))
 
@@ -29,7 +29,7 @@ def exported(exported, note):
 @pytest.fixture(scope="session")
 def alternatives(small_recipe, trained, exported):
     """Alternatives to the small model's levels of detail."""
-    from model_export.report import levels_of_detail
+    from posefield_train.report import levels_of_detail
 
     return levels_of_detail.alternatives(small_recipe, trained, exported.card)
 
@@ -37,7 +37,7 @@ def alternatives(small_recipe, trained, exported):
 @pytest.fixture(scope="session")
 def levels(exported, alternatives):
     """The small model's levels of detail, measured once."""
-    from model_export.report import levels_of_detail
+    from posefield_train.report import levels_of_detail
 
     return levels_of_detail.of(exported, alternatives)
 
@@ -45,6 +45,6 @@ def levels(exported, alternatives):
 @pytest.fixture(scope="session")
 def rendered(trained, exported, levels, steps):
     """The small model's report."""
-    from model_export.report import training_report
+    from posefield_train.report import training_report
 
     return training_report.render(trained, exported, levels, steps)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from model_export import align, kriging
-from model_export.report import drawn_clips, leave_one_out
+from posefield_train.align import time_alignment
+from posefield_train.kriging import universal_kriging
+from posefield_train.report import drawn_clips
+from posefield_train.report.drawing import left_out_clips
 
 # Two ways to one solution of the same equations differ by rounding, m.
 ROUNDING = 1e-8
@@ -20,7 +22,7 @@ def slices(trained):
 def predicted(trained, kept, clip):
     """Slice (D', T) at a clip's controls by kriging from the kept clips, nothing tuned anew."""
     samples = trained.model.bank.pose.samples
-    field = kriging.solve(trained.pose.hyper, samples[kept], slices(trained)[kept])
+    field = universal_kriging.solve(trained.pose.hyper, samples[kept], slices(trained)[kept])
     return field.predict(samples[[clip]]).reshape(trained.tensor.values.shape[:2])
 
 
@@ -33,7 +35,7 @@ def clip(request, trained):
 
 def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
     everyone = np.arange(len(trained.examples))
-    found = leave_one_out.motion(trained, clip)
+    found = left_out_clips.motion(trained, clip)
     alone = predicted(trained, everyone[everyone != clip], clip)
     assert np.abs(found - alone).max() < ROUNDING
     # Negative control: with the clip itself the prediction is another.
@@ -44,23 +46,23 @@ def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
 
 
 def test_its_distance_from_the_capture_is_what_training_measured(trained, clip):
-    gap = trained.tensor.values[:, :, clip] - leave_one_out.motion(trained, clip)
+    gap = trained.tensor.values[:, :, clip] - left_out_clips.motion(trained, clip)
     frames = gap.shape[1]
     assert np.sum(gap**2) / (trained.tensor.weight * frames) == pytest.approx(trained.missed[clip])
 
 
 def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
     offsets = np.stack([example.offsets for example in trained.examples])
-    expected = align.positions(trained.aligned, trained.skeleton.parents, offsets)[clip]
-    body = leave_one_out.body(trained, clip, trained.tensor.values[:, :, clip])
+    expected = time_alignment.positions(trained.aligned, trained.skeleton.parents, offsets)[clip]
+    body = left_out_clips.body(trained, clip, trained.tensor.values[:, :, clip])
     assert np.abs(body.joints - expected).max() < ROUNDING
-    guess = leave_one_out.body(trained, clip, leave_one_out.motion(trained, clip))
+    guess = left_out_clips.body(trained, clip, left_out_clips.motion(trained, clip))
     assert np.abs(guess.joints - expected).max() > SEEN
 
 
 def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
     own = trained.examples[clip].clip.skeleton
-    body = leave_one_out.body(trained, clip, leave_one_out.motion(trained, clip))
+    body = left_out_clips.body(trained, clip, left_out_clips.motion(trained, clip))
     bones = np.linalg.norm(body.tips - body.joints[:, list(own.tip_joints)], axis=-1)
     assert np.abs(bones - np.linalg.norm(own.tip_offsets, axis=-1)).max() < ROUNDING
 

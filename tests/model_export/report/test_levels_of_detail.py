@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from model_export.report import levels_of_detail
-from service.synthesis.ports import OUTPUTS
+from posefield.inference.graph_ports import OUTPUTS
+from posefield_train.report import levels_of_detail
 
 SLOWER = (4e-6, 3e-6, 2e-6, 1e-6)
 

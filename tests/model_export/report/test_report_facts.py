@@ -6,24 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import variogram
-from model_export.field_bank import VARIANCE
-from model_export.report import (
+from posefield.motion.measures import Measure
+from posefield_train.align.warp import DENSE
+from posefield_train.kriging import variogram
+from posefield_train.kriging.kriging_bank import VARIANCE
+from posefield_train.report import (
     calibration,
     clip_errors,
     coverage,
-    leave_one_out,
-    rounding,
     spectra,
     truncation,
     variograms,
     warps,
 )
-from model_export.report.calibration import Calibration
-from model_export.report.reliability import Reliability
-from model_export.report.warps import Warps
-from model_export.warp import DENSE
-from service.motion.measure import Measure
+from posefield_train.report.calibration import Calibration
+from posefield_train.report.drawing import left_out_clips, significant_digits
+from posefield_train.report.reliability import Reliability
+from posefield_train.report.warps import Warps
 
 # JSON holds six digits.
 DIGITS = 1e-5
@@ -63,9 +62,9 @@ def test_every_clip_is_there_the_worst_first(facts, trained):
     found = [clip["missed_m"] for clip in facts["clips"]["clips"]]
     assert found == pytest.approx(sorted(np.sqrt(trained.missed), reverse=True), rel=DIGITS)
     worst = trained.examples[int(np.argmax(trained.missed))]
-    assert facts["clips"]["clips"][0]["clip"] == leave_one_out.label(worst)
+    assert facts["clips"]["clips"][0]["clip"] == left_out_clips.label(worst)
     assert facts["clips"]["clips"][0]["performer"] == worst.row.performer
-    assert facts["figures"]["worst"][0]["clip"] == leave_one_out.label(worst)
+    assert facts["figures"]["worst"][0]["clip"] == left_out_clips.label(worst)
 
 
 def test_performers_add_up_to_all_clips(trained, controls):
@@ -239,4 +238,4 @@ def test_clips_of_equal_distance_keep_their_order(trained, controls):
 
 
 def test_numbers_are_rounded_to_six_digits():
-    assert rounding.numbers(np.array([[1 / 3, 1e-9 / 3]])) == [[0.333333, 3.33333e-10]]
+    assert significant_digits.numbers(np.array([[1 / 3, 1e-9 / 3]])) == [[0.333333, 3.33333e-10]]

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from model_export.report import clip_errors, warps
-from model_export.strangers import Stranger
+from posefield_train.graph.trained_model import Outlier
+from posefield_train.report import clip_errors, warps
 
 SAID = ("lies far away", "leaps")
 
@@ -13,8 +13,8 @@ def caption(chapter):
 
 
 def test_an_outlier_is_listed_with_the_evidence(trained, exported):
-    against = tuple(Stranger(3, "far", said) for said in SAID)
-    odd = clip_errors.of(replace(trained, strangers=against), exported.card.controls)
+    against = tuple(Outlier(3, "far", said) for said in SAID)
+    odd = clip_errors.of(replace(trained, outliers=against), exported.card.controls)
     assert caption(odd) == "Possible outliers"
     assert "Outlined" in odd.section().charts[0].caption
     ((file, said),) = odd.section().tables[0].rows

@@ -13,9 +13,10 @@ import matplotlib
 import numpy as np
 import pytest
 
-from model_export.report import chart, clip_errors, coverage, leave_one_out, training_report
-from model_export.report.html_page import Page, Section, Table
-from model_export.report.provenance import Step
+from posefield_train.report import clip_errors, coverage, training_report
+from posefield_train.report.drawing import left_out_clips, svg_chart
+from posefield_train.report.drawing.html_page import Page, Section, Table
+from posefield_train.report.provenance import Step
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
 ACTIVE = {"script", "link", "iframe", "object", "embed", "base"}
@@ -168,7 +169,7 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
     first, *others = exported.card.controls
     chapter = coverage.of(trained, (replace(first, name=long), *others)).section()
     (svg,) = (drawn.svg.decode() for drawn in chapter.charts)
-    assert f"{'a' * (chart.LABEL - 1)}… (m)" in svg and long not in svg
+    assert f"{'a' * (svg_chart.LABEL - 1)}… (m)" in svg and long not in svg
     assert long in chapter.tables[0].rows[0]
     examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
     bars = clip_errors.of(replace(trained, examples=tuple(examples)), exported.card.controls)
@@ -186,11 +187,11 @@ def test_charts_do_not_depend_on_the_users_matplotlib_settings():
     def paint(figure):
         figure.subplots().plot([1, 2], [3, 4])
 
-    expected = chart.draw(1.0, paint, "", "")
+    expected = svg_chart.draw(1.0, paint, "", "")
     with matplotlib.rc_context({"lines.linewidth": 9.0, "svg.fonttype": "path"}):
-        assert chart.draw(1.0, paint, "", "") == expected
+        assert svg_chart.draw(1.0, paint, "", "") == expected
     # Negative control: another curve gives another file.
-    assert chart.draw(1.0, lambda figure: figure.subplots().plot([1, 3]), "", "") != expected
+    assert svg_chart.draw(1.0, lambda figure: figure.subplots().plot([1, 3]), "", "") != expected
 
 
 def test_two_reports_of_a_model_differ_only_in_the_times(
@@ -215,7 +216,7 @@ def test_no_date_and_no_path_is_in_the_report(rendered, page, trained):
 
 def test_the_clip_with_the_largest_error_is_named_first(rendered, trained):
     order = np.argsort(-trained.missed)
-    worst, best = (leave_one_out.label(trained.examples[order[i]]) for i in (0, -1))
+    worst, best = (left_out_clips.label(trained.examples[order[i]]) for i in (0, -1))
     found = re.search(r"largest error is ([0-9.]+) cm, of (.*?)\.<", rendered.html.decode())
     assert found.group(2) == worst != best
     assert float(found.group(1)) == pytest.approx(100 * np.sqrt(trained.missed.max()), abs=0.005)

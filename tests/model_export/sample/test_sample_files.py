@@ -12,20 +12,27 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from model_export.sample import arms, body, controls, family, truth, write
-from service.motion import quat, skeleton
-from service.motion.errors import FileError
+from posefield.common.errors import FileError
+from posefield.motion import quat, skeleton
+from posefield_train.sample import (
+    noise_free,
+    sample_arms,
+    sample_body,
+    sample_controls,
+    sample_family,
+    sample_files,
+)
 
 
 @pytest.fixture(scope="module")
 def samples():
-    return list(family.samples())
+    return list(sample_family.samples())
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     output = tmp_path_factory.mktemp("sample") / "new" / "reaching"
-    assert write.family(output) == output / "recipe.toml"
+    assert sample_files.family(output) == output / "recipe.toml"
     return output
 
 
@@ -80,7 +87,7 @@ def played(head, values):
         elif word == "}":
             stack.pop()
     tips = [name for name in places if name.endswith(" tip")]
-    return np.stack([places[name] for name in (*body.NAMES, *tips)], axis=1)
+    return np.stack([places[name] for name in (*sample_body.NAMES, *tips)], axis=1)
 
 
 def meant(clip):
@@ -93,7 +100,7 @@ def meant(clip):
 
 @pytest.mark.system
 def test_files_are_the_same_in_every_process(folder, tmp_path):
-    script = "import sys, pathlib; from model_export.sample import write; "
+    script = "import sys, pathlib; from posefield_train.sample import write; "
     script += "write.family(pathlib.Path(sys.argv[1]))"
     runs = [
         subprocess.Popen(
@@ -107,7 +114,7 @@ def test_files_are_the_same_in_every_process(folder, tmp_path):
 
 
 def test_there_are_92_clips_of_94_channels_at_120_hz(folder, rows):
-    assert len(rows) == family.COUNT == 92
+    assert len(rows) == sample_family.COUNT == 92
     assert sorted(row["file"] for row in rows) == sorted(
         path.relative_to(folder).as_posix() for path in folder.rglob("*.bvh")
     )
@@ -130,8 +137,8 @@ def test_every_degree_of_freedom_of_the_truth_moves():
     """Noise apart: each of the 94 changes along the motion or from one to another."""
     phases = np.linspace(0.0, 1.0, 9)
     stacks = []
-    for _, where in list(family.design())[::4]:
-        rotations, root_path, _ = truth.poses(
+    for _, where in list(sample_family.design())[::4]:
+        rotations, root_path, _ = noise_free.poses(
             [where.stature, where.hip_height, where.turn, where.target_height], phases
         )
         stacks.append(np.concatenate([root_path, rotations[..., 1:].reshape(len(phases), -1)], 1))
@@ -153,15 +160,17 @@ def test_file_read_by_another_hand_gives_the_same_positions(folder, rows, sample
 def test_table_holds_the_controls_of_the_samples(rows, samples):
     for row, sample in zip(rows, samples, strict=True):
         assert row["performer"] == sample.performer
-        for name in controls.RANGES:
+        for name in sample_controls.RANGES:
             assert float(row[name]) == getattr(sample.controls, name)
-        assert controls.parse({name: float(row[name]) for name in controls.RANGES})
+        assert sample_controls.parse({name: float(row[name]) for name in sample_controls.RANGES})
 
 
 def test_three_performers_sit_and_stand(rows):
     groups = {}
     for row in rows:
-        upright = controls.parse([float(row[name]) for name in controls.RANGES]).uprightness
+        upright = sample_controls.parse(
+            [float(row[name]) for name in sample_controls.RANGES]
+        ).uprightness
         assert upright < 0.1 or upright > 0.9
         groups.setdefault((row["performer"], upright > 0.5), []).append(float(row["turn"]))
     assert sorted(map(len, groups.values())) == [15, 15, 15, 15, 16, 16]
@@ -180,10 +189,10 @@ def test_trials_scatter_about_the_truth(samples):
     """A few per cent in time; in place the hand misses by what 0.4 degrees a joint come to."""
     lates, misses = [], []
     for sample in samples:
-        where = [getattr(sample.controls, name) for name in controls.RANGES]
-        lates.append(np.log(sample.clip.duration / truth.duration(where)))
-        hand = arms.palm(sample.clip.positions())[-1]
-        misses.append(np.linalg.norm(hand - truth.target(where)))
+        where = [getattr(sample.controls, name) for name in sample_controls.RANGES]
+        lates.append(np.log(sample.clip.duration / noise_free.duration(where)))
+        hand = sample_arms.palm(sample.clip.positions())[-1]
+        misses.append(np.linalg.norm(hand - noise_free.target(where)))
     assert 0.03 < np.std(lates) < 0.05
     assert 0.005 < np.median(misses) < 0.03
     assert len({len(sample.clip) for sample in samples}) > 40
@@ -193,19 +202,19 @@ def test_trials_scatter_about_the_truth(samples):
 
 def test_noise_has_the_size_it_claims_and_keeps_hinges_and_feet(samples):
     rng = np.random.Generator(np.random.PCG64(0))
-    noise = family.smooth_noise(rng, 200, (40, 3))
-    assert np.sqrt(np.mean(noise**2)) == pytest.approx(family.NOISE, rel=0.2)
+    noise = sample_family.smooth_noise(rng, 200, (40, 3))
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(sample_family.NOISE, rel=0.2)
     for sample in samples[::9]:
-        hinges = sample.clip.rotations[:, [body.INDEX[name] for name in body.HINGES]]
+        hinges = sample.clip.rotations[:, [sample_body.INDEX[name] for name in sample_body.HINGES]]
         assert np.abs(hinges[..., 2:]).max() == 0.0
         for name in ("LeftFoot", "RightFoot"):
-            foot = sample.clip.positions()[:, body.INDEX[name]]
+            foot = sample.clip.positions()[:, sample_body.INDEX[name]]
             assert np.linalg.norm(foot - foot.mean(axis=0), axis=-1).max() < 0.02
 
 
 def test_recipe_names_columns_that_exist(folder, rows):
     recipe = tomllib.loads((folder / "recipe.toml").read_text())
-    assert [control["name"] for control in recipe["controls"]] == list(controls.RANGES)
+    assert [control["name"] for control in recipe["controls"]] == list(sample_controls.RANGES)
     assert {control["column"] for control in recipe["controls"]} <= rows[0].keys()
     assert {recipe["clips"]["file"], recipe["clips"]["performer"]} <= rows[0].keys()
     assert recipe["clips"]["table"] == "clips.csv"
@@ -213,7 +222,7 @@ def test_recipe_names_columns_that_exist(folder, rows):
 
 def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    assert write.family(folder) == folder / "recipe.toml"
+    assert sample_files.family(folder) == folder / "recipe.toml"
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
@@ -221,7 +230,7 @@ def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
 def small(tmp_path, samples):
     """A family of one clip in a folder that was empty."""
     (tmp_path / "small").mkdir()
-    return write.family(tmp_path / "small", samples[:1]).parent
+    return sample_files.family(tmp_path / "small", samples[:1]).parent
 
 
 def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
@@ -241,9 +250,9 @@ def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
 def test_a_folder_with_anything_else_is_refused(small, samples, spoil, message):
     spoil(small)
     with pytest.raises(FileError, match=message):
-        write.family(small, samples[:1])
+        sample_files.family(small, samples[:1])
 
 
 def test_a_file_in_the_way_is_refused(small, samples):
     with pytest.raises(FileError, match="found a file"):
-        write.family(small / "recipe.toml", samples[:1])
+        sample_files.family(small / "recipe.toml", samples[:1])

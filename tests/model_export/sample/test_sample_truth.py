@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.random import PCG64, Generator
 
-from model_export.sample import arms, body, controls, truth
-from model_export.sample.timing import Warp, minimum_jerk
-from service.motion import quat, skeleton
-from service.motion.clip import assemble
-from service.motion.errors import InvalidField
+from posefield.common.errors import InvalidField
+from posefield.motion import quat, skeleton
+from posefield.motion.clip import assemble
+from posefield_train.sample import noise_free, sample_arms, sample_body, sample_controls
+from posefield_train.sample.reach_timing import Warp, minimum_jerk
 
 PHASES = np.linspace(0.0, 1.0, 201)
 SITTING = {"stature": 1.70, "hip_height": 0.50, "turn": 40.0, "target_height": 1.2}
@@ -26,25 +26,25 @@ def points(count, seed=7):
 
     for _ in range(count):
         stature = within((1.62, 1.88))
-        hip = within(controls.limits("hip_height", stature, 0.0))
-        turn = within(controls.limits("turn", stature, hip))
-        yield stature, hip, turn, within(controls.limits("target_height", stature, hip))
+        hip = within(sample_controls.limits("hip_height", stature, 0.0))
+        turn = within(sample_controls.limits("turn", stature, hip))
+        yield stature, hip, turn, within(sample_controls.limits("target_height", stature, hip))
 
 
 def positions(point, phases=PHASES):
-    rotations, root_path, offsets = truth.poses(point, phases)
+    rotations, root_path, offsets = noise_free.poses(point, phases)
     translations = np.repeat(offsets[None], len(phases), axis=0)
     translations[:, 0] = root_path
-    return skeleton.forward(body.PARENTS, rotations, translations)
+    return skeleton.forward(sample_body.PARENTS, rotations, translations)
 
 
 def joint(array, name):
-    return array[:, body.INDEX[name]]
+    return array[:, sample_body.INDEX[name]]
 
 
 def miss(point, phase):
-    found = arms.palm(positions(point, np.array([phase]))[0])[0]
-    return np.linalg.norm(found - truth.target(point))
+    found = sample_arms.palm(positions(point, np.array([phase]))[0])[0]
+    return np.linalg.norm(found - noise_free.target(point))
 
 
 def test_hand_reaches_the_target_at_the_end():
@@ -57,28 +57,28 @@ def test_hand_has_not_reached_the_target_before_the_end():
 
 def test_target_lies_where_the_controls_say():
     for point in points(20):
-        x, y, z = truth.target(point)
+        x, y, z = noise_free.target(point)
         assert np.degrees(np.arctan2(-x, z)) == pytest.approx(point[2], abs=1e-9)
         assert y == pytest.approx(point[3], abs=1e-12)
 
 
 def test_hips_begin_at_the_hip_height():
     for point in points(20):
-        assert truth.poses(point, np.zeros(1))[1][0, 1] == pytest.approx(point[1], abs=1e-12)
+        assert noise_free.poses(point, np.zeros(1))[1][0, 1] == pytest.approx(point[1], abs=1e-12)
 
 
-@pytest.mark.parametrize("side", body.SIDES)
+@pytest.mark.parametrize("side", sample_body.SIDES)
 def test_feet_stay_planted_flat_on_the_floor(side):
     for point in points(20):
         places, turns = positions(point)
         ankle, toes = joint(places, side + "Foot"), joint(places, side + "ToeBase")
         for foot in (ankle, toes, joint(turns, side + "Foot")):
             assert np.ptp(foot, axis=0).max() < 1e-9
-        assert ankle[0, 1] == pytest.approx(body.ankle_height(point[0]), abs=1e-12)
+        assert ankle[0, 1] == pytest.approx(sample_body.ankle_height(point[0]), abs=1e-12)
         assert np.ptp(joint(places, side + "UpLeg"), axis=0).max() > 0.002
 
 
-@pytest.mark.parametrize("side", body.SIDES)
+@pytest.mark.parametrize("side", sample_body.SIDES)
 def test_knees_bend_forwards(side):
     for point in points(20):
         places, turns = positions(point)
@@ -89,15 +89,15 @@ def test_knees_bend_forwards(side):
 
 def test_elbows_bend_as_elbows_do():
     for point in points(30):
-        rotations, _, _ = truth.poses(point, PHASES)
-        for side, sign in body.SIDES.items():
+        rotations, _, _ = noise_free.poses(point, PHASES)
+        for side, sign in sample_body.SIDES.items():
             flexion = -sign * quat.twist(joint(rotations, side + "ForeArm"), np.eye(3)[1])
             assert 0.05 < flexion.min() and flexion.max() < 2.5
 
 
 def test_hinges_turn_about_one_axis():
-    rotations, _, _ = truth.poses(SITTING, PHASES)
-    for name in body.HINGES:
+    rotations, _, _ = noise_free.poses(SITTING, PHASES)
+    for name in sample_body.HINGES:
         assert np.abs(joint(rotations, name)[:, 2:]).max() == 0.0
     assert np.abs(joint(rotations, "LeftFoot")[:, 2:]).max() > 1e-3
 
@@ -105,15 +105,15 @@ def test_hinges_turn_about_one_axis():
 def test_bones_keep_their_lengths():
     for point in points(5):
         places, _ = positions(point)
-        offsets = truth.poses(point, PHASES)[2]
-        bones = places[:, 1:] - places[:, body.PARENTS[1:]]
+        offsets = noise_free.poses(point, PHASES)[2]
+        bones = places[:, 1:] - places[:, sample_body.PARENTS[1:]]
         lengths = np.linalg.norm(bones, axis=-1)
         assert np.abs(lengths - np.linalg.norm(offsets[1:], axis=-1)).max() < 1e-12
 
 
 def test_no_rotation_comes_near_to_half_a_turn():
     for point in points(60):
-        angles = np.linalg.norm(quat.log(truth.poses(point, PHASES)[0]), axis=-1)
+        angles = np.linalg.norm(quat.log(noise_free.poses(point, PHASES)[0]), axis=-1)
         assert np.degrees(angles.max()) < 130.0
 
 
@@ -163,24 +163,24 @@ def test_gaze_ends_on_the_target():
     for point in points(20):
         places, turns = positions(point, np.ones(1))
         look = quat.rotate(joint(turns, "Head")[0], np.array([0.0, 0.0, 1.0]))
-        way = truth.target(point) - joint(places, "Neck")[0]
+        way = noise_free.target(point) - joint(places, "Neck")[0]
         assert np.degrees(np.arccos(look @ way / np.linalg.norm(way))) < 12.0
 
 
 def test_clip_has_the_duration_and_timing_of_the_truth():
-    clip = truth.clip(STANDING, 240.0)
-    assert clip.duration == pytest.approx(truth.duration(STANDING), abs=0.5 / 240.0)
-    phases = truth.phases(STANDING, np.linspace(0.0, 1.0, len(clip)))
-    rotations, root_path, offsets = truth.poses(STANDING, phases)
+    clip = noise_free.clip(STANDING, 240.0)
+    assert clip.duration == pytest.approx(noise_free.duration(STANDING), abs=0.5 / 240.0)
+    phases = noise_free.phases(STANDING, np.linspace(0.0, 1.0, len(clip)))
+    rotations, root_path, offsets = noise_free.poses(STANDING, phases)
     expected = assemble(clip.skeleton, rotations, root_path, offsets, 240.0)
     assert np.abs(clip.positions() - expected.positions()).max() < 1e-12
 
 
 def test_durations_and_timings_are_plausible():
-    durations = [truth.duration(point) for point in points(60)]
+    durations = [noise_free.duration(point) for point in points(60)]
     assert 0.8 < min(durations) < 1.3 < 1.6 < max(durations) < 2.2
     for point in points(60):
-        phases = truth.phases(point, PHASES)
+        phases = noise_free.phases(point, PHASES)
         assert phases[[0, -1]] == pytest.approx([0.0, 1.0], abs=1e-12)
         assert np.diff(phases).min() > 0.4 * PHASES[1]
 
@@ -196,9 +196,9 @@ def test_minimum_jerk_stays_at_its_ends():
     )
 
 
-@pytest.mark.parametrize("stature", controls.STATURES.values())
+@pytest.mark.parametrize("stature", sample_controls.STATURES.values())
 def test_rest_pose_stands_on_the_floor_and_is_as_tall_as_its_stature(stature):
-    figure = body.skeleton(stature)
+    figure = sample_body.skeleton(stature)
     still = np.tile(quat.IDENTITY, (len(figure), 1))
     places, _ = skeleton.forward(figure.parents, still, figure.offsets)
     tips = places[list(figure.tip_joints)] + figure.tip_offsets
@@ -207,7 +207,10 @@ def test_rest_pose_stands_on_the_floor_and_is_as_tall_as_its_stature(stature):
 
 
 def test_performers_differ_in_more_than_size():
-    shapes = [body.skeleton(stature).offsets / stature for stature in controls.STATURES.values()]
+    shapes = [
+        sample_body.skeleton(stature).offsets / stature
+        for stature in sample_controls.STATURES.values()
+    ]
     assert min(np.abs(a - b).max() for a, b in pairwise(shapes)) > 0.003
 
 
@@ -224,19 +227,19 @@ def test_performers_differ_in_more_than_size():
 )
 def test_what_the_body_cannot_do_is_refused_by_name(name, value):
     with pytest.raises(InvalidField, match=r"cannot be reached, expected .* to ") as error:
-        truth.clip({**SITTING, name: value}, 120.0)
+        noise_free.clip({**SITTING, name: value}, 120.0)
     assert error.value.field == name
 
 
 def test_missing_and_unknown_controls_are_refused_by_name():
     with pytest.raises(InvalidField, match="missing") as missing:
-        truth.target({"stature": 1.7})
+        noise_free.target({"stature": 1.7})
     with pytest.raises(InvalidField, match="unknown") as unknown:
-        truth.target({**SITTING, "weight": 70.0})
+        noise_free.target({**SITTING, "weight": 70.0})
     assert (missing.value.field, unknown.value.field) == ("hip_height", "weight")
     with pytest.raises(InvalidField, match="3 values, expected 4"):
-        truth.target([1.7, 0.5, 0.0])
+        noise_free.target([1.7, 0.5, 0.0])
 
 
 def test_four_values_mean_what_their_names_mean():
-    assert truth.target(list(SITTING.values())).tolist() == truth.target(SITTING).tolist()
+    assert noise_free.target(list(SITTING.values())).tolist() == noise_free.target(SITTING).tolist()

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from service.encode import ENCODERS
-from service.motion import clip, quat
-from service.motion.answer import ClipAnswer, Trust
-from service.motion.skeleton import Skeleton
+from posefield.encode.formats import ENCODERS
+from posefield.motion import clip, quat
+from posefield.motion.skeleton import Skeleton
+from posefield.question.results import ClipAnswer, Trust
 
 SKELETON = Skeleton(
     ("Hips", "Spine", "Head", "LeftLeg", "LeftFoot", "RightLeg"),

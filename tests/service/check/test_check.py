@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Vt
 
-from service.check import Finding, check
-from service.encode import ENCODERS
-from service.motion.answer import ClipAnswer
-from service.motion.clip import Clip
-from service.motion.errors import UsdError
+from posefield.check import Finding, check
+from posefield.common.errors import UsdError
+from posefield.encode.formats import ENCODERS
+from posefield.motion.clip import Clip
+from posefield.question.results import ClipAnswer
 
 
 def test_a_good_file_has_no_finding(good):

@@ -1,6 +1,6 @@
 """Tests of progress without a terminal: plain lines on standard error only."""
 
-from service.cli.progress import Bar
+from posefield.console.progress import Bar
 
 
 def test_a_line_says_how_much_is_finished(capsys):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from service.motion import clip as clips
-from service.motion import quat
-from service.motion.answer import ClipAnswer, Trust
-from service.motion.skeleton import Skeleton
+from posefield.motion import clip as clips
+from posefield.motion import quat
+from posefield.motion.skeleton import Skeleton
+from posefield.question.results import ClipAnswer, Trust
 
 TRUST = Trust(
     "walk@0123abcd",

@@ -2,15 +2,15 @@
 
 from collections import Counter
 
-from service.encode import crate
-from service.encode.content import Author, Content, Pattern
-from service.encode.press import Form, Template
+from posefield.encode.usd import crate_template
+from posefield.encode.usd.layer_content import Author, Content, Pattern
+from posefield.encode.usd.template_cache import Form, Template
 
 
 class Counted:
     """Layers of a form; calls: how many were written by usd-core, and how many templates made."""
 
-    def __init__(self, form: Form = crate) -> None:
+    def __init__(self, form: Form = crate_template) -> None:
         self.form = form
         self.calls = Counter[str]()
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from service.motion import quat, skeleton
-from service.motion.crowd import CrowdClip, Motions, Placement
+from posefield.motion import quat, skeleton
+from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 
 FACTS = {
     "model": "walk@0123abcd",

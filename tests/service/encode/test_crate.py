@@ -8,11 +8,11 @@ import pytest
 from counted import Counted
 from pxr import Sdf, Vt
 
-from service.encode import content as contents
-from service.encode import crate, facts, layers, specs
-from service.encode.content import Content
-from service.encode.press import Press
-from service.encode.specs import Type
+from posefield.encode.usd import crate_template, custom_data, layer_metadata, prim_specs
+from posefield.encode.usd import layer_content as contents
+from posefield.encode.usd.layer_content import Content
+from posefield.encode.usd.prim_specs import Type
+from posefield.encode.usd.template_cache import Press
 
 RATE, UNIT = 29.97, 0.01
 MIX = 1.0 / 3.0
@@ -27,19 +27,19 @@ class Plain:
 
     def head(self, content):
         made = Sdf.Layer.CreateAnonymous("moves.usda")
-        layers.say(made, facts.dictionary(content.facts.whole()))
+        layer_metadata.say(made, custom_data.dictionary(content.facts.whole()))
         made.timeCodesPerSecond = RATE
         made.pseudoRoot.SetInfo("metersPerUnit", UNIT)
         return made
 
     def layer(self, content):
         made = self.head(content)
-        prim = specs.prim(made, "Anim", "SkelAnimation")
-        specs.attribute(prim, "translations", Type.Float3Array)
-        specs.attribute(prim, "rotations", Type.QuatfArray)
+        prim = prim_specs.prim(made, "Anim", "SkelAnimation")
+        prim_specs.attribute(prim, "translations", Type.Float3Array)
+        prim_specs.attribute(prim, "rotations", Type.QuatfArray)
         extent = Vt.Vec3fArray.FromNumpy(content.values["extent"])
-        specs.attribute(prim, "extent", Type.Float3Array, extent)
-        specs.samples(prim, content.samples)
+        prim_specs.attribute(prim, "extent", Type.Float3Array, extent)
+        prim_specs.samples(prim, content.samples)
         return made
 
     def __hash__(self):
@@ -52,7 +52,7 @@ def content(seed=0, frames=7, joints=5, **said):
     samples = {name: rng.standard_normal(size, np.float32) for name, size in sizes.items()}
     told = {"model": f"m@{seed}", "sigma": 0.5 * seed, "mix": MIX + seed, "warnings": ["a", "b"]}
     extent = rng.standard_normal((2, 3), np.float32)
-    return Content(samples, {"extent": extent}, facts.parted(told | said))
+    return Content(samples, {"extent": extent}, custom_data.parted(told | said))
 
 
 def changed(made, **samples):
@@ -60,7 +60,7 @@ def changed(made, **samples):
 
 
 def template(author, made):
-    return crate.template(author, made, contents.pattern(made, author.numbers))
+    return crate_template.template(author, made, contents.pattern(made, author.numbers))
 
 
 def pattern(made):
@@ -73,10 +73,10 @@ def test_a_template_writes_what_usd_writes(frames):
     for seed in range(2, 5):
         other = content(seed, frames)
         assert pattern(other) == pattern(content(1, frames))
-        assert made.write(Plain(), other) == crate.ordinary(Plain(), other)
+        assert made.write(Plain(), other) == crate_template.ordinary(Plain(), other)
     # The real part at the wrong end would be seen.
     swapped = changed(other, rotations=np.roll(other.samples["rotations"], 1, axis=-1))
-    assert made.write(Plain(), swapped) != crate.ordinary(Plain(), other)
+    assert made.write(Plain(), swapped) != crate_template.ordinary(Plain(), other)
 
 
 def test_a_template_is_not_changed_by_what_it_writes():
@@ -113,7 +113,7 @@ def test_equal_samples_are_written_once_as_usd_does(repeat):
     made = template(Plain(), repeat(content(1)))
     for seed in range(2, 5):
         other = repeat(content(seed))
-        assert made.write(Plain(), other) == crate.ordinary(Plain(), other)
+        assert made.write(Plain(), other) == crate_template.ordinary(Plain(), other)
     assert pattern(other) != pattern(content(1))
     assert len(made) < len(template(Plain(), content(1)))
 
@@ -121,7 +121,9 @@ def test_equal_samples_are_written_once_as_usd_does(repeat):
 @pytest.mark.parametrize("repeat", REPEATS)
 def test_the_pattern_of_other_samples_would_not_do(repeat):
     made = template(Plain(), content(1))
-    assert made.write(Plain(), repeat(content(2))) != crate.ordinary(Plain(), repeat(content(2)))
+    assert made.write(Plain(), repeat(content(2))) != crate_template.ordinary(
+        Plain(), repeat(content(2))
+    )
 
 
 def test_samples_of_equal_sums_are_told_apart():
@@ -147,12 +149,12 @@ def test_numbers_are_kept_as_usd_does(said):
     """USD keeps what float32 holds beside its type, and any other number once."""
     first, second = content(1, **said), content(2, **said)
     made = template(Plain(), first)
-    assert made.write(Plain(), second) == crate.ordinary(Plain(), second)
+    assert made.write(Plain(), second) == crate_template.ordinary(Plain(), second)
 
 
 def test_numbers_of_another_pattern_would_not_do():
     made, other = template(Plain(), content(1)), content(2, mix=0.25)
-    assert made.write(Plain(), other) != crate.ordinary(Plain(), other)
+    assert made.write(Plain(), other) != crate_template.ordinary(Plain(), other)
 
 
 @pytest.mark.parametrize("word", ["Anim", "posefield", "translations", "rotations", "token"])
@@ -161,7 +163,7 @@ def test_a_text_that_is_a_word_of_the_layer_is_left_to_usd(word):
     assert made.write(Plain(), content(2, model="another")) is not None
     other = content(2, model=word)
     found = made.write(Plain(), other)
-    assert found is None or found == crate.ordinary(Plain(), other)
+    assert found is None or found == crate_template.ordinary(Plain(), other)
     assert made.write(Plain(), content(2, model="Anim")) is None
 
 
@@ -170,21 +172,21 @@ def test_texts_that_occur_twice_have_a_pattern_of_their_own():
     assert pattern(twice) != pattern(content(1))
     assert pattern(content(1, warnings=["model", "b"])) != pattern(content(1))
     other = content(2, warnings=["c", "c"])
-    assert template(Plain(), twice).write(Plain(), other) == crate.ordinary(Plain(), other)
+    assert template(Plain(), twice).write(Plain(), other) == crate_template.ordinary(Plain(), other)
 
 
 @pytest.mark.parametrize("text", ["", "ünïcode 左腕", 'quo"ted\n', "x" * 5000])
 def test_any_text_is_spelt_as_usd_does(text):
     made, other = template(Plain(), content(1)), content(2, model=text)
     found = made.write(Plain(), other)
-    assert found is None or found == crate.ordinary(Plain(), other)
+    assert found is None or found == crate_template.ordinary(Plain(), other)
     assert (found is None) == (text == "")
 
 
 def test_arrays_that_usd_would_merge_are_left_to_usd():
     first, other = content(1, joints=2), content(2, joints=2)
     made = template(Plain(), first)
-    assert made.write(Plain(), other) == crate.ordinary(Plain(), other)
+    assert made.write(Plain(), other) == crate_template.ordinary(Plain(), other)
     moves = other.samples["translations"].copy()
     moves[3] = other.values["extent"]
     assert made.write(Plain(), changed(other, translations=moves)) is None
@@ -204,7 +206,7 @@ class Negated(Plain):
 class Derived(Plain):
     def layer(self, content):
         made = super().layer(content)
-        spec = specs.attribute(made.GetPrimAtPath("/Anim"), "highest", Type.Double)
+        spec = prim_specs.attribute(made.GetPrimAtPath("/Anim"), "highest", Type.Double)
         spec.default = float(content.samples["translations"].max()) / 3
         return made
 
@@ -219,16 +221,16 @@ class Optional(Plain):
     def layer(self, content):
         made = super().layer(content)
         if content.values["extent"][0, 0] > 0.5:
-            specs.attribute(made.GetPrimAtPath("/Anim"), "more", Type.Double, 1.0)
+            prim_specs.attribute(made.GetPrimAtPath("/Anim"), "more", Type.Double, 1.0)
         return made
 
 
 @pytest.mark.parametrize("author", [Negated(), Derived(), Sorted(), Optional()])
 def test_what_cannot_be_trusted_is_written_the_ordinary_way(author):
     assert template(author, content(1)) is None
-    press = Press(crate, limit=10**6)
+    press = Press(crate_template, limit=10**6)
     for seed in range(4):
-        assert press.write(author, content(seed)) == crate.ordinary(author, content(seed))
+        assert press.write(author, content(seed)) == crate_template.ordinary(author, content(seed))
 
 
 def test_a_template_is_made_for_the_second_of_a_pattern():
@@ -245,15 +247,15 @@ def test_a_template_is_made_for_the_second_of_a_pattern():
 
 def test_templates_are_kept_within_a_limit():
     size = len(template(Plain(), content(1)))
-    press = Press(crate, limit=3 * size)
+    press = Press(crate_template, limit=3 * size)
     for frames in (7, 8, 9, 10, 7):
         for seed in range(3):
             other = content(seed, frames)
-            assert press.write(Plain(), other) == crate.ordinary(Plain(), other)
+            assert press.write(Plain(), other) == crate_template.ordinary(Plain(), other)
         assert press.taken <= press.limit
     assert press.taken > size
-    nothing = Press(crate, limit=0)
-    assert nothing.write(Plain(), content(1)) == crate.ordinary(Plain(), content(1))
+    nothing = Press(crate_template, limit=0)
+    assert nothing.write(Plain(), content(1)) == crate_template.ordinary(Plain(), content(1))
     assert nothing.taken == 0
 
 
@@ -266,7 +268,7 @@ def test_patterns_are_kept_within_the_limit_too():
     tracemalloc.stop()
     assert taken / 1.5 < size < 1.5 * taken
     assert contents.size(pattern(content(1, 1000))) < size / 10
-    press = Press(crate, limit=int(3.5 * size))
+    press = Press(crate_template, limit=int(3.5 * size))
     for each in made:
         press.write(Plain(), each)
     # Three, as a fourth has no room.

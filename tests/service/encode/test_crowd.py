@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pxr import Kind, Usd, UsdGeom, UsdSkel
 
-from service.check import check
-from service.encode import crowd, names
-from service.encode.crowd import writer
+from posefield.check import check
+from posefield.encode import usd_crowd
+from posefield.encode.character import joint_names
+from posefield.encode.usd_crowd import crowd_writer
 
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
 FRAMES = 12
@@ -28,15 +29,15 @@ def clip(made):
     return crowds.crowd(conftest.person(), made, MOTION)
 
 
-@pytest.fixture(scope="module", params=crowd.INSTANCING)
+@pytest.fixture(scope="module", params=usd_crowd.INSTANCING)
 def instancing(request):
     return request.param
 
 
-@pytest.fixture(scope="module", params=crowd.FILES)
+@pytest.fixture(scope="module", params=usd_crowd.FILES)
 def path(request, made, instancing, tmp_path_factory):
     found = tmp_path_factory.mktemp(instancing) / f"crowd.{request.param}"
-    writer.write(crowds.crowd(conftest.person(), made, MOTION), found, instancing)
+    crowd_writer.write(crowds.crowd(conftest.person(), made, MOTION), found, instancing)
     return found
 
 
@@ -212,7 +213,7 @@ def test_levels_have_a_sample_where_they_change(stage, made):
 
 
 def test_animations_are_baked_named_and_of_one_sign(stage, clip, made):
-    paths = names.paths(names.legal(clip.skeleton.names), clip.skeleton.parents)
+    paths = joint_names.paths(joint_names.legal(clip.skeleton.names), clip.skeleton.parents)
     for prim in characters(stage):
         played = stage.GetPrimAtPath(animation(prim))
         assert tuple(played.GetAttribute("joints").Get()) == paths
@@ -245,7 +246,7 @@ def test_our_own_check_and_the_official_ones_find_nothing(path):
 @pytest.mark.parametrize("ending", ["usd", "usdz"])
 def test_a_crowd_that_is_not_loaded_still_says_how_large_it_is(ending, made, clip, tmp_path):
     path = tmp_path / f"crowd.{ending}"
-    writer.write(crowds.crowd(conftest.person(), made, MOTION), path)
+    crowd_writer.write(crowds.crowd(conftest.person(), made, MOTION), path)
     stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     unloaded = stage.GetPrimAtPath("/Crowd/Characters").GetAllChildren()
     assert len(unloaded) == len(MOTION)
@@ -279,5 +280,5 @@ class TestNegativeControls:
     def error(self, made, clip, expected, folder, instancing, **wrong):
         path = folder / "wrong.usdc"
         given = vars(clip) | {"batches": crowds.cut(made, 2)} | wrong
-        writer.write(type(clip)(**given), path, instancing)
+        crowd_writer.write(type(clip)(**given), path, instancing)
         return error(Usd.Stage.Open(str(path)), expected)

@@ -19,15 +19,17 @@ import pytest
 from counted import Counted
 from pxr import Sdf, Usd, UsdUtils
 
-from service.encode import character, character_prims, crowd, layers
-from service.encode.crowd import motions, package, writer
-from service.encode.press import Press
-from service.motion.errors import FileError, InvalidField
-from service.motion.skeleton import Skeleton
+from posefield.common.errors import FileError, InvalidField
+from posefield.encode import usd_crowd
+from posefield.encode.character import character
+from posefield.encode.usd import character_prims, layer_metadata
+from posefield.encode.usd.template_cache import Press
+from posefield.encode.usd_crowd import crowd_motions, crowd_package, crowd_writer
+from posefield.motion.skeleton import Skeleton
 
 FOLDER = Path(__file__).parent
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
-LAYOUTS = [(e, i) for e in crowd.FILES for i in crowd.INSTANCING]
+LAYOUTS = [(e, i) for e in usd_crowd.FILES for i in usd_crowd.INSTANCING]
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +69,7 @@ def breaking(clip, after):
 
 
 def test_a_folder_has_a_layer_for_each_motion_and_two_more(clip, tmp_path):
-    writer.write(clip, tmp_path / "many.usd")
+    crowd_writer.write(clip, tmp_path / "many.usd")
     parts = ["character", *(f"m{i:05}" for i in range(5)), "summary"]
     assert list(contents(tmp_path)) == ["many.usd", *(f"many_clips/{p}.usdc" for p in parts)]
     assert all(data.startswith(b"PXR-USDC") for data in contents(tmp_path).values())
@@ -75,22 +77,22 @@ def test_a_folder_has_a_layer_for_each_motion_and_two_more(clip, tmp_path):
 
 @pytest.mark.parametrize(("ending", "instancing"), [("usdc", "references"), ("usd", "flatten")])
 def test_a_single_layer_needs_no_other(ending, instancing, clip, tmp_path):
-    writer.write(clip, tmp_path / f"one.{ending}", instancing)
+    crowd_writer.write(clip, tmp_path / f"one.{ending}", instancing)
     assert list(contents(tmp_path)) == [f"one.{ending}"]
     layers, assets, missing = UsdUtils.ComputeAllDependencies(str(tmp_path / f"one.{ending}"))
     assert (len(layers), assets, missing) == (1, [], [])
 
 
 def test_everything_that_an_entry_names_is_there(clip, tmp_path):
-    writer.write(clip, tmp_path / "many.usd")
+    crowd_writer.write(clip, tmp_path / "many.usd")
     layers, assets, missing = UsdUtils.ComputeAllDependencies(str(tmp_path / "many.usd"))
     assert (len(layers), assets, missing) == (1 + 5 + 2, [], [])
 
 
-@pytest.mark.parametrize("instancing", crowd.INSTANCING)
+@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
 def test_an_archive_is_stored_aligned_and_begins_with_what_is_opened(instancing, clip, tmp_path):
     path = tmp_path / "crowd.usdz"
-    writer.write(clip, path, instancing)
+    crowd_writer.write(clip, path, instancing)
     data = path.read_bytes()
     with zipfile.ZipFile(path) as found:
         assert found.testzip() is None
@@ -105,23 +107,23 @@ def test_an_archive_is_stored_aligned_and_begins_with_what_is_opened(instancing,
         assert (info.compressionMethod, info.encrypted) == (0, False)
 
 
-@pytest.mark.parametrize("ending", crowd.STREAMS)
-@pytest.mark.parametrize("instancing", crowd.INSTANCING)
+@pytest.mark.parametrize("ending", usd_crowd.STREAMS)
+@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
 def test_a_stream_has_the_bytes_of_the_file(ending, instancing, clip, made, tmp_path, temporary):
     path = tmp_path / f"crowd.{ending}"
-    writer.write(clip, path, instancing)
+    crowd_writer.write(clip, path, instancing)
     again = crowds.crowd(conftest.person(), made, MOTION, size=2)
-    assert b"".join(writer.stream(again, ending, instancing)) == path.read_bytes()
+    assert b"".join(crowd_writer.stream(again, ending, instancing)) == path.read_bytes()
     assert contents(temporary) == {}
 
 
 @pytest.mark.parametrize(("ending", "instancing"), LAYOUTS)
 def test_what_breaks_off_leaves_what_was_there(ending, instancing, made, clip, tmp_path):
     path = tmp_path / f"crowd.{ending}"
-    writer.write(replace(clip, batches=crowds.cut(made, 2), facts={}), path, instancing)
+    crowd_writer.write(replace(clip, batches=crowds.cut(made, 2), facts={}), path, instancing)
     before = contents(tmp_path)
     with pytest.raises(RuntimeError, match="the model has gone"):
-        writer.write(breaking(clip, after=1), path, instancing)
+        crowd_writer.write(breaking(clip, after=1), path, instancing)
     assert contents(tmp_path) == before
     assert not [found for found in tmp_path.rglob("*") if ".writing" in found.name]
 
@@ -129,13 +131,15 @@ def test_what_breaks_off_leaves_what_was_there(ending, instancing, made, clip, t
 @pytest.mark.parametrize(("ending", "instancing"), LAYOUTS)
 def test_what_breaks_off_leaves_nothing_where_nothing_was(ending, instancing, clip, tmp_path):
     with pytest.raises(RuntimeError, match="the model has gone"):
-        writer.write(breaking(clip, after=1), tmp_path / f"crowd.{ending}", instancing)
+        crowd_writer.write(breaking(clip, after=1), tmp_path / f"crowd.{ending}", instancing)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_smaller_crowd_leaves_no_motion_of_a_larger_one(clip, made, tmp_path):
-    writer.write(clip, tmp_path / "crowd.usd")
-    writer.write(crowds.crowd(conftest.person(), first(made, 2), [0, 1]), tmp_path / "crowd.usd")
+    crowd_writer.write(clip, tmp_path / "crowd.usd")
+    crowd_writer.write(
+        crowds.crowd(conftest.person(), first(made, 2), [0, 1]), tmp_path / "crowd.usd"
+    )
     assert "crowd_clips/m00001.usdc" in contents(tmp_path)
     assert "crowd_clips/m00002.usdc" not in contents(tmp_path)
 
@@ -149,7 +153,7 @@ def test_a_folder_with_something_else_in_it_is_left_alone(name, clip, tmp_path):
     (tmp_path / name).parent.mkdir(parents=True)
     (tmp_path / name).write_text("mine")
     with pytest.raises(FileError, match="in the way; expected nothing here but an earlier crowd"):
-        writer.write(clip, tmp_path / "crowd.usd")
+        crowd_writer.write(clip, tmp_path / "crowd.usd")
     assert contents(tmp_path) == {name: b"mine"}
 
 
@@ -157,7 +161,7 @@ def test_a_folder_with_something_else_in_it_is_left_alone(name, clip, tmp_path):
 def test_a_batch_is_garbage_before_the_next_is_made(ending, instancing, made, clip, tmp_path):
     alive = []
     given = replace(clip, batches=watched(made, alive))
-    writer.write(given, tmp_path / f"crowd.{ending}", instancing)
+    crowd_writer.write(given, tmp_path / f"crowd.{ending}", instancing)
     assert alive == [0] * 5
 
 
@@ -198,7 +202,7 @@ def peak(count):
         crowds.crowd(person, crowds.motions(person, 1, 100), range(count)), batches=batches
     )
     tracemalloc.start()
-    sent = sum(map(len, writer.stream(given, "usdz")))
+    sent = sum(map(len, crowd_writer.stream(given, "usdz")))
     held = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return held, sent
@@ -213,7 +217,7 @@ def test_an_archive_is_sent_while_it_is_made(clip, made):
             yield batch
 
     sent = 0
-    for piece in writer.stream(replace(clip, batches=batches()), "usdz"):
+    for piece in crowd_writer.stream(replace(clip, batches=batches()), "usdz"):
         sent += piece.startswith(b"PXR-USDC")
         # The entry and the character go first.
         assert len(asked) == max(0, min(sent - 2, 5)) or not piece.startswith(b"PXR-USDC")
@@ -222,7 +226,7 @@ def test_an_archive_is_sent_while_it_is_made(clip, made):
 
 @pytest.mark.parametrize(("ending", "instancing"), [("usdc", "references"), ("usdz", "flatten")])
 def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, temporary):
-    sent = writer.stream(clip, ending, instancing)
+    sent = crowd_writer.stream(clip, ending, instancing)
     next(sent)
     assert contents(temporary) != {}
     sent.close()
@@ -231,8 +235,8 @@ def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, tempor
 
 def written_layers(clip, press):
     rig = character.rig(clip.skeleton)
-    each = motions.each(clip, rig)
-    return [motions.layer(rig, clip.rate, motion.samples, press) for motion in each]
+    each = crowd_motions.each(clip, rig)
+    return [crowd_motions.layer(rig, clip.rate, motion.samples, press) for motion in each]
 
 
 def test_motions_are_written_by_template_and_without_one_the_same(clip, made):
@@ -267,14 +271,16 @@ FIELDS = (
 def print_digests():
     person = conftest.person()
     made = crowds.motions(person, 5, 12)
-    for ending in crowd.STREAMS:
-        for instancing in crowd.INSTANCING:
-            sent = b"".join(writer.stream(crowds.crowd(person, made, MOTION), ending, instancing))
+    for ending in usd_crowd.STREAMS:
+        for instancing in usd_crowd.INSTANCING:
+            sent = b"".join(
+                crowd_writer.stream(crowds.crowd(person, made, MOTION), ending, instancing)
+            )
             print(ending, instancing, hashlib.sha256(sent).hexdigest())  # noqa: T201
     layer, copy = Sdf.Layer.CreateAnonymous("x.usdc"), Sdf.Layer.CreateAnonymous("x.usdc")
     prim = character_prims.root(layer, "Character", character.rig(person))
     Sdf.CopySpec(layer, prim.path, copy, prim.path)
-    print("CopySpec", hashlib.sha256(layers.crate(copy)).hexdigest())  # noqa: T201
+    print("CopySpec", hashlib.sha256(layer_metadata.crate(copy)).hexdigest())  # noqa: T201
 
 
 @pytest.mark.system
@@ -292,13 +298,13 @@ def test_other_processes_write_the_same_bytes():
     assert differing == {"CopySpec"}
 
 
-@pytest.mark.parametrize("instancing", crowd.INSTANCING)
+@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
 def test_one_joint_in_one_frame_by_one_character_will_do(instancing, tmp_path):
     dot = Skeleton(("Root",), (-1,), np.zeros((1, 3)), (), np.zeros((0, 3)))
     made = crowds.motions(dot, 1, 1)
-    for ending in crowd.FILES:
+    for ending in usd_crowd.FILES:
         path = tmp_path / f"dot.{ending}"
-        writer.write(crowds.crowd(dot, made, [0]), path, instancing)
+        crowd_writer.write(crowds.crowd(dot, made, [0]), path, instancing)
         stage = Usd.Stage.Open(str(path))
         assert len(stage.GetPrimAtPath("/Crowd/Characters").GetChildren()) == 1
 
@@ -309,10 +315,10 @@ def test_what_cannot_be_written_is_refused_before_any_motion_is_made(clip, tmp_p
         ("usdc", "copies", "instancing: 'copies', expected one of references, scenegraph, flatten"),
     ):
         with pytest.raises(InvalidField) as refusal:
-            writer.write(breaking(clip, after=0), tmp_path / f"crowd.{ending}", instancing)
+            crowd_writer.write(breaking(clip, after=0), tmp_path / f"crowd.{ending}", instancing)
         assert str(refusal.value) == said
     with pytest.raises(InvalidField, match="'usd', expected one of usda, usdc, usdz"):
-        writer.stream(clip, "usd")
+        crowd_writer.stream(clip, "usd")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -323,8 +329,8 @@ def test_what_cannot_be_written_is_refused_before_any_motion_is_made(clip, tmp_p
 def test_a_crowd_that_no_archive_can_hold_is_refused_at_once(many, said, clip, tmp_path):
     given = replace(breaking(clip, after=0), **many)
     for ask in (
-        lambda: writer.write(given, tmp_path / "crowd.usdz"),
-        lambda: writer.stream(given, "usdz"),
+        lambda: crowd_writer.write(given, tmp_path / "crowd.usdz"),
+        lambda: crowd_writer.stream(given, "usdz"),
     ):
         with pytest.raises(InvalidField, match=said):
             ask()
@@ -335,14 +341,14 @@ def test_the_size_of_an_archive_is_not_guessed_too_small():
     person = conftest.person()
     for frames, spare in ((1, 10), (500, 1.2)):
         given = crowds.crowd(person, crowds.motions(person, 5, frames), MOTION)
-        size = sum(map(len, writer.stream(given, "usdz")))
-        assert size < package.size(given) < spare * size
+        size = sum(map(len, crowd_writer.stream(given, "usdz")))
+        assert size < crowd_package.size(given) < spare * size
 
 
 def test_a_place_that_cannot_be_taken_is_named(clip, tmp_path):
     (tmp_path / "crowd.usdc" / "inside").mkdir(parents=True)
     with pytest.raises(FileError, match=r"crowd\.usdc: cannot be written: Is a directory"):
-        writer.write(clip, tmp_path / "crowd.usdc")
+        crowd_writer.write(clip, tmp_path / "crowd.usdc")
 
 
 ON_A_FULL_DISK = """
@@ -359,7 +365,7 @@ def write_and_say(path, instancing):
     # The disk takes 5 kB of a file and no more.
     resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
     try:
-        writer.write(given, Path(path), instancing)
+        crowd_writer.write(given, Path(path), instancing)
     except FileError as fault:
         print(fault)  # noqa: T201
 
@@ -401,5 +407,5 @@ def test_motions_that_do_not_fit_the_crowd_are_an_error(clip, made, tmp_path):
         ([crowds.motions(conftest.person(), 5, 9)], r"\(9, 20, 4\), expected \(12, 20, 4\)"),
     ):
         with pytest.raises(ValueError, match=said):
-            writer.write(replace(clip, batches=batches), tmp_path / "crowd.usdc")
+            crowd_writer.write(replace(clip, batches=batches), tmp_path / "crowd.usdc")
     assert list(tmp_path.iterdir()) == []

@@ -12,9 +12,9 @@ import orjson
 import pyarrow as pa
 import pytest
 
-from service.encode import CROWD_ENCODERS
-from service.motion import quat
-from service.motion.crowd import CrowdPoses
+from posefield.encode.formats import CROWD_ENCODERS
+from posefield.motion import quat
+from posefield.motion.crowd_clip import CrowdPoses
 
 TENSORS = ("rotations", "root_position", "bone_offsets")
 NUMBERS = ("duration", "sigma", "supported", "levels", "error_px")

@@ -4,8 +4,8 @@ import conftest
 import crowds
 import pytest
 
-from service.encode.crowd import INSTANCING, STREAMS, crowd_size, writer
-from service.encode.crowd.crowd_size import Counts
+from posefield.encode.usd_crowd import INSTANCING, STREAMS, crowd_size, crowd_writer
+from posefield.encode.usd_crowd.crowd_size import Counts
 
 # Characters, motions, frames.
 SHAPES = [(1, 1, 2), (1, 1, 200), (40, 2, 2), (12, 12, 30)]
@@ -19,7 +19,7 @@ def test_a_file_is_no_larger_than_said(ending, instancing, shape):
     person = conftest.person()
     made = crowds.motions(person, motions, frames)
     crowd = crowds.crowd(person, made, [index % motions for index in range(characters)])
-    size = sum(map(len, writer.stream(crowd, ending, instancing)))
+    size = sum(map(len, crowd_writer.stream(crowd, ending, instancing)))
     said = crowd_size.file(
         Counts(len(person), characters, motions, frames), ending, instancing == "flatten"
     )

@@ -6,10 +6,11 @@ import numpy as np
 import orjson
 import pytest
 
-from model_export import bvh
-from service.encode import ENCODERS, axes, convention
-from service.encode.convention import CENTIMETRES, METRES, Convention
-from service.motion import skeleton
+from posefield.encode.files import axis_conversion, file_convention
+from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
+from posefield.encode.formats import ENCODERS
+from posefield.motion import skeleton
+from posefield_train.source import bvh
 
 
 def test_the_table_names_each_format_once():
@@ -143,7 +144,7 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
 
 def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     """Its front is -Y where Z is up."""
-    found = axes.moved(STAGE, walk.clip).skeleton
+    found = axis_conversion.moved(STAGE, walk.clip).skeleton
     meant = on_stage(walk.clip.skeleton.offsets)
     np.testing.assert_allclose(found.offsets, meant, atol=1e-12)
     np.testing.assert_allclose(
@@ -162,7 +163,7 @@ def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     ],
 )
 def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):
-    assert convention.of(unit, up, usual) == meant
+    assert file_convention.of(unit, up, usual) == meant
 
 
 @pytest.mark.parametrize("extension", ENCODERS)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from serving import children
 
-from service.encode.crowd import STREAMS, crowd_size, encoding_process, writer
-from service.encode.crowd.crowd_size import Counts
-from service.encode.crowd.encoding_process import EncoderDied
-from service.motion import cancel
-from service.motion.cancel import Cancellation, Cancelled
+from posefield.common import cancellation
+from posefield.common.cancellation import Cancellation, Cancelled
+from posefield.encode.usd_crowd import STREAMS, crowd_size, crowd_writer, encoding_process
+from posefield.encode.usd_crowd.crowd_size import Counts
+from posefield.encode.usd_crowd.encoding_process import EncoderDied
 
 pytestmark = pytest.mark.system
 
@@ -46,16 +46,16 @@ def folder(monkeypatch, tmp_path):
 def test_its_bytes_are_those_of_this_process(crowd, made, ending, instancing):
     apart = b"".join(encoding_process.stream(crowd, ending, instancing))
     again = replace(crowd, batches=crowds.cut(made, 3))
-    assert apart == b"".join(writer.encoded(again, ending, instancing))
+    assert apart == b"".join(crowd_writer.encoded(again, ending, instancing))
 
 
 def test_a_large_layer_is_encoded_apart(made):
     person = conftest.person()
-    count = writer.APART // crowd_size.CHARACTER
+    count = crowd_writer.APART // crowd_size.CHARACTER
     few, many = (crowds.crowd(person, made, np.arange(n) % 5) for n in (6, count))
-    assert crowd_size.layer(Counts(len(person), count, 5, 12), "usdc", False) > writer.APART
+    assert crowd_size.layer(Counts(len(person), count, 5, 12), "usdc", False) > crowd_writer.APART
     # The process has ended when the first piece comes, and so has the generator's work here.
-    assert next(writer.stream(few, "usdc")) and next(writer.stream(many, "usdc"))
+    assert next(crowd_writer.stream(few, "usdc")) and next(crowd_writer.stream(many, "usdc"))
 
 
 def test_a_fault_of_the_motions_is_raised_here(crowd):
@@ -88,7 +88,7 @@ class Third(Cancellation):
 
 def test_a_cancelled_crowd_ends_its_process(crowd):
     own, context = Third(), copy_context()
-    context.run(cancel.current.set, own)
+    context.run(cancellation.current.set, own)
     pieces = encoding_process.stream(crowd, "usdc", "references")
     with pytest.raises(Cancelled):
         context.run(next, pieces)

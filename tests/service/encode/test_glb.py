@@ -8,12 +8,12 @@ import pytest
 from conftest import TRUST, answer, person
 from pygltflib import GLTF2
 
-from service.encode import ENCODERS
-from service.encode.convention import CENTIMETRES, Convention
-from service.motion import quat, skeleton
-from service.motion.answer import ClipAnswer
-from service.motion.clip import Clip
-from service.motion.errors import InvalidField
+from posefield.common.errors import InvalidField
+from posefield.encode.files.file_convention import CENTIMETRES, Convention
+from posefield.encode.formats import ENCODERS
+from posefield.motion import quat, skeleton
+from posefield.motion.clip import Clip
+from posefield.question.results import ClipAnswer
 
 # float32 keeps 1e-7 of a metre; a joint is at the end of ten of them.
 NEAR = 2e-6

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
-from service.check import check
-from service.encode import CENTIMETRES, METRES, animation, crate, library, takes
-from service.encode.convention import Convention
-from service.motion.answer import ClipAnswer
+from posefield.check import check
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import CENTIMETRES, METRES
+from posefield.encode.usd import clip_arrays, crate_template, usd_animation, usd_library
+from posefield.question.results import ClipAnswer
 
 INCHES = Convention(0.0254, "z")
 NAMES = ("walk 1", "walk-1", "ok")
@@ -29,14 +30,14 @@ def answers(walk):
 
 def build(folder, answers, convention=METRES, rate=30.0):
     entries = []
-    layers = animation.usdc(answers, convention)
+    layers = usd_animation.usdc(answers, convention)
     for name, answer, layer in zip(NAMES, answers, layers, strict=False):
         file = f"clips/00@/{name}.usdc"
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_bytes(layer)
-        entries.append(library.entry(name, file, answer))
+        entries.append(usd_library.entry(name, file, answer))
     path = folder / "character.usd"
-    path.write_bytes(library.stage(conftest.person(), convention, rate, entries))
+    path.write_bytes(usd_library.stage(conftest.person(), convention, rate, entries))
     return path
 
 
@@ -130,7 +131,7 @@ def test_the_text_is_what_usd_writes_of_it(answers, tmp_path):
 
 def test_a_library_of_no_clips_is_a_character_at_rest(tmp_path):
     path = tmp_path / "character.usd"
-    path.write_bytes(library.stage(conftest.person(), METRES, 30.0, []))
+    path.write_bytes(usd_library.stage(conftest.person(), METRES, 30.0, []))
     stage = Usd.Stage.Open(str(path))
     assert stage.GetEndTimeCode() == 0
     assert not stage.GetPrimAtPath("/Character/Clips").GetAllChildren()
@@ -149,8 +150,10 @@ def test_layers_say_what_their_clips_are_worth(answers, tmp_path):
 def test_layers_are_as_usd_writes_them(answers, convention):
     many = [answers[index] for index in (0, 1, 0, 2, 1)]
     expected = [
-        crate.ordinary(animation.Animations(take.rate, convention, take.rig.paths), take.content)
-        for take in takes.bare(many, convention)
+        crate_template.ordinary(
+            usd_animation.Animations(take.rate, convention, take.rig.paths), take.content
+        )
+        for take in clip_arrays.bare(many, convention)
     ]
-    assert animation.usdc(many, convention) == expected
-    assert animation.usdc(many[1:2], convention) == expected[1:2]
+    assert usd_animation.usdc(many, convention) == expected
+    assert usd_animation.usdc(many[1:2], convention) == expected[1:2]

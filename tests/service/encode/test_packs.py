@@ -8,8 +8,8 @@ import zipfile
 
 import pytest
 
-from service.encode import zip_archive
-from service.encode.packs import PACKS
+from posefield.encode.archives import PACKS
+from posefield.encode.files import zip_archive
 
 CONTENTS = {
     "clip-000000.usdc": b"first" * 1000,

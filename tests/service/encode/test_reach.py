@@ -6,13 +6,13 @@ import crowds
 import numpy as np
 import pytest
 
-from service.encode import body, character, moves
-from service.encode import reach as exact
-from service.encode.crowd import reach
-from service.motion import clip as clips
-from service.motion import quat, skeleton
-from service.motion.crowd import Placement
-from service.motion.skeleton import Skeleton
+from posefield.encode.character import animation_samples, body_mesh, character
+from posefield.encode.character import extent as exact
+from posefield.encode.usd_crowd import crowd_extent
+from posefield.motion import clip as clips
+from posefield.motion import quat, skeleton
+from posefield.motion.crowd_clip import Placement
+from posefield.motion.skeleton import Skeleton
 
 
 def tree(seed):
@@ -39,7 +39,7 @@ def reached(person, rig, made):
     """Lowest and highest corner (M, 2, 3) of joints and ends of boxes, without their thickness."""
     local = skeleton.translations(made.bone_offsets, made.root_position)
     places, turns = skeleton.forward(person.parents, made.rotations.astype(float), local)
-    boxes, joints = body.boxes(person, rig.bones, person.offsets), rig.bones.joints
+    boxes, joints = body_mesh.boxes(person, rig.bones, person.offsets), rig.bones.joints
     starts = boxes.starts - person.at_rest(person.offsets)[joints]
     ends = np.stack([starts, starts + boxes.arms])[:, None, None]
     drawn = places[:, :, joints] + quat.rotate(turns[:, :, joints], ends)
@@ -49,12 +49,15 @@ def reached(person, rig, made):
 
 def holds(hull, seed):
     person, rig, made = case(seed)
-    found, least = reach.boxes(hull(rig), moves.of_motions(made)), reached(person, rig, made)
+    found, least = (
+        crowd_extent.boxes(hull(rig), animation_samples.of_motions(made)),
+        reached(person, rig, made),
+    )
     return np.all(found[:, 0] <= least[:, 0]) and np.all(found[:, 1] >= least[:, 1])
 
 
 def whole(rig):
-    return reach.hull(rig)
+    return crowd_extent.hull(rig)
 
 
 def joints_alone(rig):
@@ -75,7 +78,7 @@ def test_placed_boxes_hold_their_corners_wherever_they_stand():
     rng = np.random.default_rng(4)
     own = np.sort(rng.uniform(-1, 1, (6, 2, 3)), axis=1)
     placement = Placement(rng.uniform(-9, 9, (6, 3)), rng.uniform(-9, 9, 6))
-    low, high = reach.placed(placement, own)
+    low, high = crowd_extent.placed(placement, own)
     for box, turn, at in zip(own, placement.turns, placement.positions, strict=True):
         inside = rng.uniform(box[0], box[1], (200, 3))
         moved = quat.rotate(turn, inside) + at
@@ -109,7 +112,7 @@ def test_boxes_of_clips_are_exact(seed):
     person, made = ragged(seed)
     rig = character.rig(person)
     none = np.zeros((len(made), len(person) + len(person.tip_joints)))
-    found = exact.boxes(rig.tree, moves.of_clips(made), none)
+    found = exact.boxes(rig.tree, animation_samples.of_clips(made), none)
     for clip, (low, high) in zip(made, found, strict=True):
         every = places(person, clip).reshape(-1, 3)
         for ours, theirs in ((low, every.min(axis=0)), (-high, -every.max(axis=0))):
@@ -119,7 +122,7 @@ def test_boxes_of_clips_are_exact(seed):
 def test_motions_too_many_to_be_placed_at_once_have_the_boxes_that_each_has_alone():
     person, made = ragged(3)
     rig = character.rig(person)
-    many = moves.of_clips(made * (2 * exact.FRAMES // sum(map(len, made))))
+    many = animation_samples.of_clips(made * (2 * exact.FRAMES // sum(map(len, made))))
     assert len(list(many.parts(exact.FRAMES))) > 1
     balls = np.zeros((len(many), len(person) + len(person.tip_joints)))
     found = exact.boxes(rig.tree, many, balls)
@@ -132,15 +135,17 @@ def test_a_turn_in_the_wrong_order_would_be_seen():
     rig = character.rig(person)
     none = np.zeros((len(made), len(person) + len(person.tip_joints)))
     swapped = [replace(clip, rotations=np.roll(clip.rotations, 1, axis=-1)) for clip in made]
-    found = exact.boxes(rig.tree, moves.of_clips(swapped), none)
-    assert np.abs(found - exact.boxes(rig.tree, moves.of_clips(made), none)).max() > 0.05
+    found = exact.boxes(rig.tree, animation_samples.of_clips(swapped), none)
+    assert (
+        np.abs(found - exact.boxes(rig.tree, animation_samples.of_clips(made), none)).max() > 0.05
+    )
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_body_in_any_pose_stays_in_the_box_of_anywhere(seed):
     person, made = ragged(seed)
     rig = character.rig(person)
-    whole = moves.of_clips(made)
+    whole = animation_samples.of_clips(made)
     own = exact.boxes(rig.tree, whole, character.balls(character.resting(rig, whole.offsets)))
     for clip, (low, high) in zip(made, own, strict=True):
         lowest, highest = exact.anywhere(person, clip.translations[0], clip.root_path)

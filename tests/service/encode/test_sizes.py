@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from service.encode import CROWD_ENCODERS, ENCODERS, poses_within
-from service.motion.crowd import Placement
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, crowd, session
-from service.synthesis.crowd_question import CrowdQuestion
-from service.synthesis.synthesizer import Synthesizer
+from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, poses_within
+from posefield.inference import session
+from posefield.motion.crowd_clip import Placement
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips, crowd_synthesis
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.crowd_question import CrowdQuestion
 
 SHARES = np.linspace(0.03, 0.97, 7)
 
@@ -41,7 +42,9 @@ def test_no_clip_takes_more_than_was_reckoned(name, model):
 @pytest.mark.parametrize("name", CROWD_ENCODERS)
 def test_no_crowd_takes_more_than_was_reckoned(name, model):
     joints, encoder = len(model.session.card.skeleton) + 1, CROWD_ENCODERS[name]
-    sizes = [len(encoder.encode(crowd.poses(model, company(model, n)))) for n in (100, 400)]
+    sizes = [
+        len(encoder.encode(crowd_synthesis.poses(model, company(model, n)))) for n in (100, 400)
+    ]
     per_joint = (sizes[1] - sizes[0]) / 300 / joints
     assert encoder.per_joint / 3 < per_joint < encoder.per_joint
 

@@ -11,12 +11,13 @@ import orjson
 import pyarrow as pa
 import pytest
 
-from service.encode import ENCODERS, POSE_ENCODERS, tables
-from service.encode.arrow import arrow
-from service.encode.tables import Table
-from service.motion import cancel
-from service.motion.answer import PoseAnswer
-from service.motion.cancel import Cancellation, Cancelled
+from posefield.common import cancellation
+from posefield.common.cancellation import Cancellation, Cancelled
+from posefield.encode.formats import ENCODERS, POSE_ENCODERS
+from posefield.encode.tables import table as tables
+from posefield.encode.tables.arrow import arrow
+from posefield.encode.tables.table import Table
+from posefield.question.results import PoseAnswer
 
 ROWS = ("times", "rotations", "root_position")
 
@@ -141,7 +142,7 @@ def test_large_arrays_are_written_in_pieces_that_do_not_show():
 def test_writing_large_arrays_stops_when_it_is_cancelled():
     own = Cancellation()
     context = copy_context()
-    context.run(cancel.current.set, own)
+    context.run(cancellation.current.set, own)
     small, large = {"a": np.zeros(4)}, {"a": np.zeros(tables.BLOCK + 1)}
     assert context.run(tables.document, large)
     own.cancel()

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
-from service.encode import ENCODERS, layers, names
-from service.motion.answer import ClipAnswer
-from service.motion.clip import Clip
+from posefield.encode.character import joint_names
+from posefield.encode.formats import ENCODERS
+from posefield.encode.usd import layer_metadata
+from posefield.motion.clip import Clip
+from posefield.question.results import ClipAnswer
 
 FOLDER = Path(__file__).parent
 
@@ -111,7 +113,7 @@ def test_prims_are_bound_to_each_other(stage):
 def test_joints_have_legal_unique_leaf_names_and_keep_their_own(stage, walk):
     joints = value(stage, "/Skel.joints")
     leaves = [joint.rpartition("/")[2] for joint in joints]
-    assert tuple(leaves) == names.legal(walk.clip.skeleton.names)
+    assert tuple(leaves) == joint_names.legal(walk.clip.skeleton.names)
     assert tuple(value(stage, "/Skel.jointNames")) == walk.clip.skeleton.names
     assert list(value(stage, "/Anim.joints")) == list(joints)
 
@@ -196,7 +198,7 @@ PRINT_DIGESTS = """
 import hashlib, sys
 sys.path.insert(0, sys.argv[1])
 import conftest
-from service.encode import ENCODERS
+from posefield.encode.formats import ENCODERS
 walk = conftest.answer(frames=45, rate=29.97)
 for encoder in ENCODERS.values():
     print(encoder.extension, hashlib.sha256(encoder.encode(walk)).hexdigest())
@@ -221,10 +223,10 @@ def layer(walk):
 
 
 def test_no_temporary_file_is_left(layer, tmp_path):
-    assert layers.crate(layer, tmp_path).startswith(b"PXR-USDC")
+    assert layer_metadata.crate(layer, tmp_path).startswith(b"PXR-USDC")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("place", ["none", "/proc"])
 def test_a_machine_without_a_folder_in_memory_will_do(layer, place, tmp_path):
-    assert layers.crate(layer, tmp_path / place) == layers.crate(layer)
+    assert layer_metadata.crate(layer, tmp_path / place) == layer_metadata.crate(layer)

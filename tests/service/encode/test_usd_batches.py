@@ -8,12 +8,19 @@ import numpy as np
 import pytest
 from counted import Counted
 
-from service.encode import ENCODERS, METRES, crate, press, takes, text, usd
-from service.encode.convention import CENTIMETRES, Convention
-from service.motion import clip as clips
-from service.motion import quat
-from service.motion.answer import ClipAnswer, Met, Trust
-from service.motion.skeleton import Skeleton
+from posefield.encode.files.file_convention import CENTIMETRES, Convention
+from posefield.encode.formats import ENCODERS, METRES
+from posefield.encode.usd import (
+    clip_arrays,
+    crate_template,
+    template_cache,
+    text_template,
+    usd_clip,
+)
+from posefield.motion import clip as clips
+from posefield.motion import quat
+from posefield.motion.skeleton import Skeleton
+from posefield.question.results import ClipAnswer, Met, Trust
 
 INCHES = Convention(0.0254, "z")
 CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), INCHES]
@@ -37,11 +44,11 @@ def _answer(rng, frames, person, said):
     return ClipAnswer(made, replace(trust, **said))
 
 
-def ordinary(given, convention=METRES, form=crate):
-    return [form.ordinary(*each) for one in given for each in usd.authored([one], convention)]
+def ordinary(given, convention=METRES, form=crate_template):
+    return [form.ordinary(*each) for one in given for each in usd_clip.authored([one], convention)]
 
 
-def written(given, convention=METRES, write=usd.usdc):
+def written(given, convention=METRES, write=usd_clip.usdc):
     """All of them twice: templates are made on the way."""
     first = write(given, convention)
     assert write(given, convention) == first
@@ -51,7 +58,7 @@ def written(given, convention=METRES, write=usd.usdc):
 def both(given, convention=METRES):
     """Whether both forms are written as usd-core does."""
     return written(given, convention) == ordinary(given, convention) and (
-        written(given, convention, usd.usda) == ordinary(given, convention, text)
+        written(given, convention, usd_clip.usda) == ordinary(given, convention, text_template)
     )
 
 
@@ -98,7 +105,7 @@ def test_clips_too_long_to_be_made_together_are_written():
     """Two that are too long together, and one that is too long by itself."""
     given = [*answers(2, 1700), *answers(1, 3300, seed=1)]
     lengths = [len(answer.clip) for answer in given]
-    assert max(lengths[:2]) < takes.TOGETHER < min(sum(lengths[:2]), lengths[2])
+    assert max(lengths[:2]) < clip_arrays.TOGETHER < min(sum(lengths[:2]), lengths[2])
     assert written(given) == ordinary(given)
 
 
@@ -185,20 +192,20 @@ def test_what_clips_were_held_to_is_written_as_usd_does(reached):
 def pressed(form, given):
     """How clips are written by a new press: by usd-core, and templates that are made."""
     counted = Counted(form)
-    own = press.Press(counted, 64_000_000)
-    for author, content in usd.authored(given, METRES):
+    own = template_cache.Press(counted, 64_000_000)
+    for author, content in usd_clip.authored(given, METRES):
         own.write(author, content)
     return counted.calls
 
 
-@pytest.mark.parametrize("form", [crate, text])
+@pytest.mark.parametrize("form", [crate_template, text_template])
 def test_clips_that_are_held_to_different_places_share_a_template(form):
     given = list(held(7, 39))
     assert pressed(form, given) == {"ordinary": 1, "template": 1}
     fewer = replace(given[3].trust, targets=given[3].trust.targets[:2])
     found = pressed(form, [*given, replace(given[3], trust=fewer)])
     # Text says facts in its head, which is no part of a template.
-    assert found == {"ordinary": 2 if form is crate else 1, "template": 1}
+    assert found == {"ordinary": 2 if form is crate_template else 1, "template": 1}
 
 
 def chain(joints):
@@ -215,7 +222,7 @@ def test_skeletons_whose_arrays_are_as_large_as_others_will_do(joints):
 
 def test_samples_that_equal_the_tints_are_written_as_usd_does():
     given = answers(4, person=chain(3))
-    tinted = np.broadcast_to(usd.TINTS.astype(float), given[3].clip.translations.shape)
+    tinted = np.broadcast_to(usd_clip.TINTS.astype(float), given[3].clip.translations.shape)
     given[3] = moved(given[3], tinted)
     assert both(given)
 
@@ -239,10 +246,10 @@ def test_awkward_numbers_are_written_as_usd_does():
     assert both(given, INCHES)
 
 
-@pytest.mark.parametrize("form", [crate, text])
+@pytest.mark.parametrize("form", [crate_template, text_template])
 def test_templates_are_used(form):
     """Else all that is above would hold without them."""
     given = answers(3, 37)
     assert pressed(form, given) == {"ordinary": 1, "template": 1}
     assert pressed(form, [*given, *answers(1, 38)]) == {"ordinary": 2, "template": 1}
-    assert press.TEXTS.taken <= press.TEXTS.limit
+    assert template_cache.TEXTS.taken <= template_cache.TEXTS.limit

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
-from service.check import check
-from service.encode import CENTIMETRES, ENCODERS, METRES
-from service.encode.convention import Convention
+from posefield.check import check
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import CENTIMETRES, ENCODERS, METRES
 
 CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), Convention(0.0254, "z")]
 FRAMES = (0, 20, 44)

@@ -5,7 +5,8 @@ import zipfile
 import pytest
 from pxr import Usd, UsdSkel
 
-from service.encode import ENCODERS, zip_archive
+from posefield.encode.files import zip_archive
+from posefield.encode.formats import ENCODERS
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import orjson
 
-from service.export.job import Job, Work
-from service.export.query import KEPT, Fault, Query, Survey
-from service.question.motion_question import ClipQuestion
+from posefield.batch.job import Job, Work
+from posefield.batch.rows.row_query import KEPT, Fault, Query, Survey
+from posefield.question.motion_question import ClipQuestion
 
 CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 

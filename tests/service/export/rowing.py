@@ -7,10 +7,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from service.export import queries
-from service.export.columns import OPTIONS
-from service.export.queries import Asked, Defaults
-from service.export.query import Fault, Query
+from posefield.batch.rows import row_sources
+from posefield.batch.rows.columns import OPTIONS
+from posefield.batch.rows.row_query import Fault, Query
+from posefield.batch.rows.row_sources import Asked, Defaults
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
@@ -54,7 +54,7 @@ def text(path: Path, *lines, end="\n"):
 
 
 def source(model, path=None, usual=None, **asked):
-    return queries.source(Asked(path, **asked), usual or Defaults("usdc"), model)
+    return row_sources.source(Asked(path, **asked), usual or Defaults("usdc"), model)
 
 
 def rows(model, path=None, usual=None, **asked):

@@ -14,8 +14,8 @@ import pytest
 from clusters import started, wait_for
 from typer.testing import CliRunner
 
-import service
-from service import cli
+import posefield
+from posefield import cli
 
 pytestmark = pytest.mark.system
 
@@ -160,7 +160,7 @@ def test_a_scheduler_that_dies_is_said(words, undisturbed, mortal, tmp_path):
 
 def test_a_worker_that_came_later_with_another_source_is_refused(words, mortal, tmp_path):
     copy = tmp_path / "older"
-    shutil.copytree(Path(service.__file__).parent, copy / "service")
+    shutil.copytree(Path(posefield.__file__).parent, copy / "service")
     with (copy / "service" / "crowds.py").open("a") as file:
         file.write("# one more line\n")
     target = tmp_path / "made"
@@ -194,9 +194,9 @@ import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import exporting
-from service.export import cluster
-from service.export.chunks import Task
-from service.motion.errors import FileError
+from posefield.batch import dask_export as cluster
+from posefield.batch.chunks import Task
+from posefield.common.errors import FileError
 source = exporting.queries(4)
 work = exporting.work(Path(sys.argv[2]), source, sys.argv[3])
 with cluster.runner(sys.argv[4]) as run:

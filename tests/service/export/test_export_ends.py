@@ -18,7 +18,7 @@ import exporting
 import pytest
 from typer.testing import CliRunner
 
-from service import cli
+from posefield import cli
 
 pytestmark = pytest.mark.system
 

@@ -7,13 +7,13 @@ import sys
 
 import pytest
 
-from service.export.folder import Folder
-from service.motion.errors import FileError
+from posefield.batch.folder_target import Folder
+from posefield.common.errors import FileError
 
 # Dies with half a file written; what is written reaches the disk before.
 DIES = """
 import os, signal, sys
-from service.export.folder import Folder
+from posefield.batch.folder_target import Folder
 
 def pieces():
     yield bytes(1 << 20)

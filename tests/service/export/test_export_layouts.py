@@ -13,11 +13,11 @@ import pytest
 from msgspec import structs
 from pxr import Usd, UsdSkel
 
-from service import check
-from service.export import run
-from service.motion.errors import InvalidField, UsdError
-from service.synthesis import clips
-from service.synthesis import library as synthesis
+from posefield import check
+from posefield.batch import run
+from posefield.common.errors import InvalidField, UsdError
+from posefield.registry import model_registry as synthesis
+from posefield.synthesis import clips
 
 ROWS, CHUNK = 20, 8
 

@@ -7,13 +7,14 @@ import shutil
 import exporting
 import pytest
 
-from service.encode import ENCODERS
-from service.export import pool, run
-from service.export.layouts import path
-from service.export.query import Fault, Query
-from service.export.run import Shard
-from service.motion.errors import FileError, InvalidField
-from service.synthesis import clips, library
+from posefield.batch import process_pool, run
+from posefield.batch.layouts import path
+from posefield.batch.rows.row_query import Fault, Query
+from posefield.batch.run import Shard
+from posefield.common.errors import FileError, InvalidField
+from posefield.encode.formats import ENCODERS
+from posefield.registry import model_registry
+from posefield.synthesis import clips
 
 ROWS = 30
 
@@ -36,7 +37,7 @@ def undisturbed(source, model_path, tmp_path_factory):
 
 
 def test_every_query_has_a_file_that_the_encoder_would_make(undisturbed, source, model_path):
-    synthesizer = library.load([model_path]).models["reaching"]
+    synthesizer = model_registry.load([model_path]).models["reaching"]
     for query in source.rows():
         expected = ENCODERS["json"].encode(clips.clip(synthesizer, query.question))
         assert (undisturbed / f"clips/000/{query.name}.json").read_bytes() == expected
@@ -81,7 +82,7 @@ def test_folders_hold_a_thousand_files_at_most():
 @pytest.mark.parametrize("workers", [2, 3])
 def test_processes_make_the_same_bytes(workers, undisturbed, source, model_path, tmp_path):
     work = exporting.work(model_path, source, tmp_path)
-    outcome = run.run(work, source, exporting.Recorder(), pool.runner(workers))
+    outcome = run.run(work, source, exporting.Recorder(), process_pool.runner(workers))
     assert outcome.done == ROWS
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
@@ -217,7 +218,7 @@ def test_rows_at_fault_end_it_before_anything_is_written(source, model_path, tmp
 def test_rows_at_fault_are_skipped_and_listed(source, model_path, tmp_path):
     bad = spoilt(source)
     work = exporting.work(model_path, bad, tmp_path, skip=True)
-    outcome = run.run(work, bad, exporting.Recorder(), pool.runner(2))
+    outcome = run.run(work, bad, exporting.Recorder(), process_pool.runner(2))
     assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 2)
     skipped = exporting.lines(tmp_path / "skipped.jsonl")
     assert [fault["place"] for fault in skipped] == ["line 6", "line 13"]
@@ -230,7 +231,7 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
     rows = [row for row in spoilt(source).rows() if not isinstance(row, Fault)]
     bad = exporting.Listed(rows)
     work = exporting.work(model_path, bad, tmp_path)
-    for by in (pool.run_here, pool.runner(2)):
+    for by in (process_pool.run_here, process_pool.runner(2)):
         with pytest.raises(
             InvalidField, match=r"rows that cannot be answered: 1 .*\n  line 13: end: 50"
         ):
@@ -254,7 +255,7 @@ def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_p
     work = exporting.work(model, source, tmp_path / "target")
     watch = exporting.Recorder()
     watch.advance = lambda part: model.write_bytes(b"another")
-    assert run.run(work, source, watch, pool.runner(2)).facts is not None
+    assert run.run(work, source, watch, process_pool.runner(2)).facts is not None
     assert model.read_bytes() == b"another"
     assert exporting.content(tmp_path / "target") == exporting.content(undisturbed)
 

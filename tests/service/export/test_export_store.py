@@ -6,12 +6,12 @@ import exporting
 import pytest
 import stores
 
-from service.export import pool, run
-from service.export.run import Shard
-from service.export.store import Store
-from service.export.target import open_target
-from service.motion.errors import FileError
-from service.synthesis import objects
+from posefield.batch import process_pool, run
+from posefield.batch.run import Shard
+from posefield.batch.store_target import Store
+from posefield.batch.target import open_target
+from posefield.common.errors import FileError
+from posefield.registry import model_sources
 
 pytestmark = pytest.mark.system
 
@@ -54,13 +54,13 @@ def paths(url):
     """Path of every object under a URL."""
     import obstore
 
-    return [meta["path"] for batch in obstore.list(objects.connect(url)) for meta in batch]
+    return [meta["path"] for batch in obstore.list(model_sources.connect(url)) for meta in batch]
 
 
 @pytest.mark.parametrize("layout", ["folder", "tar"])
 def test_a_store_gets_what_a_folder_would(layout, source, model_path, bucket, local):
     work = exporting.work(model_path, source, bucket, layout=layout)
-    outcome = run.run(work, source, exporting.Recorder(), pool.runner(2))
+    outcome = run.run(work, source, exporting.Recorder(), process_pool.runner(2))
     assert outcome.done == ROWS
     assert content(bucket) == local[layout]
 

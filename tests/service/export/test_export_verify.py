@@ -6,7 +6,7 @@ import shutil
 import exporting
 import pytest
 
-from service.export import run
+from posefield.batch import run
 
 ROWS = 12
 

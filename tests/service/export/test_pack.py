@@ -6,15 +6,16 @@ import hashlib
 import orjson
 import pytest
 
-from service.encode import ENCODERS
-from service.encode.convention import METRES
-from service.export import pack
-from service.export.pack import CLIPS, POSES, Order
-from service.export.query import Query
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, session
-from service.synthesis.clips import Prospect
-from service.synthesis.synthesizer import Synthesizer
+from posefield.batch import clip_archive
+from posefield.batch.clip_archive import CLIPS, POSES, Order
+from posefield.batch.rows.row_query import Query
+from posefield.encode.files.file_convention import METRES
+from posefield.encode.formats import ENCODERS
+from posefield.inference import session
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.clips import Prospect
+from posefield.synthesis.synthesizer import Synthesizer
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def test_batches_are_bounded_in_clips_and_in_poses(order):
     ordered, made = order
     rates = [10] * 40 + [1000] * 5 + [10] * 3
     asked = ordered(rates)
-    assert len(list(pack.members(asked))) == len(rates) + 1
+    assert len(list(clip_archive.members(asked))) == len(rates) + 1
     assert [frames for batch in made for frames in batch] == [p.frames for p in asked.prospects]
     assert all(len(batch) <= CLIPS for batch in made)
     assert all(sum(batch) <= POSES for batch in made)
@@ -58,13 +59,13 @@ def test_a_clip_that_alone_is_more_than_a_batch_is_one(order):
     ordered, made = order
     asked = ordered([10] * 4)
     prospects = [Prospect(frames, ()) for frames in (1, POSES + 1, 1, 1)]
-    list(pack.members(dataclasses.replace(asked, prospects=prospects)))
+    list(clip_archive.members(dataclasses.replace(asked, prospects=prospects)))
     assert [len(batch) for batch in made] == [1, 1, 2]
 
 
 def test_a_batch_is_made_when_its_first_file_is_taken(order):
     ordered, made = order
-    members = pack.members(ordered([10] * 2 * CLIPS))
+    members = clip_archive.members(ordered([10] * 2 * CLIPS))
     for _ in range(CLIPS):
         next(members)
     assert len(made) == 1
@@ -74,8 +75,8 @@ def test_a_batch_is_made_when_its_first_file_is_taken(order):
 
 def test_the_manifest_lists_the_files_in_order(order):
     ordered, _ = order
-    *files, (name, content) = pack.members(ordered([10, 20]))
-    assert name == pack.MANIFEST
+    *files, (name, content) = clip_archive.members(ordered([10, 20]))
+    assert name == clip_archive.MANIFEST
     lines = [orjson.loads(line) for line in content.splitlines()]
     assert [(line["name"], line["file"]) for line in lines] == [
         ("c0", "c0.json"),

@@ -8,12 +8,13 @@ from hypothesis import strategies as st
 from msgspec import structs
 from rowing import POINT, faults, rows, source, write_csv, write_jsonl, write_parquet
 
-from service.encode import ENCODERS
-from service.export.queries import Defaults
-from service.export.query import Fault
-from service.motion.errors import QueryError
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, library
+from posefield.batch.rows.row_query import Fault
+from posefield.batch.rows.row_sources import Defaults
+from posefield.common.errors import QueryError
+from posefield.encode.formats import ENCODERS
+from posefield.question.motion_question import ClipQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips
 
 WRITERS = {"csv": write_csv, "jsonl": write_jsonl, "parquet": write_parquet}
 PERFORMERS = ("middle", "short", "tall")
@@ -58,13 +59,13 @@ CYCLES = st.fixed_dictionaries(
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture(scope="module")
 def walk(walk_path):
     """A model of a cycle whose joints have no roles."""
-    return library.load([walk_path]).models["stroll"]
+    return model_registry.load([walk_path]).models["stroll"]
 
 
 @pytest.fixture(scope="module")

@@ -3,16 +3,17 @@
 import pytest
 from rowing import POINT, rows, source, write_csv
 
-from service.export.columns import OPTIONS
-from service.export.queries import Defaults
-from service.motion.errors import FileError, InvalidField, OutsideSamples, UnknownFormat
-from service.question.motion_question import ClipQuestion, NamedClipQuestion
-from service.synthesis import clips, library
+from posefield.batch.rows.columns import OPTIONS
+from posefield.batch.rows.row_sources import Defaults
+from posefield.common.errors import FileError, InvalidField, OutsideSamples, UnknownFormat
+from posefield.question.motion_question import ClipQuestion, NamedClipQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips
 
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture

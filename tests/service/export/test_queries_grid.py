@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from rowing import asked, rows, source
 
-from service.export.queries import Defaults
-from service.export.query import Fault
-from service.motion.errors import InvalidField
-from service.question.motion_question import ClipQuestion
-from service.synthesis import library
+from posefield.batch.rows.row_query import Fault
+from posefield.batch.rows.row_sources import Defaults
+from posefield.common.errors import InvalidField
+from posefield.question.motion_question import ClipQuestion
+from posefield.registry import model_registry
 
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 def test_a_grid_is_the_product_in_the_order_it_is_given(model):

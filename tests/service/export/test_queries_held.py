@@ -7,10 +7,10 @@ import pytest
 from msgspec import structs
 from rowing import POINT, faults, rows, source, text, write_csv, write_jsonl, write_parquet
 
-from service.export.queries import Defaults
-from service.motion.errors import InvalidField
-from service.question.motion_question import ClipQuestion, Target
-from service.synthesis import library
+from posefield.batch.rows.row_sources import Defaults
+from posefield.common.errors import InvalidField
+from posefield.question.motion_question import ClipQuestion, Target
+from posefield.registry import model_registry
 
 HELD = ("exact", "targets", "pin_feet")
 HAND = {"joint": "RightHand", "position": [-0.2, 1.1, 0.5], "at": "end"}
@@ -24,7 +24,7 @@ WORDS = "RightHand@end:-0.2,1.1,0.5; LeftFoot@0.25:0.1,0,0.5"
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 def holds(model, path, usual=None):

@@ -5,16 +5,16 @@ import json
 import pytest
 from rowing import POINT, asked, faults, rows, source
 
-from service.motion.errors import FileError
-from service.question.motion_question import ClipQuestion
-from service.synthesis import library
+from posefield.common.errors import FileError
+from posefield.question.motion_question import ClipQuestion
+from posefield.registry import model_registry
 
 OK = json.dumps(POINT)
 
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture

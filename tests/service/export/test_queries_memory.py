@@ -5,8 +5,8 @@ import tracemalloc
 import pytest
 from rowing import POINT, source, text, write_csv
 
-from service.export.queries import Defaults
-from service.synthesis import library
+from posefield.batch.rows.row_sources import Defaults
+from posefield.registry import model_registry
 
 pytestmark = pytest.mark.system
 
@@ -17,7 +17,7 @@ ROWS = 60_000
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 def peak(work):

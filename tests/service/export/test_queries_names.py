@@ -5,7 +5,7 @@ import tracemalloc
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.export.names import Seen, generated
+from posefield.batch.rows.clip_names import Seen, generated
 
 WORDS = st.text("abAB_1", min_size=1, max_size=3)
 NAMES = 300_000

@@ -8,17 +8,17 @@ import pyarrow.parquet as pq
 import pytest
 from rowing import POINT, asked, faults, rows, source, write_parquet
 
-from service.motion.errors import FileError
-from service.question.motion_question import ClipQuestion
-from service.synthesis import library
+from posefield.common.errors import FileError
+from posefield.question.motion_question import ClipQuestion
+from posefield.registry import model_registry
 
 HIDDEN = """
 import sys
 sys.modules["pyarrow"] = None
 from pathlib import Path
-from service.export import queries
-from service.motion.errors import FileError
-from service.synthesis import library
+from posefield.batch.rows import row_sources as queries
+from posefield.common.errors import FileError
+from posefield.registry import model_registry as library
 model = library.load([Path(sys.argv[1])]).models["labelled"]
 try:
     queries.source(queries.Asked(Path(sys.argv[2])), queries.Defaults("usdc"), model)
@@ -29,7 +29,7 @@ except FileError as fault:
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ import contextlib
 import pytest
 from rowing import POINT, asked, faults, rows, source, text, write_csv
 
-from service.export.blocks import SIZE
-from service.export.queries import Defaults
-from service.motion.errors import FileError
-from service.question.motion_question import ClipQuestion
-from service.synthesis import library
+from posefield.batch.rows.row_blocks import SIZE
+from posefield.batch.rows.row_sources import Defaults
+from posefield.common.errors import FileError
+from posefield.question.motion_question import ClipQuestion
+from posefield.registry import model_registry
 
 HEADING = "stature,hip_height,turn,target_height"
 ROW = "1.7,0.9,10,1.0"
@@ -18,7 +18,7 @@ ROW = "1.7,0.9,10,1.0"
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture

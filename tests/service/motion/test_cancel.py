@@ -10,8 +10,8 @@ import anyio
 import pytest
 from anyio import to_thread
 
-from service.motion import cancel
-from service.motion.cancel import Cancellation, Cancelled
+from posefield.common import cancellation as cancel
+from posefield.common.cancellation import Cancellation, Cancelled
 
 CALLS = 20_000
 CHEAP = 20.0

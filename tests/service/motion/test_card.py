@@ -6,25 +6,25 @@ from dataclasses import replace
 import numpy as np
 from model_cards import CARD
 
-from service.motion import card
-from service.motion.card import Making
+from posefield.model_file import model_card
+from posefield.model_file.model_card import Making
 
 
 def test_making_is_in_the_file_and_not_sent_to_clients():
-    entries = card.dump(CARD)
+    entries = model_card.dump(CARD)
     assert json.loads(entries["posefield.making"]) == {
         "fields": {"warp": [0.25, 0, 1]},
         "landmarks": {"peak": 0.4},
         "joint_weights": {"chest": 2.0},
         "in_phase": True,
     }
-    assert "making" not in card.plain_values(CARD)
+    assert "making" not in model_card.plain_values(CARD)
 
 
 def test_parameters_at_their_default_take_no_bytes():
-    few = card.dump(replace(CARD, making=Making({"warp": (0.25, 1)})))
+    few = model_card.dump(replace(CARD, making=Making({"warp": (0.25, 1)})))
     assert few["posefield.making"] == '{"fields": {"warp": [0.25, 1]}}'
-    assert card.dump(replace(CARD, making=Making()))["posefield.making"] == "{}"
+    assert model_card.dump(replace(CARD, making=Making()))["posefield.making"] == "{}"
     controls = json.loads(few["posefield.controls"])
     assert controls[0]["measure"] == {"quantity": "stature"}
     assert "measure" not in controls[1]
@@ -32,20 +32,20 @@ def test_parameters_at_their_default_take_no_bytes():
 
 def test_equal_cards_give_equal_text_in_equal_order():
     shuffled = replace(CARD, diagnostics=dict(reversed(list(CARD.diagnostics.items()))))
-    assert list(card.dump(shuffled).items()) == list(card.dump(CARD).items())
-    assert list(card.dump(CARD)) == sorted(card.dump(CARD))
-    assert card.dump(replace(CARD, rate=30.0)) != card.dump(CARD)
+    assert list(model_card.dump(shuffled).items()) == list(model_card.dump(CARD).items())
+    assert list(model_card.dump(CARD)) == sorted(model_card.dump(CARD))
+    assert model_card.dump(replace(CARD, rate=30.0)) != model_card.dump(CARD)
 
 
 def test_every_entry_is_json_under_the_prefix():
-    for key, value in card.dump(CARD).items():
+    for key, value in model_card.dump(CARD).items():
         assert key.startswith("posefield.")
         json.loads(value)
 
 
 def test_bones_are_written_to_the_micrometre():
     offsets = CARD.skeleton.offsets + 1.23456789e-5
-    entries = card.dump(replace(CARD, skeleton=replace(CARD.skeleton, offsets=offsets)))
+    entries = model_card.dump(replace(CARD, skeleton=replace(CARD.skeleton, offsets=offsets)))
     away = np.abs(np.array(json.loads(entries["posefield.skeleton"])["offsets"]) - offsets).max()
     assert 0.0 < away <= 0.5e-6
 

@@ -5,7 +5,7 @@ import hashlib
 import onnx
 import pytest
 
-from service.motion import checksum
+from posefield.model_file import checksum
 
 CONTENT = bytes(range(256)) * 4
 

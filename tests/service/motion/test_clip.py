@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from service.motion import clip, quat
-from service.motion.clip import Clip
-from service.motion.skeleton import Skeleton
+from posefield.motion import clip, quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
 
 CHAIN = Skeleton(
     ("root", "arm"),

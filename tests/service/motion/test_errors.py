@@ -4,8 +4,8 @@ import pickle
 
 import pytest
 
-from service.motion import errors
-from service.motion.errors import FileError, InvalidField, MotionError, WorkerDied
+from posefield.common import errors
+from posefield.common.errors import FileError, InvalidField, MotionError, WorkerDied
 
 
 def every(kind):

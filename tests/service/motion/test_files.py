@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from service.motion import files
-from service.motion.errors import FileError
+from posefield.common import atomic_files
+from posefield.common.errors import FileError
 
 ROOT = Path(__file__).parents[3]
 # The disk takes 1000 bytes of a file and no more.
 FULL_DISK = """
 import resource, sys
 from pathlib import Path
-from service.motion import files
-from service.motion.errors import FileError
+from posefield.common import atomic_files as files
+from posefield.common.errors import FileError
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 target = Path(sys.argv[1])
 try:
@@ -36,14 +36,14 @@ def on_a_full_disk(write, target):
 
 def test_content_arrives_and_replaces_what_was_there(tmp_path):
     target = tmp_path / "model.onnx"
-    files.write(b"first", target)
-    files.write(b"second", target)
+    atomic_files.write(b"first", target)
+    atomic_files.write(b"second", target)
     assert target.read_bytes() == b"second"
     assert list(tmp_path.iterdir()) == [target]
 
 
 def test_folders_on_the_way_are_made(tmp_path):
-    files.write(b"x", tmp_path / "a" / "b" / "clip.usda")
+    atomic_files.write(b"x", tmp_path / "a" / "b" / "clip.usda")
     assert (tmp_path / "a" / "b" / "clip.usda").read_bytes() == b"x"
 
 
@@ -51,7 +51,7 @@ def test_folders_on_the_way_are_made(tmp_path):
 def test_everyone_may_read_and_the_owner_write_whatever_the_mask(tmp_path, mask):
     before = os.umask(mask)
     try:
-        files.write(b"x", tmp_path / "model.onnx")
+        atomic_files.write(b"x", tmp_path / "model.onnx")
     finally:
         os.umask(before)
     assert (tmp_path / "model.onnx").stat().st_mode & 0o777 == 0o644
@@ -78,7 +78,7 @@ def test_place_that_cannot_be_taken_leaves_nothing_behind(tmp_path):
     taken = tmp_path / "model.onnx"
     (taken / "inside").mkdir(parents=True)
     with pytest.raises(FileError) as refusal:
-        files.write(b"x", taken)
+        atomic_files.write(b"x", taken)
     assert str(refusal.value) == f"{taken}: cannot be written: Is a directory"
     assert list(tmp_path.iterdir()) == [taken]
 
@@ -86,12 +86,12 @@ def test_place_that_cannot_be_taken_leaves_nothing_behind(tmp_path):
 def test_reader_never_sees_a_part(tmp_path):
     target = tmp_path / "model.onnx"
     contents = [bytes([i]) * 300_000 for i in (1, 2)]
-    files.write(contents[0], target)
+    atomic_files.write(contents[0], target)
     done = threading.Event()
 
     def keep_writing():
         for i in range(60):
-            files.write(contents[i % 2], target)
+            atomic_files.write(contents[i % 2], target)
         done.set()
 
     writer = threading.Thread(target=keep_writing)
@@ -112,13 +112,13 @@ def test_pieces_that_break_off_leave_the_old_file(tmp_path):
         raise RuntimeError("no more")
 
     with pytest.raises(RuntimeError, match="no more"):
-        files.stream(pieces(), target)
+        atomic_files.stream(pieces(), target)
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
 
 
 def fill(path, folder, word):
-    with files.replacing_pair(path, folder) as (file, inside):
+    with atomic_files.replacing_pair(path, folder) as (file, inside):
         file.write_text(word)
         (inside / word).write_text(word)
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export.measured import travel
-from model_export.sample import stroll
-from service.motion import measure, quat
-from service.motion.conventions import UP
-from service.motion.measure import Measure, Seen
+from posefield.common.units import UP
+from posefield.motion import measures, quat
+from posefield.motion.measures import Measure, Seen
+from posefield_train.sample import sample_walk
+from posefield_train.source.measured_controls import travel
 
 # Sums and roots of numbers near one, in double precision.
 ROUNDING = 1e-12
@@ -31,7 +31,7 @@ def thrown():
 
 
 def of(quantity, *joints, at=None, seen=None):
-    return measure.value(Measure(quantity, joints, at), thrown() if seen is None else seen)
+    return measures.value(Measure(quantity, joints, at), thrown() if seen is None else seen)
 
 
 def test_the_highest_moment_is_the_top_of_the_parabola():
@@ -95,48 +95,48 @@ INSENSITIVE = [
 def test_what_is_no_place_does_not_hang_on_where_it_happens(asked):
     seen = thrown()
     elsewhere = replace(seen, positions=seen.positions + np.array([3.0, 1.0, -7.0]))
-    assert measure.value(asked, elsewhere) == pytest.approx(measure.value(asked, seen), rel=1e-9)
+    assert measures.value(asked, elsewhere) == pytest.approx(measures.value(asked, seen), rel=1e-9)
 
 
-@pytest.mark.parametrize("at", [m for m in measure.MOMENTS if m != "landmark"])
-@pytest.mark.parametrize("quantity", measure.AXES)
+@pytest.mark.parametrize("at", [m for m in measures.MOMENTS if m != "landmark"])
+@pytest.mark.parametrize("quantity", measures.AXES)
 def test_a_place_moves_with_the_motion_and_its_moment_does_not(quantity, at):
     seen, way = thrown(), np.array([3.0, 1.0, -7.0])
     elsewhere = replace(seen, positions=seen.positions + way)
     gone = of(quantity, 1, at=at, seen=elsewhere) - of(quantity, 1, at=at)
-    assert gone == pytest.approx(way[measure.AXES[quantity]], abs=1e-9)
+    assert gone == pytest.approx(way[measures.AXES[quantity]], abs=1e-9)
 
 
 def strolled(speed, turn):
-    clip = stroll.stride(speed, turn, 0.02)
+    clip = sample_walk.stride(speed, turn, 0.02)
     gone = travel(clip.rotations[:, 0], clip.root_path)
-    offsets = stroll.SKELETON.offsets
-    return Seen(clip.positions(), clip.duration, gone, stroll.SKELETON.parents, offsets), clip
+    offsets = sample_walk.SKELETON.offsets
+    return Seen(clip.positions(), clip.duration, gone, sample_walk.SKELETON.parents, offsets), clip
 
 
 def test_a_stroll_is_as_fast_and_turns_as_much_as_it_was_made_to():
     for speed, turn in ((0.7, -0.5), (1.5, 0.0), (1.1, 0.2)):
         seen, _ = strolled(speed, turn)
-        assert measure.value(Measure("turn"), seen) == pytest.approx(np.degrees(turn), abs=1e-9)
+        assert measures.value(Measure("turn"), seen) == pytest.approx(np.degrees(turn), abs=1e-9)
         # Its way is the chord of an arc as long as its speed says.
         arc = speed * seen.duration
         chord = arc * np.sinc(turn / (2 * np.pi))
-        assert measure.value(Measure("stride_length"), seen) == pytest.approx(chord, abs=1e-9)
-        assert measure.value(Measure("speed"), seen) == pytest.approx(chord / seen.duration)
+        assert measures.value(Measure("stride_length"), seen) == pytest.approx(chord, abs=1e-9)
+        assert measures.value(Measure("speed"), seen) == pytest.approx(chord / seen.duration)
     assert arc - chord > 1e-3, "negative control: an arc is longer than its chord"
 
 
 def test_a_step_of_the_stroll_is_half_its_stride():
     seen, clip = strolled(1.1, 0.0)
     feet = Measure("step_length", (3, 6))
-    length = measure.value(Measure("stride_length"), seen)
+    length = measures.value(Measure("stride_length"), seen)
     # Walking straight, a foot that came down half a stride after the other is that far ahead, when
     # it has stopped; the frames of 1/60 s see that within what the foot moves in one.
-    assert measure.value(feet, seen) == pytest.approx(0.5 * length, rel=0.02)
+    assert measures.value(feet, seen) == pytest.approx(0.5 * length, rel=0.02)
     ahead = clip.positions()[:, 3, 2] - clip.positions()[:, 6, 2]
     assert abs(ahead.mean()) < 0.1 * length < np.abs(ahead).max(), "negative control"
     swapped = Measure("step_length", (6, 3))
-    assert measure.value(swapped, seen) == measure.value(feet, seen)
+    assert measures.value(swapped, seen) == measures.value(feet, seen)
 
 
 def test_heading_is_the_roots_own_and_not_its_sway():
@@ -163,13 +163,13 @@ def test_units_are_those_of_the_values(quantity, unit):
     ],
 )
 def test_a_measure_read_is_the_measure_written(asked):
-    assert measure.parse(measure.plain(asked)) == asked
-    assert all(value not in (None, []) for value in measure.plain(asked).values())
+    assert measures.parse(measures.plain(asked)) == asked
+    assert all(value not in (None, []) for value in measures.plain(asked).values())
 
 
 def test_a_measure_can_be_said():
     names = ("hips", "hand", "foot")
-    assert measure.words(Measure("turn"), names) == "turn"
-    assert measure.words(Measure("step_length", (1, 2)), names) == "step length of hand and foot"
+    assert measures.words(Measure("turn"), names) == "turn"
+    assert measures.words(Measure("step_length", (1, 2)), names) == "step length of hand and foot"
     at_end = Measure("height", (1,), "landmark", 0.254)
-    assert measure.words(at_end, names) == "height of hand at landmark (25%)"
+    assert measures.words(at_end, names) == "height of hand at landmark (25%)"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from service.motion import quat
+from posefield.motion import quat
 
 # A few roundings of numbers of size one.
 TOLERANCE = 1e-12

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from service.motion import quat, quat_planes
+from posefield.motion import quat, quat_planes
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from service.motion import quat, skeleton
-from service.motion.skeleton import Skeleton
+from posefield.motion import quat, skeleton
+from posefield.motion.skeleton import Skeleton
 
 PARENTS = (-1, 0, 1, 1, 3, 0)
 TOLERANCE = 1e-12

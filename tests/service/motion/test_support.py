@@ -5,7 +5,7 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF
 
-from service.motion import field, support
+from posefield.kriging import kriging_model, support
 
 CLOSE = 1e-9
 WIDE = np.array([2.0, 30.0, 0.5])
@@ -34,8 +34,8 @@ def judged(own, controls, points, scale=support.SCALE):
     """Variance (B,) by scikit-learn."""
     ends = controls.min(axis=0), controls.max(axis=0)
     process = GaussianProcessRegressor(RBF(scale), alpha=support.NUGGET, optimizer=None)
-    process.fit(field.half_ranges(controls, *ends), np.zeros(len(controls)))
-    return process.predict(field.half_ranges(points, *ends), return_std=True)[1] ** 2
+    process.fit(kriging_model.half_ranges(controls, *ends), np.zeros(len(controls)))
+    return process.predict(kriging_model.half_ranges(points, *ends), return_std=True)[1] ** 2
 
 
 def test_left_out_each_sample_is_as_the_others_support_it(own, controls):

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from service.question import body, words
-from service.question.model_question import SigmaQuestion, WhyQuestion
-from service.question.motion_question import FileQuestion, PoseQuestion
+from posefield.question import json_decoding, text_decoding
+from posefield.question.model_question import SigmaQuestion, WhyQuestion
+from posefield.question.motion_question import FileQuestion, PoseQuestion
 
 PAIRS = [("turn", "20"), ("stature", "1.7")]
 BODY = {"controls": {"stature": 1.7, "turn": 20}}
@@ -22,9 +22,9 @@ CASES = {
 @pytest.mark.parametrize("form", CASES)
 def test_every_way_to_ask_is_one_question(form):
     pairs, rest = [*PAIRS, *CASES[form][0]], {**BODY, **CASES[form][1]}
-    first = words.question(form, pairs)
-    assert words.question(form, pairs[::-1]) == first
-    assert body.question(form, json.dumps(rest).encode()) == first
-    assert body.question(form, json.dumps(dict(reversed(rest.items()))).encode()) == first
+    first = text_decoding.question(form, pairs)
+    assert text_decoding.question(form, pairs[::-1]) == first
+    assert json_decoding.question(form, json.dumps(rest).encode()) == first
+    assert json_decoding.question(form, json.dumps(dict(reversed(rest.items()))).encode()) == first
     other = [(key, "1.8" if key == "stature" else text) for key, text in pairs]
-    assert words.question(form, other) != first
+    assert text_decoding.question(form, other) != first

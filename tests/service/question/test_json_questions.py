@@ -7,9 +7,9 @@ from typing import Annotated
 import msgspec
 import pytest
 
-from service.motion.errors import FormError
-from service.question import body as bodies
-from service.question.motion_question import ClipsQuestion, FileQuestion
+from posefield.common.errors import FormError
+from posefield.question import json_decoding as bodies
+from posefield.question.motion_question import ClipsQuestion, FileQuestion
 
 
 class Inner(msgspec.Struct, forbid_unknown_fields=True):

@@ -3,11 +3,11 @@
 import msgspec
 import pytest
 
-from service.motion.errors import FormError, InvalidField
-from service.question import words
-from service.question.model_question import SigmaQuestion, WhyQuestion
-from service.question.motion_question import FileQuestion, PoseQuestion, Target
-from service.question.walk_question import WalkQuestion
+from posefield.common.errors import FormError, InvalidField
+from posefield.question import text_decoding
+from posefield.question.model_question import SigmaQuestion, WhyQuestion
+from posefield.question.motion_question import FileQuestion, PoseQuestion, Target
+from posefield.question.walk_question import WalkQuestion
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,8 @@ from service.question.walk_question import WalkQuestion
     ],
 )
 def test_words_are_targets(text, expected):
-    assert words.target(text) == expected
-    assert words.target("=".join(text.rsplit(":", 1))) == expected
+    assert text_decoding.target(text) == expected
+    assert text_decoding.target("=".join(text.rsplit(":", 1))) == expected
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_words_are_targets(text, expected):
 )
 def test_other_words_are_none(text):
     with pytest.raises(ValueError, match="expected JOINT@MOMENT:X,Y,Z, m; a moment is seconds or"):
-        words.target(text)
+        text_decoding.target(text)
 
 
 HAND = {"joint": "hand", "position": [0, 1.5, 2], "time": 1}
@@ -86,24 +86,24 @@ def test_other_values_are_none(found):
 
 
 def test_exact_controls_in_words():
-    assert words.exact("auto") == "auto"
-    assert words.exact("none") == "none"
-    assert words.exact("speed") == ("speed",)
-    assert words.exact("speed,turn") == ("speed", "turn")
+    assert text_decoding.exact("auto") == "auto"
+    assert text_decoding.exact("none") == "none"
+    assert text_decoding.exact("speed") == ("speed",)
+    assert text_decoding.exact("speed,turn") == ("speed", "turn")
     for text in ("", ",", "speed,"):
         with pytest.raises(ValueError, match="expected auto, none or names"):
-            words.exact(text)
+            text_decoding.exact(text)
 
 
 def test_a_name_that_is_no_parameter_is_a_control():
     pairs = [("turn", "3"), ("fps", "24"), ("loop", "true"), ("unit", "cm")]
     pairs += [("target", "a@end:1,2,3"), ("target", "b@0.5:1,2,3")]
-    found = words.question(FileQuestion, pairs)
+    found = text_decoding.question(FileQuestion, pairs)
     targets = (Target("a", (1, 2, 3), at="end"), Target("b", (1, 2, 3), time=0.5))
     assert found == FileQuestion(
         controls={"turn": 3}, fps=24, loop=True, unit="cm", targets=targets
     )
-    assert found.corrects and not words.question(FileQuestion, [("turn", "3")]).corrects
+    assert found.corrects and not text_decoding.question(FileQuestion, [("turn", "3")]).corrects
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_a_name_that_is_no_parameter_is_a_control():
 )
 def test_words_that_are_no_question_are_named(form, pairs, said):
     with pytest.raises(FormError, match=said):
-        words.question(form, pairs)
+        text_decoding.question(form, pairs)
 
 
 @pytest.mark.parametrize(
@@ -139,5 +139,5 @@ def test_words_that_are_no_question_are_named(form, pairs, said):
 )
 def test_a_question_checks_itself(form, pairs, field):
     with pytest.raises(InvalidField) as fault:
-        words.question(form, pairs)
+        text_decoding.question(form, pairs)
     assert fault.value.field == field

@@ -5,21 +5,22 @@ from contextvars import copy_context
 
 import pytest
 
-from service.encode import ENCODERS
-from service.encode.crowd import writer
-from service.export import pack
-from service.motion import cancel
-from service.motion.cancel import Cancellation, Cancelled
-from service.question import body as bodies
-from service.question.model_question import SigmaQuestion, SuggestQuestion
-from service.question.motion_question import ClipQuestion, FileQuestion
-from service.synthesis import clips, crowd, library
-from service.synthesis.grid import grid
-from service.synthesis.suggest import suggest
-from service.synthesis.walk import gait, order
-from service.synthesis.walk.order import Order
-from service.web import clips_query, crowd_query
-from service.web.settings import Settings
+from posefield.batch import clip_archive
+from posefield.common import cancellation
+from posefield.common.cancellation import Cancellation, Cancelled
+from posefield.encode.formats import ENCODERS
+from posefield.encode.usd_crowd import crowd_writer
+from posefield.http.api.settings import Settings
+from posefield.http.decoding import clips_query, crowd_query
+from posefield.locomotion import crowd_order, gait
+from posefield.locomotion.crowd_order import Order
+from posefield.question import json_decoding as bodies
+from posefield.question.model_question import SigmaQuestion, SuggestQuestion
+from posefield.question.motion_question import ClipQuestion, FileQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips, crowd_synthesis
+from posefield.synthesis.capture_suggestions import suggest
+from posefield.synthesis.sigma_grid import grid
 
 
 class Counted(Cancellation):
@@ -38,12 +39,12 @@ class Counted(Cancellation):
 
 @pytest.fixture(scope="module")
 def reaching(model_path):
-    return library.load([model_path]).models["reaching"]
+    return model_registry.load([model_path]).models["reaching"]
 
 
 @pytest.fixture(scope="module")
 def walk(walk_path):
-    return library.load([walk_path]).models["stroll"]
+    return model_registry.load([walk_path]).models["stroll"]
 
 
 def controls(model):
@@ -83,24 +84,24 @@ def archived(model, walk):
     """An archive of clips."""
     asked = {"format": "usdc", "clips": [{"controls": controls(model)}] * 20}
     found = clips_query.order(model, ENCODERS, json.dumps(asked).encode(), Settings())
-    return list(pack.members(found))
+    return list(clip_archive.members(found))
 
 
 def crowded(model, walk):
     """Poses of a crowd."""
     asked = {"controls": controls(model), "time": [0.1] * 20_000}
-    return crowd.poses(model, crowd_query.of_body(json.dumps(asked).encode(), 1e6))
+    return crowd_synthesis.poses(model, crowd_query.of_body(json.dumps(asked).encode(), 1e6))
 
 
 def planned(model, walk):
     """The plan of a crowd that walks."""
-    return order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=10.0))
+    return crowd_order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=10.0))
 
 
 def walked(model, walk):
     """A crowd that walks, as USD."""
-    made = order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=1.0))
-    return list(writer.stream(made, "usdc"))
+    made = crowd_order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=1.0))
+    return list(crowd_writer.stream(made, "usdc"))
 
 
 def several(model, walk):
@@ -116,7 +117,7 @@ WORK = [solved, solved_open, mapped, suggested, archived, crowded, planned, walk
 @pytest.mark.parametrize("last", [1, 6])
 def test_work_stops_when_it_is_cancelled(work, last, reaching, walk):
     own, context = Counted(last), copy_context()
-    context.run(cancel.current.set, own)
+    context.run(cancellation.current.set, own)
     with pytest.raises(Cancelled):
         context.run(work, reaching, walk)
     # Several threads of one crowd may look before the first of them has ended.
@@ -126,6 +127,6 @@ def test_work_stops_when_it_is_cancelled(work, last, reaching, walk):
 @pytest.mark.parametrize("work", [solved, mapped, walked], ids=lambda work: work.__name__)
 def test_work_that_is_not_cancelled_goes_on(work, reaching, walk):
     own, context = Counted(10**9), copy_context()
-    context.run(cancel.current.set, own)
+    context.run(cancellation.current.set, own)
     assert context.run(work, reaching, walk) is not None
     assert own.looks > 6

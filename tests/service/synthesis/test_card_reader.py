@@ -6,10 +6,9 @@ import re
 import pytest
 from model_cards import CARD
 
-from service.motion import card
-from service.synthesis import card_reader, onnx_check
+from posefield.model_file import card_reader, model_card, onnx_check
 
-WRITTEN = {key: text.encode() for key, text in card.dump(CARD).items()}
+WRITTEN = {key: text.encode() for key, text in model_card.dump(CARD).items()}
 
 
 def changed(path, value):
@@ -33,7 +32,7 @@ def refusal(entries):
 
 def test_a_card_read_is_the_card_written():
     read = card_reader.decode(WRITTEN)
-    assert {key: text.encode() for key, text in card.dump(read).items()} == WRITTEN
+    assert {key: text.encode() for key, text in model_card.dump(read).items()} == WRITTEN
     # To the last bit: weights are computed with them.
     assert read.kriging.scales.tolist() == CARD.kriging.scales.tolist()
     assert (read.levels, read.controls, read.making) == (CARD.levels, CARD.controls, CARD.making)
@@ -44,8 +43,8 @@ def test_a_card_read_is_the_card_written():
 )
 def test_what_training_writes_is_read_without_loss(model, request):
     entries = onnx_check.check(request.getfixturevalue(model).read_bytes()).metadata
-    own = {key: text for key, text in entries.items() if key.startswith(card.PREFIX)}
-    read = card.dump(card_reader.decode(entries))
+    own = {key: text for key, text in entries.items() if key.startswith(model_card.PREFIX)}
+    read = model_card.dump(card_reader.decode(entries))
     assert {key: text.encode() for key, text in read.items()} == own
 
 

@@ -5,13 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from service.motion import quat
-from service.motion.conventions import UP
-from service.motion.errors import InvalidField
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, library, poses
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.walk import plane, stride
+from posefield.common.errors import InvalidField
+from posefield.common.units import UP
+from posefield.locomotion import floor_plane, stride
+from posefield.motion import quat
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 STROLL = {"haste": 4.0, "veer": 400.0}
@@ -21,12 +22,12 @@ FLOAT32 = 1e-5
 
 @pytest.fixture(scope="module")
 def walker(walk_path):
-    return library.load([walk_path]).models["stroll"]
+    return model_registry.load([walk_path]).models["stroll"]
 
 
 @pytest.fixture(scope="module")
 def reacher(model_path):
-    return library.load([model_path]).models["reaching"]
+    return model_registry.load([model_path]).models["reaching"]
 
 
 def clip(model, controls, **asked):
@@ -104,7 +105,7 @@ def test_a_cycle_in_place_is_posed_as_in_crowds(walker):
     crowd = stride.poses(walker.session, np.tile(point, (count, 1)), labels, phases)
     own = stride.strides(walker.session, point, labels[:1])
     assert np.abs(found.rotations - crowd.rotations).max() < FLOAT32
-    assert np.abs(plane.of(found.root_path) - own.starts - crowd.places).max() < FLOAT32
+    assert np.abs(floor_plane.of(found.root_path) - own.starts - crowd.places).max() < FLOAT32
     assert np.abs(found.root_path[:, 1] - crowd.heights).max() < FLOAT32
 
 

@@ -6,14 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.motion import quat, skeleton
-from service.motion.conventions import UP
-from service.motion.crowd import Placement
-from service.motion.errors import InvalidField, OutsideSamples
-from service.question.motion_question import PoseQuestion
-from service.synthesis import crowd, library, poses
-from service.synthesis.crowd_question import Blending, CrowdQuestion
-from service.synthesis.view import Camera, View
+from posefield.common.errors import InvalidField, OutsideSamples
+from posefield.common.units import UP
+from posefield.inference.level_selection import Camera, View
+from posefield.motion import quat, skeleton
+from posefield.motion.crowd_clip import Placement
+from posefield.question.motion_question import PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import crowd_synthesis, poses
+from posefield.validation.crowd_question import Blending, CrowdQuestion
 
 COUNT = 60
 # The graph answers in float32, and sums a batch in another order than one row; m.
@@ -22,12 +23,12 @@ FLOAT32 = 3e-5
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture(scope="module")
 def walk(walk_path):
-    return next(iter(library.load([walk_path]).models.values()))
+    return next(iter(model_registry.load([walk_path]).models.values()))
 
 
 def asked(model, count=COUNT, **given):
@@ -77,7 +78,7 @@ def alone(model, question, row):
 
 def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     question = asked(model)
-    found = crowd.poses(model, question)
+    found = crowd_synthesis.poses(model, question)
     places = of(model, found)
     for row in range(COUNT):
         expected, trust = alone(model, question, row)
@@ -90,18 +91,18 @@ def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     assert found.error_px is None and found.warnings == ()
     # Negative controls: another heading, and another level.
     turned = replace(question.placement, headings=question.placement.headings + 0.01)
-    others = crowd.poses(model, replace(question, placement=turned))
+    others = crowd_synthesis.poses(model, replace(question, placement=turned))
     assert np.abs(of(model, others) - places).max(axis=(1, 2)).min() > 10 * FLOAT32
-    finest = crowd.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
+    finest = crowd_synthesis.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
     changed = np.abs(of(model, finest) - places).max(axis=(1, 2)) > 10 * FLOAT32
     assert np.array_equal(changed, question.detail > 0)
 
 
 def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
-    question = asked(model, 3 * crowd.BATCH + 7)
-    whole = crowd.poses(model, question)
-    rows = np.array([0, 1, crowd.BATCH, 2 * crowd.BATCH + 5, len(question) - 1])
-    part = crowd.poses(
+    question = asked(model, 3 * crowd_synthesis.BATCH + 7)
+    whole = crowd_synthesis.poses(model, question)
+    rows = np.array([0, 1, crowd_synthesis.BATCH, 2 * crowd_synthesis.BATCH + 5, len(question) - 1])
+    part = crowd_synthesis.poses(
         model,
         replace(
             question,
@@ -121,7 +122,7 @@ def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
 
 def test_the_same_crowd_is_the_same_bytes(model):
     question = asked(model, 2_000)
-    once, again = crowd.poses(model, question), crowd.poses(model, question)
+    once, again = crowd_synthesis.poses(model, question), crowd_synthesis.poses(model, question)
     for name in ("rotations", "root_position", "bone_offsets", "sigma"):
         assert getattr(once, name).tobytes() == getattr(again, name).tobytes()
 
@@ -133,11 +134,11 @@ def test_in_place_a_cycle_goes_nowhere(walk):
     still = replace(
         question, times=np.zeros(count), placement=Placement(np.zeros((count, 3)), np.zeros(count))
     )
-    begin = crowd.poses(walk, still)
+    begin = crowd_synthesis.poses(walk, still)
     late = replace(still, times=begin.duration.astype(float))
-    end = crowd.poses(walk, late)
+    end = crowd_synthesis.poses(walk, late)
     assert np.abs(of(walk, end) - of(walk, begin)).max() < 1e-4
-    gone = crowd.poses(walk, replace(late, root="travelling"))
+    gone = crowd_synthesis.poses(walk, replace(late, root="travelling"))
     assert card.cyclic and np.abs(gone.root_position - end.root_position).max(axis=1).min() > 0.3
 
 
@@ -150,7 +151,7 @@ def test_levels_are_those_that_the_camera_asks_for(model):
         placement=Placement(positions, np.zeros(COUNT)),
         detail=View(camera, 1.0, None, None),
     )
-    found = crowd.poses(model, question)
+    found = crowd_synthesis.poses(model, question)
     assert found.levels.tolist() == sorted(found.levels.tolist())
     assert {0, 3} < set(found.levels)
     errors = np.array([level.pose for level in model.session.card.levels])
@@ -174,14 +175,14 @@ def test_what_the_viewer_sees_of_a_level_is_less_than_the_limit(model):
     )
     placed = Placement(positions, np.zeros(count))
     question = asked(model, count, placement=placed, detail=View(camera, 1.0, None, None))
-    seen = crowd.poses(model, question)
-    finest = crowd.poses(model, replace(question, detail=np.zeros(count, dtype=int)))
+    seen = crowd_synthesis.poses(model, question)
+    finest = crowd_synthesis.poses(model, replace(question, detail=np.zeros(count, dtype=int)))
     gaps = np.linalg.norm(of(model, seen) - of(model, finest), axis=-1)
     distances = np.linalg.norm(of(model, finest) - camera.position, axis=-1)
     pixels = gaps / distances * camera.pixels
     assert np.sqrt(np.mean(np.square(pixels), axis=1)).max() < 1.0
     assert np.mean(pixels > 1.0) < 0.02
-    coarsest = crowd.poses(model, replace(question, detail=np.full(count, 3)))
+    coarsest = crowd_synthesis.poses(model, replace(question, detail=np.full(count, 3)))
     gaps = np.linalg.norm(of(model, coarsest) - of(model, finest), axis=-1)
     assert np.mean(gaps / distances * camera.pixels > 1.0) > 0.04
 
@@ -190,26 +191,26 @@ def test_a_budget_is_kept_and_said(model):
     camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
     view = View(camera, 0.01, None, None)
     question = asked(model, placement=Placement(np.zeros((COUNT, 3)), np.zeros(COUNT)), detail=view)
-    free = crowd.poses(model, question)
+    free = crowd_synthesis.poses(model, question)
     assert set(free.levels) == {0}
     costs = model.ladder.costs
     if costs[-1] == costs[0]:
         pytest.skip("this machine takes as long for every level")
     tight = COUNT * float(costs[-1]) * 1.001
-    bound = crowd.poses(model, replace(question, detail=replace(view, budget=tight)))
+    bound = crowd_synthesis.poses(model, replace(question, detail=replace(view, budget=tight)))
     assert float(np.sum(costs[bound.levels])) <= tight
     assert len(bound.warnings) == 1 and "budget" in bound.warnings[0]
 
 
 def test_who_is_between_two_levels_is_between_their_poses(model):
     question = asked(model, detail=np.full(COUNT, 3))
-    before = crowd.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
-    after = crowd.poses(model, question)
+    before = crowd_synthesis.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
+    after = crowd_synthesis.poses(model, question)
 
     def mixed(share):
         shares = np.full(COUNT, share)
         blending = Blending(np.zeros(COUNT, dtype=int), shares)
-        return of(model, crowd.poses(model, replace(question, blending=blending)))
+        return of(model, crowd_synthesis.poses(model, replace(question, blending=blending)))
 
     assert np.abs(mixed(1.0) - of(model, after)).max() < FLOAT32
     assert np.abs(mixed(0.0) - of(model, before)).max() < FLOAT32
@@ -221,7 +222,7 @@ def test_who_is_between_two_levels_is_between_their_poses(model):
         assert np.median(way[moved] / whole[moved]) == pytest.approx(0.5, abs=0.02)
         assert np.all(way[moved] < 0.75 * whole[moved])
     assert np.linalg.norm(
-        crowd.poses(
+        crowd_synthesis.poses(
             model,
             replace(question, blending=Blending(np.zeros(COUNT, dtype=int), np.full(COUNT, 0.3))),
         ).rotations,
@@ -241,7 +242,7 @@ def test_who_is_on_the_way_goes_to_no_third_level(model):
         detail=view,
         blending=Blending(np.full(COUNT, 3), shares),
     )
-    found = crowd.poses(model, question)
+    found = crowd_synthesis.poses(model, question)
     assert set(found.levels[shares < 1.0]) == {2}
     assert set(found.levels[shares == 1.0]) == {0}
 
@@ -274,7 +275,7 @@ def broken(model, field, row, value):
 )
 def test_what_is_wrong_with_one_character_names_it(model, field, value, said):
     with pytest.raises(InvalidField, match=said) as caught:
-        crowd.poses(model, broken(model, field, 17, value))
+        crowd_synthesis.poses(model, broken(model, field, 17, value))
     assert (caught.value.field, caught.value.index) == (field, 17)
 
 
@@ -284,7 +285,7 @@ def test_controls_that_make_no_sense_name_the_first_character(model):
     far = turn.maximum + 99.0 * (turn.maximum - turn.minimum)
     question = broken(model, "controls/turn", 5, far)
     try:
-        crowd.poses(model, question)
+        crowd_synthesis.poses(model, question)
     except OutsideSamples as refusal:
         assert refusal.index == 5
 
@@ -293,17 +294,17 @@ def test_missing_and_unknown_controls_are_named(model):
     question = asked(model)
     fewer = {name: values for name, values in question.controls.items() if name != "turn"}
     with pytest.raises(InvalidField, match="controls/turn: missing"):
-        crowd.poses(model, replace(question, controls=fewer))
+        crowd_synthesis.poses(model, replace(question, controls=fewer))
     more = {**question.controls, "mood": np.zeros(COUNT)}
     with pytest.raises(InvalidField, match="controls/mood: no such control"):
-        crowd.poses(model, replace(question, controls=more))
+        crowd_synthesis.poses(model, replace(question, controls=more))
 
 
 def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     high = model.session.card.control("stature").maximum
     question = broken(model, "controls/stature", 9, high + 0.05)
-    assert crowd.poses(model, question).warnings == ()
-    found = crowd.poses(model, replace(question, extrapolate="warn"))
+    assert crowd_synthesis.poses(model, question).warnings == ()
+    found = crowd_synthesis.poses(model, replace(question, extrapolate="warn"))
     outside, gap = found.warnings
     assert "stature of 1 characters" in outside
     assert "the first is character 9" in outside
@@ -311,15 +312,15 @@ def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     assert f"{np.count_nonzero(beside)} characters; the first, " in gap
     assert f"character {int(np.argmax(beside))}, lies in a gap" in gap
     with pytest.raises(OutsideSamples, match="the first is character 9") as caught:
-        crowd.poses(model, replace(question, extrapolate="refuse"))
+        crowd_synthesis.poses(model, replace(question, extrapolate="refuse"))
     assert (caught.value.field, caught.value.index) == ("controls/stature", 9)
 
 
 def test_gaps_alone_are_refused_too(model):
     question = replace(asked(model), extrapolate="refuse")
-    first = int(np.argmin(crowd.poses(model, asked(model)).supported))
+    first = int(np.argmin(crowd_synthesis.poses(model, asked(model)).supported))
     with pytest.raises(OutsideSamples, match="in a gap") as caught:
-        crowd.poses(model, question)
+        crowd_synthesis.poses(model, question)
     assert (caught.value.field, caught.value.index) == ("controls", first)
 
 
@@ -327,10 +328,13 @@ def test_a_heading_of_many_turns_is_the_one_within_a_turn(model):
     question = asked(model)
     turns = 2.0 * np.pi * np.arange(COUNT)
     wound = replace(question.placement, headings=question.placement.headings + 1e4 * turns)
-    found = crowd.poses(model, replace(question, placement=wound))
-    assert np.abs(of(model, found) - of(model, crowd.poses(model, question))).max() < 10 * FLOAT32
+    found = crowd_synthesis.poses(model, replace(question, placement=wound))
+    assert (
+        np.abs(of(model, found) - of(model, crowd_synthesis.poses(model, question))).max()
+        < 10 * FLOAT32
+    )
     endless = replace(question.placement, headings=np.full(COUNT, 1e300))
-    far = crowd.poses(model, replace(question, placement=endless))
+    far = crowd_synthesis.poses(model, replace(question, placement=endless))
     assert np.isfinite(far.rotations).all()
 
 
@@ -338,13 +342,13 @@ def test_who_lets_the_camera_choose_need_not_know_the_levels_end(model):
     camera = Camera(np.array([0.0, 1.7, -4.0]), math.radians(60.0), 1080.0)
     placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
     seen = asked(model, placement=placed, detail=View(camera, 1.0, None, None))
-    late = 1.05 * crowd.poses(model, seen).duration.astype(float)
-    assert set(crowd.poses(model, replace(seen, times=late)).levels) == {0}
+    late = 1.05 * crowd_synthesis.poses(model, seen).duration.astype(float)
+    assert set(crowd_synthesis.poses(model, replace(seen, times=late)).levels) == {0}
     numbered = replace(seen, times=late, detail=np.zeros(COUNT, dtype=int))
     with pytest.raises(InvalidField, match="s, expected 0 to"):
-        crowd.poses(model, numbered)
+        crowd_synthesis.poses(model, numbered)
     with pytest.raises(InvalidField, match="s, expected 0 to"):
-        crowd.poses(model, replace(seen, times=1.2 * late))
+        crowd_synthesis.poses(model, replace(seen, times=1.2 * late))
 
 
 def test_a_budget_counts_who_is_on_the_way(model):
@@ -353,11 +357,13 @@ def test_a_budget_counts_who_is_on_the_way(model):
     view = View(camera, 1.0, 1e-9, held)
     blending = Blending(np.ones(COUNT, dtype=int), np.full(COUNT, 0.5))
     placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
-    found = crowd.poses(model, asked(model, placement=placed, detail=view, blending=blending))
+    found = crowd_synthesis.poses(
+        model, asked(model, placement=placed, detail=view, blending=blending)
+    )
     assert set(found.levels) == {0} and found.warnings == ()
     shares = np.where(np.arange(COUNT) % 2, 1.0, 0.5)
     some = replace(blending, shares=shares)
-    found = crowd.poses(model, asked(model, placement=placed, detail=view, blending=some))
+    found = crowd_synthesis.poses(model, asked(model, placement=placed, detail=view, blending=some))
     assert set(found.levels[shares == 1.0]) == {3} and "budget" in found.warnings[0]
 
 
@@ -371,4 +377,4 @@ def test_a_camera_in_a_character_names_it(model):
         detail=View(inside, 1.0, None, None),
     )
     with pytest.raises(InvalidField, match="inside character 23"):
-        crowd.poses(model, question)
+        crowd_synthesis.poses(model, question)

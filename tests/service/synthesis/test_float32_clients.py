@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from service.motion.errors import InvalidField
-from service.question.motion_question import ClipQuestion, PoseQuestion, Target
-from service.synthesis import clips, library, poses
-from service.synthesis.synthesizer import Synthesizer
+from posefield.common.errors import InvalidField
+from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
+from posefield.registry import model_registry
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 POINTS = 40
 # Single precision has 24 bits: two steps above a number lie beyond its rounding.
@@ -16,7 +17,7 @@ STEPS = 2
 @pytest.fixture(scope="module", params=["model_path", "walk_path"])
 def model(request) -> Synthesizer:
     path = request.getfixturevalue(request.param)
-    return library.load([path]).models[path.stem]
+    return model_registry.load([path]).models[path.stem]
 
 
 def sampled(model, rng):

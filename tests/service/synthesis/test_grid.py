@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from service.motion.errors import InvalidField
-from service.question.model_question import SigmaQuestion
-from service.question.motion_question import PoseQuestion
-from service.synthesis import library, poses
-from service.synthesis.grid import BATCH, grid
+from posefield.common.errors import InvalidField
+from posefield.question.model_question import SigmaQuestion
+from posefield.question.motion_question import PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import poses
+from posefield.synthesis.sigma_grid import BATCH, grid
 
 ASKED = SigmaQuestion(
     across="turn",
@@ -23,7 +24,7 @@ ASKED = SigmaQuestion(
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).find("labelled")
+    return model_registry.load([labelled_path]).find("labelled")
 
 
 def test_each_point_is_the_sigma_of_an_answer(model):

@@ -2,11 +2,11 @@
 
 import pytest
 
-from service.motion.answer import Met
-from service.motion.errors import OutOfReach
-from service.motion.measure import Measure
-from service.synthesis.exact import missed
-from service.synthesis.exact.goals import Goal, Goals
+from posefield.common.errors import OutOfReach
+from posefield.constraints.targets import Goal, Goals
+from posefield.motion.measures import Measure
+from posefield.question.results import Met
+from posefield.synthesis import synthesizer
 
 HIGH = Measure("height", (3,), "highest")
 GOALS = Goals((("speed", Measure("speed"), 2.0),), (Goal("hand at 1 s", HIGH, (0, 0, 0), 1.0),))
@@ -16,11 +16,11 @@ FINE = Met("hand at 1 s", 1e-6, "m", True)
 
 
 def test_each_miss_is_a_sentence():
-    assert missed.sentences([SLOW, SHORT]) == (
+    assert synthesizer.sentences([SLOW, SHORT]) == (
         "speed stays 0.123 m/s from its target: out of reach",
         "hand at 1 s stays 12.3 cm from its target: out of reach",
     )
-    assert missed.sentences([FINE]) == ()
+    assert synthesizer.sentences([FINE]) == ()
 
 
 @pytest.mark.parametrize(
@@ -33,10 +33,10 @@ def test_each_miss_is_a_sentence():
 )
 def test_the_first_miss_is_named(met, field):
     with pytest.raises(OutOfReach) as caught:
-        missed.refuse(GOALS, met)
+        synthesizer.refuse(GOALS, met)
     assert caught.value.field == field
-    assert caught.value.message == "; ".join(missed.sentences(met))
+    assert caught.value.message == "; ".join(synthesizer.sentences(met))
 
 
 def test_what_is_met_is_not_refused():
-    assert missed.refuse(GOALS, [Met("speed", 0.0, "m/s", True), FINE]) is None
+    assert synthesizer.refuse(GOALS, [Met("speed", 0.0, "m/s", True), FINE]) is None

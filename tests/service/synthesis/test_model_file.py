@@ -7,9 +7,8 @@ import onnx
 import pytest
 from model_files import numbered, written
 
-from service.motion import checksum
-from service.motion.errors import ModelError
-from service.synthesis import model_file
+from posefield.common.errors import ModelError
+from posefield.model_file import checked_file, checksum
 
 DAMAGED = 500
 
@@ -21,15 +20,15 @@ def content(labelled_path):
 
 def refusal(content):
     with pytest.raises(ModelError) as caught:
-        model_file.checked(content, "some.onnx")
+        checked_file.checked(content, "some.onnx")
     assert caught.value.path == "some.onnx"
     assert "\n" not in caught.value.message
     return caught.value.message
 
 
 def test_a_good_file_passes(content):
-    card = model_file.checked(content, "some.onnx")
-    assert model_file.checked(numbered(content, 7), "other").name == card.name
+    card = checked_file.checked(content, "some.onnx")
+    assert checked_file.checked(numbered(content, 7), "other").name == card.name
 
 
 def flipped(content, rng):
@@ -60,30 +59,30 @@ def test_every_damaged_file_is_refused(content, rng, damage):
         damaged = damage(content, rng)
         if damaged != content:
             tried += 1
-            assert refusal(damaged) == model_file.UNSEALED
+            assert refusal(damaged) == checked_file.UNSEALED
 
 
 def test_a_file_that_another_program_has_changed_is_refused(content):
     """As optimizers do it: the same answers, another graph."""
     model = onnx.load_from_string(content)
     model.graph.name = "optimized"
-    assert refusal(model.SerializeToString()) == model_file.UNSEALED
+    assert refusal(model.SerializeToString()) == checked_file.UNSEALED
     model.metadata_props.add(key="optimizer", value="1.0")
-    assert refusal(model.SerializeToString()) == model_file.UNSEALED
+    assert refusal(model.SerializeToString()) == checked_file.UNSEALED
 
 
 @pytest.mark.parametrize("after", [b"\n", onnx.ModelProto(producer_name="x").SerializeToString()])
 def test_bytes_after_the_checksum_are_refused(content, after):
-    assert refusal(content + after) == model_file.UNSEALED
+    assert refusal(content + after) == checked_file.UNSEALED
 
 
 def test_a_file_from_before_checksums_is_refused(content):
-    assert refusal(content[: -checksum.SIZE]) == model_file.UNSEALED
+    assert refusal(content[: -checksum.SIZE]) == checked_file.UNSEALED
 
 
 def test_a_foreign_model_is_refused():
     foreign = onnx.ModelProto(producer_name="other", ir_version=8).SerializeToString()
-    assert refusal(foreign) == model_file.UNSEALED
+    assert refusal(foreign) == checked_file.UNSEALED
     said = "no posefield metadata: it was not written by posefield"
     assert refusal(checksum.sealed(foreign + graph_of_nothing())) == said
 
@@ -96,8 +95,8 @@ def graph_of_nothing():
 
 @pytest.mark.parametrize("found", [b"", b"no model", bytes(range(256)) * 8, b"\0" * 4096])
 def test_something_else_is_refused(found):
-    assert refusal(found) == model_file.UNSEALED
-    assert refusal(checksum.sealed(found)) != model_file.UNSEALED
+    assert refusal(found) == checked_file.UNSEALED
+    assert refusal(checksum.sealed(found)) != checked_file.UNSEALED
 
 
 @pytest.mark.parametrize(
@@ -151,12 +150,12 @@ def test_a_skeleton_of_other_joints_than_the_graph_is_refused(content):
 
 def test_a_file_is_read(tmp_path, content):
     (tmp_path / "good.onnx").write_bytes(content)
-    assert model_file.read(tmp_path / "good.onnx") == content
+    assert checked_file.read(tmp_path / "good.onnx") == content
 
 
 def unreadable(path):
     with pytest.raises(ModelError) as caught:
-        model_file.read(path)
+        checked_file.read(path)
     return caught.value.message
 
 
@@ -176,4 +175,4 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
         file.truncate(100 << 30)
     said = "cannot be read: 107374182400 bytes, expected at most 67108864"
     assert unreadable(path) == said
-    assert "expected at most 67108864" in refusal(bytes(model_file.MOST_BYTES + 1))
+    assert "expected at most 67108864" in refusal(bytes(checked_file.MOST_BYTES + 1))

@@ -4,11 +4,12 @@ import pytest
 import stores
 from model_files import numbered
 
-from service.motion.errors import ModelError
-from service.synthesis import library, model_file
-from service.synthesis.library import Bounds
-from service.synthesis.objects import connect
-from service.synthesis.shelf import Shelf
+from posefield.common.errors import ModelError
+from posefield.model_file import checked_file
+from posefield.registry import model_registry
+from posefield.registry.model_registry import Bounds
+from posefield.registry.model_reload import Shelf
+from posefield.registry.object_store import connect
 
 pytestmark = pytest.mark.usefixtures("store_environment")
 
@@ -27,7 +28,7 @@ def put(url, model_path):
     def at(name, number):
         content = numbered(plain, number)
         store.put(name, content)
-        return model_file.digest(content)
+        return checked_file.digest(content)
 
     return at
 
@@ -40,13 +41,13 @@ def test_models_are_named_as_in_a_folder(put, url):
     shelf = Shelf([url], Bounds())
     assert sorted(shelf.library.models) == ["reach", "walk"]
     assert [m.session.digest for m in shelf.library.versions("reach")] == [new, old]
-    assert sorted(library.load([f"{url}/"]).models) == ["reach", "walk"]
+    assert sorted(model_registry.load([f"{url}/"]).models) == ["reach", "walk"]
 
 
 def test_one_object_is_a_model(put, url):
     digest = put("walk.onnx", 1)
     put("reach.onnx", 2)
-    (model,) = library.load([f"{url}/walk.onnx"]).models.values()
+    (model,) = model_registry.load([f"{url}/walk.onnx"]).models.values()
     assert model.identity == f"walk@{digest}"
 
 
@@ -74,9 +75,9 @@ def test_a_broken_object_leaves_the_old_one(put, url):
 
 def test_a_bucket_that_is_not_there_is_refused(url):
     with pytest.raises(ModelError, match="cannot be read"):
-        library.load(["s3://no-such-bucket-anywhere/models"])
+        model_registry.load(["s3://no-such-bucket-anywhere/models"])
     with pytest.raises(ModelError, match=r"no \.onnx object under this URL"):
-        library.load([url])
+        model_registry.load([url])
 
 
 def test_a_store_that_has_become_empty_leaves_what_there_was(put, url):
@@ -105,8 +106,8 @@ def test_a_store_that_cannot_be_reached_leaves_what_there_was(model_path, tmp_pa
 
 def test_a_url_of_no_store_is_refused():
     with pytest.raises(ModelError, match="cannot be read"):
-        library.load(["nonsense://somewhere/models"])
+        model_registry.load(["nonsense://somewhere/models"])
 
 
 def test_a_url_of_a_file_is_a_path(model_path):
-    assert library.load([model_path.as_uri()]).models.keys() == {model_path.stem}
+    assert model_registry.load([model_path.as_uri()]).models.keys() == {model_path.stem}

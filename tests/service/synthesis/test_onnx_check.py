@@ -7,11 +7,10 @@ import onnx
 import pytest
 from onnx import TensorProto
 
-from model_export.covariance import COVARIANCES
-from model_export.net import Net
-from service.motion import checksum
-from service.motion.errors import ModelError
-from service.synthesis import model_file, onnx_check
+from posefield.common.errors import ModelError
+from posefield.model_file import checked_file, checksum, onnx_check
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.onnx_graph.graph_builder import Net
 
 MODELS = ("model_path", "labelled_path", "walk_path", "measured_walk_path")
 
@@ -132,7 +131,7 @@ def test_a_constant_of_another_shape_than_its_bytes_is_refused(model_path, shape
     model = onnx.load(model_path)
     weight(model, "core").dims[:] = shape
     with pytest.raises(ModelError):
-        model_file.checked(model_files.written(model), "some.onnx")
+        checked_file.checked(model_files.written(model), "some.onnx")
 
 
 @pytest.mark.parametrize("change", [{"data_type": TensorProto.STRING}, {"name": None}])

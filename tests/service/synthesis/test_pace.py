@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.synthesis import pace, session
-from service.synthesis.view import Camera, Ladder, View, see
+from posefield.inference import cost_model, session
+from posefield.inference.level_selection import Camera, Ladder, View, see
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ class Slow:
         self.clock, self.seconds, self.calls = clock, seconds, 0
 
     def run(self, outputs, feed):
-        assert {len(values) for values in feed.values()} == {pace.BATCH}
+        assert {len(values) for values in feed.values()} == {cost_model.BATCH}
         self.clock[0] += self.seconds
         self.calls += 1
         return [None for _ in outputs]
@@ -41,26 +41,26 @@ def paced(opened, monkeypatch):
 
 
 def test_every_level_has_a_cost(opened):
-    found = pace.seconds_per_pose(opened)
+    found = cost_model.seconds_per_pose(opened)
     assert len(found) == len(opened.card.levels) == 4
     assert all(seconds > 0.0 for seconds in found)
     assert sorted(found, reverse=True) == list(found)
 
 
 def test_a_cost_is_that_of_its_level_by_the_pose(paced):
-    found = pace.seconds_per_pose(paced(512, 256, 128))
+    found = cost_model.seconds_per_pose(paced(512, 256, 128))
     assert found == pytest.approx([1e-3, 0.5e-3, 0.25e-3])
     assert found != pytest.approx([0.25e-3, 0.5e-3, 1e-3])
 
 
 def test_every_level_is_asked_as_often(paced):
     own = paced(3, 2, 1)
-    pace.seconds_per_pose(own)
-    assert {runtime.calls for runtime in own.runtimes} == {pace.ROUNDS + 1}
+    cost_model.seconds_per_pose(own)
+    assert {runtime.calls for runtime in own.runtimes} == {cost_model.ROUNDS + 1}
 
 
 def test_a_coarser_level_that_is_slower_costs_what_the_finer_one_does(paced):
-    assert pace.seconds_per_pose(paced(512, 600, 128)) == pytest.approx([1e-3, 1e-3, 0.25e-3])
+    assert cost_model.seconds_per_pose(paced(512, 600, 128)) == pytest.approx([1e-3, 1e-3, 0.25e-3])
 
 
 def test_a_round_that_something_else_slowed_down_does_not_count(paced):
@@ -73,19 +73,19 @@ def test_a_round_that_something_else_slowed_down_does_not_count(paced):
         return answer(outputs, feed)
 
     own.runtimes[0].run = run
-    assert pace.seconds_per_pose(own) == pytest.approx([1e-3])
+    assert cost_model.seconds_per_pose(own) == pytest.approx([1e-3])
     assert next(disturbed, None) is None
 
 
 def test_levels_of_several_files_are_told_as_they_are_found(paced):
     one, other = paced(512, 600), paced(64)
-    found = pace.in_turn([(one, 1), (other, 0), (one, 0)], 3)
+    found = cost_model.in_turn([(one, 1), (other, 0), (one, 0)], 3)
     assert found == pytest.approx([600 / 512e3, 64 / 512e3, 1e-3])
 
 
 def test_costs_never_grow(rng):
     costs = rng.uniform(1.0, 2.0, 20)
-    found = np.array(pace.falling(costs))
+    found = np.array(cost_model.falling(costs))
     assert np.all(np.diff(found) <= 0.0) and np.all(found <= costs)
     assert np.any(np.diff(costs) > 0.0)
 
@@ -93,7 +93,7 @@ def test_costs_never_grow(rng):
 def test_a_view_takes_them_as_they_are(opened):
     """Everybody fits into a budget of the finest level's cost, nobody into less than the last's."""
     errors = np.array([level.pose for level in opened.card.levels])
-    costs = np.array(pace.seconds_per_pose(opened))
+    costs = np.array(cost_model.seconds_per_pose(opened))
     camera = Camera(np.zeros(3), 1.0, 1080.0)
 
     def chosen(budget):

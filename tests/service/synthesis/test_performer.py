@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from service.encode import ENCODERS, POSE_ENCODERS
-from service.motion.errors import InvalidField
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, library, poses
+from posefield.common.errors import InvalidField
+from posefield.encode.formats import ENCODERS, POSE_ENCODERS
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips, poses
 
 POINT = {"stature": 1.75, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 NAMES = ("middle", "short", "tall")
@@ -16,12 +17,12 @@ FLOAT32 = 1e-5
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture(scope="module")
 def plain(model_path):
-    return library.load([model_path]).models["reaching"]
+    return model_registry.load([model_path]).models["reaching"]
 
 
 def differ(a, b):

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.synthesis import protobuf
-from service.synthesis.protobuf import LENGTH, VARINT
+from posefield.model_file import protobuf_wire
+from posefield.model_file.protobuf_wire import LENGTH, VARINT
 
 
 @given(st.lists(st.integers(0, 2**63 - 1)), st.text(), st.integers(0, 2**31 - 1))
 def test_what_google_writes_is_read(axes, name, kind):
     tensor = onnx.TensorProto(dims=axes, name=name, data_type=kind)
-    found = list(protobuf.fields(tensor.SerializeToString()))
+    found = list(protobuf_wire.fields(tensor.SerializeToString()))
     assert [field.value for field in found if field.number == 1] == axes
     assert [field.value for field in found if field.number == 2] == [kind]
     assert [field.content.decode() for field in found if field.number == 8] == [name]
@@ -22,7 +22,9 @@ def test_what_google_writes_is_read(axes, name, kind):
 @given(st.integers(0, 2**31 - 1), st.binary(max_size=300), st.text())
 def test_google_reads_what_is_written(kind, numbers, name):
     content = (
-        protobuf.varint(2, kind) + protobuf.nested(9, numbers) + protobuf.nested(8, name.encode())
+        protobuf_wire.varint(2, kind)
+        + protobuf_wire.nested(9, numbers)
+        + protobuf_wire.nested(8, name.encode())
     )
     tensor = onnx.TensorProto.FromString(content)
     assert (tensor.data_type, tensor.raw_data, tensor.name) == (kind, numbers, name)
@@ -30,14 +32,14 @@ def test_google_reads_what_is_written(kind, numbers, name):
 
 def test_numbers_of_a_fixed_size_are_bytes():
     tensor = onnx.AttributeProto(f=1.5).SerializeToString()
-    (field,) = protobuf.fields(tensor)
+    (field,) = protobuf_wire.fields(tensor)
     assert (field.number, field.kind, field.content) == (2, 5, tensor[1:])
 
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_fields_or_refused(content):
     try:
-        found = list(protobuf.fields(content))
+        found = list(protobuf_wire.fields(content))
     except ValueError:
         return
     assert b"".join(field.whole for field in found) == content
@@ -58,9 +60,9 @@ def test_any_bytes_are_fields_or_refused(content):
 )
 def test_a_message_that_is_cut_or_none_is_refused(content, said):
     with pytest.raises(ValueError, match=said):
-        list(protobuf.fields(content))
+        list(protobuf_wire.fields(content))
 
 
 def test_kinds_are_those_of_the_format():
     message = onnx.AttributeProto(name="axis", i=3).SerializeToString()
-    assert [(f.number, f.kind) for f in protobuf.fields(message)] == [(1, LENGTH), (3, VARINT)]
+    assert [(f.number, f.kind) for f in protobuf_wire.fields(message)] == [(1, LENGTH), (3, VARINT)]

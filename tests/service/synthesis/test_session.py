@@ -10,9 +10,9 @@ import pytest
 from model_files import written
 from onnx import TensorProto, helper, numpy_helper
 
-from service.motion.errors import ModelError
-from service.synthesis import session
-from service.synthesis.ports import OUTPUTS
+from posefield.common.errors import ModelError
+from posefield.inference import session
+from posefield.inference.graph_ports import OUTPUTS
 
 
 @pytest.fixture

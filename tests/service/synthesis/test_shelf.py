@@ -14,12 +14,12 @@ import model_files
 import pytest
 from model_files import numbered
 
-from service.motion.errors import ModelError, UnknownModel
-from service.synthesis import model_file
-from service.synthesis.intake import Intake
-from service.synthesis.library import Bounds
-from service.synthesis.shelf import SETTLING, Fixed, Shelf
-from service.synthesis.trial import Limits
+from posefield.common.errors import ModelError, UnknownModel
+from posefield.inference.trial_process import Limits
+from posefield.model_file import checked_file
+from posefield.registry.model_loading import Intake
+from posefield.registry.model_registry import Bounds
+from posefield.registry.model_reload import SETTLING, Fixed, Shelf
 
 ROOM = Bounds()
 
@@ -40,7 +40,7 @@ def put(content, tmp_path):
         path.parent.mkdir(parents=True, exist_ok=True)
         aside.write_bytes(content(number))
         aside.rename(path)
-        return model_file.digest(content(number))
+        return checked_file.digest(content(number))
 
     return at
 
@@ -95,7 +95,7 @@ def test_a_file_is_read_only_when_two_looks_find_it_the_same(put, content, tmp_p
         assert not shelf.look()
         assert not shelf.reloads.faults
     assert shelf.look()
-    assert shelf.library.find("walk").session.digest == model_file.digest(whole)
+    assert shelf.library.find("walk").session.digest == checked_file.digest(whole)
     assert shelf.reloads.failed == 0
 
 
@@ -411,14 +411,14 @@ def address_space_but(room):
 
 def test_an_error_that_no_check_foresees_is_a_fault_too(put, tmp_path, caplog):
     with (tmp_path / "a.onnx").open("wb") as file:
-        file.truncate(model_file.MOST_BYTES)
+        file.truncate(checked_file.MOST_BYTES)
     good = put("b.onnx", 1)
     intake = Intake([tmp_path], most=1)
     before = resource.getrlimit(resource.RLIMIT_AS)
     gc.collect()
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     # There is room for one file, and not for the other.
-    room = model_file.MOST_BYTES // 2
+    room = checked_file.MOST_BYTES // 2
     resource.setrlimit(resource.RLIMIT_AS, (used + room, before[1]))
     try:
         ballast = address_space_but(room)

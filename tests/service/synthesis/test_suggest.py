@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from service.encode import suggestions
-from service.motion.errors import InvalidField
-from service.question.model_question import SuggestQuestion
-from service.synthesis import library
-from service.synthesis.suggest import DRAWN, suggest
+from posefield.common.errors import InvalidField
+from posefield.encode.tables import model_tables
+from posefield.question.model_question import SuggestQuestion
+from posefield.registry import model_registry
+from posefield.synthesis.capture_suggestions import DRAWN, suggest
 
 
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return library.load([labelled_path]).models["labelled"]
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 def test_points_lie_in_the_box_and_the_first_is_worth_most(model):
@@ -78,10 +78,10 @@ def test_what_cannot_be_ranked_is_named(model, asked, field):
 
 def test_they_are_said_in_a_line_each(model):
     found = suggest(model, SuggestQuestion(count=3))
-    heading, *lines = suggestions.text(found).splitlines()
+    heading, *lines = model_tables.suggestions_text(found).splitlines()
     assert heading.split()[:2] == ["gain", "variance"] and len(lines) == 3
     assert lines[0].startswith(f"{100 * found.suggestions[0].gain:.1f} %")
-    assert suggestions.plain(found)["suggestions"][0]["lacking"] in lines[0]
+    assert model_tables.suggestions(found)["suggestions"][0]["lacking"] in lines[0]
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from service.motion.errors import InvalidField, OutsideSamples
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, library, poses
+from posefield.common.errors import InvalidField, OutsideSamples
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import clips, poses
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 # The graph answers in float32, and sums a batch in another order than one row.
@@ -18,7 +19,7 @@ FLOAT32 = 1e-5
 
 @pytest.fixture(scope="module")
 def model(model_path):
-    return library.load([model_path]).models["reaching"]
+    return model_registry.load([model_path]).models["reaching"]
 
 
 @pytest.fixture(scope="module")

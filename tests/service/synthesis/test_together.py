@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_files import written
 
-from service.question.motion_question import PoseQuestion
-from service.synthesis import poses, session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference import session
+from posefield.question.motion_question import PoseQuestion
+from posefield.synthesis import poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 KINDS = ("model_path", "labelled_path", "walk_path")
 

@@ -11,9 +11,10 @@ import model_files
 import onnx
 import pytest
 
-from service.motion.errors import ModelError
-from service.synthesis import model_file, session
-from service.synthesis.trial import LIMITS, Limits
+from posefield.common.errors import ModelError
+from posefield.inference import session
+from posefield.inference.trial_process import LIMITS, Limits
+from posefield.model_file import checked_file
 
 LONG = Limits(cpu=600, wall=600.0)
 
@@ -97,7 +98,7 @@ def test_memory_is_counted_beyond_what_the_process_has(content):
 
 def test_a_file_that_was_tried_is_not_tried_again(content):
     small = model_files.large(content, numbers=50_000_000)
-    tried = frozenset([model_file.digest(small)])
+    tried = frozenset([checked_file.digest(small)])
     assert Limits(memory=100 << 20, tried=tried).check(small, "good.onnx") is None
     refusal(small, Limits(memory=100 << 20, tried=frozenset(["0" * 16])))
 

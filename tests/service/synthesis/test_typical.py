@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from service.motion.errors import InvalidField
-from service.question.model_question import WhyQuestion
-from service.question.motion_question import ClipQuestion, PoseQuestion
-from service.synthesis import clips, poses, session, typical
-from service.synthesis.synthesizer import Synthesizer
-from service.synthesis.typical import Chooser, fit
-from service.synthesis.why import why
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.question.model_question import WhyQuestion
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.synthesis import clips, poses
+from posefield.synthesis.explanation import why
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import imputation
+from posefield.validation.imputation import Chooser, fit
 
 # A solve of numbers near one.
 ROUNDING = 1e-9
@@ -52,7 +54,7 @@ def test_what_is_given_stays_as_it_is_and_the_mean_is_its_own_companion(drawn):
 def test_of_one_given_all_others_follow_by_regression(drawn):
     given = drawn[:, 0].mean() + 1.5
     slope = np.cov(drawn.T, ddof=0)[:, 0] / drawn[:, 0].var()
-    expected = drawn.mean(axis=0) + (1.0 - typical.SHRUNK) * slope * 1.5
+    expected = drawn.mean(axis=0) + (1.0 - imputation.SHRUNK) * slope * 1.5
     assert np.abs(fit(drawn)({0: given}) - expected)[1:].max() < ROUNDING
     assert np.abs(slope[1] * 1.5) > 0.1, "negative control: it does follow"
 

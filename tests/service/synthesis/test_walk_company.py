@@ -5,10 +5,16 @@ import re
 import numpy as np
 import pytest
 
-from service.motion import quat
-from service.motion.errors import InvalidField
-from service.synthesis import session
-from service.synthesis.walk import company, detail, gait, march, plane
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.locomotion import (
+    floor_plane,
+    gait,
+    level_transitions,
+    locomotion_plan,
+    walking_crowd,
+)
+from posefield.motion import quat
 
 RATE = 30.0
 
@@ -20,8 +26,8 @@ def own(walk_path):
 
 def made(own, count, seed=3, seconds=1.0):
     """A crowd that wanders, and its motions."""
-    plan = company.wandering(own, count, seconds, RATE, seed)
-    crowd = company.crowd(own.session, plan, detail.constant(0, plan.phases.shape))
+    plan = walking_crowd.wandering(own, count, seconds, RATE, seed)
+    crowd = walking_crowd.crowd(own.session, plan, level_transitions.constant(0, plan.phases.shape))
     return crowd, list(crowd.batches)
 
 
@@ -50,17 +56,17 @@ def test_fewer_characters_are_the_first_of_more(own):
 
 
 def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
-    plan = company.wandering(own, 4, 2.0, RATE, 0)
-    crowd = company.crowd(own.session, plan, detail.constant(0, plan.phases.shape))
+    plan = walking_crowd.wandering(own, 4, 2.0, RATE, 0)
+    crowd = walking_crowd.crowd(own.session, plan, level_transitions.constant(0, plan.phases.shape))
     motions = next(iter(crowd.batches))
     at_home = motions.root_position[:, 0] * [1.0, 0.0, 1.0]
     # A pelvis sways about the way, no farther.
     assert np.abs(at_home).max() < 0.1
     who, frames = np.repeat(np.arange(4), 61), np.tile(np.arange(61), 4)
-    posed = march.pose(own.session, plan, who, frames)
+    posed = locomotion_plan.pose(own.session, plan, who, frames)
     turns = crowd.placement.turns[:, None]
     roots = quat.rotate(turns, motions.root_position) + crowd.placement.positions[:, None]
-    expected = plane.at_height(posed.places, posed.heights).reshape(4, 61, 3)
+    expected = floor_plane.at_height(posed.places, posed.heights).reshape(4, 61, 3)
     assert np.abs(roots - expected).max() < 1e-5
     turned = quat.mul(turns, motions.rotations[:, :, 0]).reshape(-1, 4)
     assert np.abs(turned - posed.rotations[:, 0]).max() < 1e-5
@@ -70,7 +76,7 @@ def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
 
 
 def test_motions_are_made_some_at_a_time(own):
-    together = company.TOGETHER // 4
+    together = walking_crowd.TOGETHER // 4
     crowd, motions = made(own, together + 3, seconds=0.1)
     assert [len(some) for some in motions] == [together, 3]
     assert not crowd.shared
@@ -81,11 +87,11 @@ def test_motions_are_made_some_at_a_time(own):
 
 
 def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
-    seconds = (company.POSED + 500) / RATE
+    seconds = (walking_crowd.POSED + 500) / RATE
     _, motions = made(own, 1, seed=0, seconds=seconds)
-    plan = company.wandering(own, 1, seconds, RATE, 0)
-    frames = np.arange(company.POSED - 2, company.POSED + 3)
-    near = march.pose(own.session, plan, np.zeros_like(frames), frames)
+    plan = walking_crowd.wandering(own, 1, seconds, RATE, 0)
+    frames = np.arange(walking_crowd.POSED - 2, walking_crowd.POSED + 3)
+    near = locomotion_plan.pose(own.session, plan, np.zeros_like(frames), frames)
     assert len(motions) == 1
     found = motions[0].rotations[0, frames, 1:]
     assert np.abs(found - near.rotations[:, 1:]).max() < 1e-6
@@ -94,7 +100,7 @@ def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
 
 
 def test_phases_and_walkers_differ(own):
-    plan = company.wandering(own, 100, 1.0, RATE, 0)
+    plan = walking_crowd.wandering(own, 100, 1.0, RATE, 0)
     assert np.ptp(plan.phases[:, 0]) > 0.9
     assert sorted(set(plan.who)) == [0, 1]
     assert plan.roots.shape == (100, 31, 3)
@@ -114,4 +120,4 @@ def test_phases_and_walkers_differ(own):
 )
 def test_numbers_that_make_no_crowd_are_refused(own, asked, said):
     with pytest.raises(InvalidField, match=re.escape(said)):
-        company.wandering(own, *asked)
+        walking_crowd.wandering(own, *asked)

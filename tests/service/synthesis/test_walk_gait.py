@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export.sample import stroll
-from service.motion.errors import InvalidField
-from service.synthesis import session
-from service.synthesis.walk import gait, region, stride
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.locomotion import gait, gait_region, stride
+from posefield_train.sample import sample_walk
 
 NOBODY = -1
 
@@ -66,7 +66,7 @@ def test_a_cycle_of_all_that_was_sampled_is_within_and_twice_that_is_not(own):
 def test_the_hull_of_a_square_is_the_square(rng):
     corners = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
     inner = rng.uniform([1.0, -1.0], [2.0, 1.0], (50, 2))
-    found = region.hull(np.vstack([inner, corners]))
+    found = gait_region.hull(np.vstack([inner, corners]))
     assert len(found.limits) == 4
     assert found.speeds == (1.0, 2.0)
     low, high = found.turning(np.array([1.0, 1.3, 2.0]))
@@ -98,4 +98,4 @@ def test_nobody_in_particular_walks_too(opened):
         "LeftFoot",
         "RightFoot",
     ]
-    assert stroll.SKELETON.same_tree(opened.card.skeleton)
+    assert sample_walk.SKELETON.same_tree(opened.card.skeleton)

@@ -5,21 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.motion import ground, skeleton
-from service.motion.errors import InvalidField
-from service.synthesis import session
-from service.synthesis.walk import (
-    company,
-    detail,
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.locomotion import (
+    floor_plane,
     gait,
-    given,
-    march,
-    plane,
-    skating,
+    level_transitions,
+    locomotion_plan,
+    random_paths,
+    routes,
     stride,
-    wander,
+    walking_crowd,
 )
-from service.synthesis.walk.given import Route
+from posefield.locomotion.routes import Route
+from posefield.motion import foot_skate, skeleton
 
 # float32 of places some metres away, and of phases after some strides.
 SINGLE = 2e-5
@@ -29,8 +28,8 @@ ANN = np.zeros(1, dtype=np.int64)
 
 def finest(opened, plan):
     """Motions of all characters of a plan, at the finest level."""
-    shown = detail.constant(0, plan.phases.shape)
-    return company.motions(opened, plan, np.arange(len(plan.who)), shown)
+    shown = level_transitions.constant(0, plan.phases.shape)
+    return walking_crowd.motions(opened, plan, np.arange(len(plan.who)), shown)
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +41,16 @@ def held(own, veer, frames, rate, phase=0.0):
     """Plan of Ann who walks at one speed and turns evenly, from the origin."""
     controls = np.tile([4.0, veer], (1, frames, 1))
     origin = np.zeros(1, dtype=np.complex128), np.zeros(1)
-    return march.roam(own, controls, ANN, np.array([phase]), origin, rate)
+    return locomotion_plan.roam(own, controls, ANN, np.array([phase]), origin, rate)
 
 
 def joints(own, plan):
     """Places of all joints (N, F, J, 3), m."""
-    made = company.motions(
-        own.session, plan, np.arange(len(plan.who)), detail.constant(0, plan.phases.shape)
+    made = walking_crowd.motions(
+        own.session,
+        plan,
+        np.arange(len(plan.who)),
+        level_transitions.constant(0, plan.phases.shape),
     )
     local = skeleton.translations(
         made.bone_offsets.astype(np.float64), made.root_position.astype(np.float64)
@@ -85,8 +87,10 @@ def test_held_controls_are_the_models_own_clip_again_and_again(own, veer):
     assert np.abs(made[:40] - clip[:40]).max() < SINGLE
     # A cycle ends where the next begins, in the same pose.
     assert np.abs(made[40] - clip[40]).max() < SINGLE
-    first = plane.facing(plan.headings[0, 80]) * plane.of(clip[:40]) + plan.places[0, 80]
-    assert np.abs(plane.of(made[80:120]) - first).max() < SINGLE
+    first = (
+        floor_plane.facing(plan.headings[0, 80]) * floor_plane.of(clip[:40]) + plan.places[0, 80]
+    )
+    assert np.abs(floor_plane.of(made[80:120]) - first).max() < SINGLE
     # Negative control: another phase is another clip.
     other = joints(own, held(own, veer, 41, rate, phase=0.3))[0]
     assert np.abs(other[:40] - clip[:40]).max() > 0.1
@@ -112,7 +116,7 @@ def swaying(own, frames):
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, 4 * np.pi, frames))
     controls = np.stack([3.0 + 2.0 * share, -400.0 + 800.0 * share], axis=-1)[None]
     origin = np.zeros(1, dtype=np.complex128), np.zeros(1)
-    return march.roam(own, controls, ANN, np.zeros(1), origin, RATE)
+    return locomotion_plan.roam(own, controls, ANN, np.zeros(1), origin, RATE)
 
 
 def leap(own, plan):
@@ -122,7 +126,7 @@ def leap(own, plan):
 
 def test_nothing_leaps_while_controls_change(own):
     plan = swaying(own, 300)
-    fastest = march.roam(
+    fastest = locomotion_plan.roam(
         own,
         np.tile([5.0, 400.0], (1, 300, 1)),
         ANN,
@@ -137,37 +141,39 @@ def test_nothing_leaps_while_controls_change(own):
 
 
 def wandering(own, count, seconds=6.0, seed=3):
-    return company.wandering(own, count, seconds, RATE, seed)
+    return walking_crowd.wandering(own, count, seconds, RATE, seed)
 
 
 def test_who_walks_keeps_to_the_way(own):
-    characters = wander.cast(own, 20, 3)
-    ways = wander.paths(own, characters, 6.0)
+    characters = random_paths.cast(own, 20, 3)
+    ways = random_paths.paths(own, characters, 6.0)
     frames = 181
-    plan = march.follow(own, ways, characters.who, characters.phases, frames, RATE)
+    plan = locomotion_plan.follow(own, ways, characters.who, characters.phases, frames, RATE)
     starts = plan.places[:, 0], plan.headings[:, 0]
-    free = march.roam(own, plan.controls, plan.who, plan.phases[:, 0], starts, RATE)
+    free = locomotion_plan.roam(own, plan.controls, plan.who, plan.phases[:, 0], starts, RATE)
     # Left to itself the model goes the same way: median 2 cm away after six seconds, 11 at most.
     assert np.median(np.abs(free.places - plan.places)[:, -1]) < 0.03
     assert np.abs(free.places - plan.places).max() < 0.15
     assert np.abs(free.headings - plan.headings).max() < 0.05
-    straight = plan.places[:, :1] + plane.facing(plan.headings[:, :1]) * np.linspace(0, 6, frames)
+    straight = plan.places[:, :1] + floor_plane.facing(plan.headings[:, :1]) * np.linspace(
+        0, 6, frames
+    )
     assert np.abs(plan.places - straight).max() > 0.5
 
 
 def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     plan = wandering(own, 60)
     made = finest(own.session, plan)
-    found = skating.of(own.session.card, made, RATE).mean()
-    strides = skating.usual(own, RATE)
-    each = skating.of_strides(own, RATE)[:, 0]
+    found = walking_crowd.foot_skate_of(own.session.card, made, RATE).mean()
+    strides = walking_crowd.usual_skate(own, RATE)
+    each = walking_crowd.stride_skate(own, RATE)[:, 0]
     who = np.array(own.session.card.moved_by)
     assert strides == pytest.approx(0.5 * (each[who == 0].mean() + each[who == 1].mean()))
     assert 0.0 < found < 1.2 * strides < 0.05
     # Negative control: a root that goes on a tenth too fast.
     fast = replace(plan, places=plan.places + 0.1 * (plan.places - plan.places[:, :1]))
     slid = finest(own.session, fast)
-    assert skating.of(own.session.card, slid, RATE).mean() > 2.0 * strides
+    assert walking_crowd.foot_skate_of(own.session.card, slid, RATE).mean() > 2.0 * strides
 
 
 def test_the_measure_is_that_of_the_evaluation(own, strides):
@@ -175,17 +181,17 @@ def test_the_measure_is_that_of_the_evaluation(own, strides):
     made = finest(own.session, plan)
     feet = joints(own, plan)[0][:, list(own.session.card.feet)]
     length = round(float(np.mean(own.session.card.durations)) * RATE) + 1
-    assert skating.of(own.session.card, made, RATE)[0, 0] == pytest.approx(
-        float(ground.skate(feet[:length], RATE))
+    assert walking_crowd.foot_skate_of(own.session.card, made, RATE)[0, 0] == pytest.approx(
+        float(foot_skate.skate(feet[:length], RATE))
     )
-    clips = [ground.skate(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides]
+    clips = [foot_skate.skate(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides]
     assert np.max(clips) < 1e-5
 
 
 def test_a_straight_route_is_walked_at_its_speed(own):
     route = Route(np.array([[2.0, 1.0], [2.0, 9.0]]), 1.2)
-    ways = given.through(own, [route])
-    plan = march.follow(own, ways, ANN, np.zeros(1), 121, RATE)
+    ways = routes.through(own, [route])
+    plan = locomotion_plan.follow(own, ways, ANN, np.zeros(1), 121, RATE)
     gone = plan.places[0, -1] - plan.places[0, 0]
     assert gone.real == pytest.approx(1.2 * 4.0, rel=2e-3)
     assert abs(gone.imag) < 1e-9
@@ -193,6 +199,6 @@ def test_a_straight_route_is_walked_at_its_speed(own):
 
 
 def test_a_way_that_ends_too_soon_is_refused(own):
-    ways = given.through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
+    ways = routes.through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
-        march.follow(own, ways, ANN, np.zeros(1), 121, RATE)
+        locomotion_plan.follow(own, ways, ANN, np.zeros(1), 121, RATE)

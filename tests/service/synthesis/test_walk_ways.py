@@ -5,11 +5,11 @@ import re
 import numpy as np
 import pytest
 
-from service.motion.errors import InvalidField
-from service.synthesis import session
-from service.synthesis.walk import gait, given, wander
-from service.synthesis.walk.given import Route
-from service.synthesis.walk.paths import STEP, Paths
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.locomotion import gait, random_paths, routes
+from posefield.locomotion.paths import STEP, Paths
+from posefield.locomotion.routes import Route
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ BEND = np.array([[1.0, -2.0], [1.0, 3.0], [2.0, 8.0], [5.0, 12.0], [9.0, 14.0]])
 
 
 def test_a_route_leads_through_its_waypoints_without_a_kink(own):
-    ways = given.through(own, [Route(BEND, 0.9)])
+    ways = routes.through(own, [Route(BEND, 0.9)])
     gone = np.linspace(0.0, ways.lengths[0], 100_000)[None]
     places, tangents = ways.at(gone)
     for left, ahead in BEND:
@@ -57,8 +57,8 @@ def test_a_route_leads_through_its_waypoints_without_a_kink(own):
 
 def test_routes_of_different_lengths_go_together(own):
     straight = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
-    both = given.through(own, [Route(BEND, 0.9), straight])
-    alone = given.through(own, [straight])
+    both = routes.through(own, [Route(BEND, 0.9), straight])
+    alone = routes.through(own, [straight])
     assert both.lengths[1] == alone.lengths[0] == pytest.approx(4.0)
     assert np.array_equal(both.headings[1, :41], alone.headings[0, :41])
     assert both.speeds[:, 0].tolist() == [0.9, 1.1]
@@ -85,7 +85,7 @@ CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]
 def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypoints, speed, said):
     fine = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
     with pytest.raises(InvalidField) as refusal:
-        given.through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
+        routes.through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
     assert re.match(said, str(refusal.value)), str(refusal.value)
 
 
@@ -101,17 +101,17 @@ def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypo
 )
 def test_what_is_no_route_is_refused(plain, field):
     with pytest.raises(InvalidField) as refusal:
-        given.parse(plain)
+        routes.parse(plain)
     assert refusal.value.field == field
 
 
 def test_routes_are_read_as_they_are_written():
-    (route,) = given.parse([{"waypoints": [[0, 1], [2, 3]], "speed": 1}])
+    (route,) = routes.parse([{"waypoints": [[0, 1], [2, 3]], "speed": 1}])
     assert (route.waypoints.tolist(), route.speed) == ([[0.0, 1.0], [2.0, 3.0]], 1.0)
 
 
 def test_characters_that_wander_stay_within_what_was_sampled(own):
-    ways = wander.paths(own, wander.cast(own, 200, 1), 10.0)
+    ways = random_paths.paths(own, random_paths.cast(own, 200, 1), 10.0)
     turning = ways.speeds * ways.bends
     assert own.region.holds(ways.speeds, turning).all()
     # They do turn, and change their speed.
@@ -121,7 +121,7 @@ def test_characters_that_wander_stay_within_what_was_sampled(own):
 
 def test_nobody_begins_within_a_metre_of_another_however_many(own):
     for count in (2, 50, 701):
-        ways = wander.paths(own, wander.cast(own, count, 5), 1.0)
+        ways = random_paths.paths(own, random_paths.cast(own, count, 5), 1.0)
         apart = np.abs(ways.starts[:, None] - ways.starts) + 9.0 * np.eye(count)
         assert apart.min() >= 1.0
     side = np.ptp(ways.starts.real)
@@ -129,12 +129,12 @@ def test_nobody_begins_within_a_metre_of_another_however_many(own):
 
 
 def test_a_character_hangs_on_its_number_and_the_seed_alone(own):
-    few, many = (wander.cast(own, count, 7) for count in (5, 10))
+    few, many = (random_paths.cast(own, count, 7) for count in (5, 10))
     assert np.array_equal(few.who, many.who[:5])
     assert np.array_equal(few.drawn, many.drawn[:5])
-    assert set(wander.cast(own, 50, 7).who) == {0, 1}
-    short, long = wander.paths(own, few, 2.0), wander.paths(own, many, 4.0)
+    assert set(random_paths.cast(own, 50, 7).who) == {0, 1}
+    short, long = random_paths.paths(own, few, 2.0), random_paths.paths(own, many, 4.0)
     known = short.headings.shape[1]
     assert np.array_equal(short.starts, long.starts[:5])
     assert np.abs(short.headings - long.headings[:5, :known]).max() < 1e-12
-    assert not np.array_equal(wander.cast(own, 5, 8).drawn, few.drawn)
+    assert not np.array_equal(random_paths.cast(own, 5, 8).drawn, few.drawn)

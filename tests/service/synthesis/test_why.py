@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from service.motion.answer import Reasons
-from service.motion.errors import InvalidField, OutsideSamples
-from service.motion.field import Weigher
-from service.question.model_question import WhyQuestion
-from service.synthesis import library, session
-from service.synthesis.why import why
+from posefield.common.errors import InvalidField, OutsideSamples
+from posefield.inference import session
+from posefield.kriging.kriging_model import Weigher
+from posefield.question.model_question import WhyQuestion
+from posefield.question.results import Reasons
+from posefield.registry import model_registry
+from posefield.synthesis.explanation import why
 
 EVERYTHING = 10_000
 
@@ -21,7 +22,7 @@ def case(request):
     """A trained model and its file, with performers told apart and without."""
     names = {"one": ("trained", "model_path"), "labelled": ("labelled", "labelled_path")}
     made, path = (request.getfixturevalue(name) for name in names[request.param])
-    return made, library.load([path]).find(path.stem)
+    return made, model_registry.load([path]).find(path.stem)
 
 
 def drawn(card, rng, count=20):
@@ -108,7 +109,7 @@ def test_the_nearest_come_first_and_a_clip_is_nearest_to_itself(case):
 
 
 def test_distance_is_that_of_scales_and_performers(labelled_path):
-    model = library.load([labelled_path]).find("labelled")
+    model = model_registry.load([labelled_path]).find("labelled")
     card = model.session.card
     hyper = card.kriging
     found = why(model, asked(card, card.examples[0], "tall"))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import recorded
 
-from service.motion.errors import InvalidField
-from service.question.motion_question import PoseQuestion
-from service.synthesis import poses, session
-from service.synthesis.synthesizer import Synthesizer
-from service.web.batching import MOST, Batcher
+from posefield.common.errors import InvalidField
+from posefield.http.concurrency.pose_batching import MOST, Batcher
+from posefield.inference import session
+from posefield.question.motion_question import PoseQuestion
+from posefield.synthesis import poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 HASTE = [3.0 + 0.125 * number for number in range(2 * MOST + 7)]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from service.motion.cores import ALONE
-from service.web import blas
+from posefield.common.cpu_cores import ALONE
+from posefield.http import server
 
 
 @pytest.fixture(autouse=True)
@@ -25,12 +25,12 @@ def threads():
 
 
 def test_blas_keeps_to_one_thread():
-    blas.limit_threads()
+    server.limit_threads()
     assert threads() == {1}
 
 
 @pytest.mark.parametrize("name", ALONE)
 def test_the_environment_counts_more(monkeypatch, name):
     monkeypatch.setenv(name, "2")
-    blas.limit_threads()
+    server.limit_threads()
     assert threads() == {2}

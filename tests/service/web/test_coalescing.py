@@ -7,7 +7,7 @@ import pytest
 import uvloop
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from service.web.coalescing import MOST, CoalescingProtocol, CoalescingTransport
+from posefield.http.middleware.coalescing import MOST, CoalescingProtocol, CoalescingTransport
 
 
 class Recorder(asyncio.Transport):

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from service.motion.errors import InvalidField
-from service.web import cors
+from posefield.common.errors import InvalidField
+from posefield.http.middleware import cors
 
 ALLOWED = cors.read("https://a.example, http://localhost:5173", "ORIGINS")
 

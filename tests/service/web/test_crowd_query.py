@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.motion.errors import FormError, InvalidField
-from service.synthesis import crowd_question
-from service.synthesis.view import View
-from service.web import crowd_query
+from posefield.common.errors import FormError, InvalidField
+from posefield.http.decoding import crowd_query
+from posefield.inference.level_selection import View
+from posefield.validation import crowd_question
 
 CAMERA = {"position": [0, 1.7, -5], "fov": 1.0, "height": 1080}
 WHOLE = {

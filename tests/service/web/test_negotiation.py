@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.web.negotiation import preferred
+from posefield.http.middleware.negotiation import preferred
 
 CLIP = (
     ("usdc", "model/vnd.usdc"),

@@ -5,8 +5,8 @@ import json
 import pytest
 from starlette.requests import Request
 
-from service.motion.errors import FormError, InvalidField, QueryError
-from service.web import problems
+from posefield.common.errors import FormError, InvalidField, QueryError
+from posefield.http.api import problems
 
 
 def descendants(error):

@@ -5,9 +5,9 @@ import asyncio
 import pytest
 from starlette.requests import Request
 
-from service.web import body
-from service.web.body import FREE, BodyMemory
-from service.web.problems import RequestFault
+from posefield.http.api.problems import RequestFault
+from posefield.http.decoding import request_body
+from posefield.http.decoding.request_body import FREE, BodyMemory
 
 LIMIT = 4 * FREE
 
@@ -29,7 +29,7 @@ def request(*chunks, **headers):
 
 
 def read(asked, memory=None):
-    return asyncio.run(body.read(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
+    return asyncio.run(request_body.read(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
 
 
 def refused(asked, memory=None):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from service.web.sending import ENOUGH, gathered
+from posefield.http.responses import ENOUGH, gathered
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from service.motion.errors import InvalidField
-from service.web import settings
-from service.web.settings import Settings
+from posefield.common.errors import InvalidField
+from posefield.http.api import settings
+from posefield.http.api.settings import Settings
 
 
 def test_nothing_set_is_the_defaults():

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.encode import ENCODERS
-from service.encode.convention import CENTIMETRES, METRES
-from service.question.motion_question import ClipQuestion
-from service.synthesis import clips, session
-from service.synthesis.synthesizer import Synthesizer
-from service.web import writing
-from service.web.writing import Desk
+from posefield.encode.files.file_convention import CENTIMETRES, METRES
+from posefield.encode.formats import ENCODERS
+from posefield.http.concurrency import clip_batching
+from posefield.http.concurrency.clip_batching import Desk
+from posefield.inference import session
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
 
 USDC = ENCODERS["usdc"]
 
@@ -63,7 +64,7 @@ def written(encoder, wanted):
 def test_what_is_wanted_at_once_is_written_together(calls, answers):
     encoder, made = calls
     files = written(encoder, [(METRES, answer) for answer in answers])
-    assert made == [writing.MOST, writing.MOST, 8]
+    assert made == [clip_batching.MOST, clip_batching.MOST, 8]
     assert files == [USDC.encode(answer, METRES) for answer in answers]
 
 
@@ -77,7 +78,7 @@ def test_conventions_are_not_mixed(calls, answers):
 def test_a_long_clip_keeps_nobody_waiting(calls, answers):
     encoder, made = calls
     clip = answers[0].clip
-    times = -(-writing.LONG // len(clip)) + 1
+    times = -(-clip_batching.LONG // len(clip)) + 1
     turns, moves = (np.tile(a, (times, 1, 1)) for a in (clip.rotations, clip.translations))
     long = replace(answers[0], clip=replace(clip, rotations=turns, translations=moves))
     written(encoder, [(METRES, long)] * 3)

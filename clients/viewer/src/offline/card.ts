@@ -1,4 +1,4 @@
-/** The model card out of a model's own metadata: service/motion/card.py says what stands there. */
+/** The model card out of a model's own metadata: service/posefield/model_file/model_card.py says what stands there. */
 
 import type { ModelCard } from "@posefield/client";
 

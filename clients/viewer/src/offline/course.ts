@@ -7,7 +7,7 @@ import { arc, type Place, turned, turnRoot } from "./plane.ts";
 
 const MOST_POSES = 10_000;
 
-/** One cycle, or the way from the first pose to the last: service/synthesis/walk/stride.py. */
+/** One cycle, or the way from the first pose to the last: service/posefield/locomotion/stride.py. */
 export interface Way {
   readonly way: Place;
   readonly turn: number;

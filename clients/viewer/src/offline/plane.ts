@@ -1,4 +1,4 @@
-/** Places on the floor and turns about +Y: service/synthesis/walk/plane.py, with x and z by name. */
+/** Places on the floor and turns about +Y: service/posefield/locomotion/floor_plane.py, with x and z by name. */
 
 export interface Place {
   readonly x: number;

@@ -3,7 +3,7 @@
  * that have a default, which onnxruntime-web can neither be told of nor be fed.
  *
  * They are protocol buffers: fields of a number, a kind and a content (onnx.proto). The service does
- * the same in service/synthesis/freeze.py.
+ * the same in service/posefield/model_file/subgraph.py.
  */
 
 import { PosefieldError } from "@posefield/client";

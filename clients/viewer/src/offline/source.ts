@@ -151,7 +151,7 @@ export class Offline implements Source {
   }
 }
 
-/** What one cycle does, as its end says (service/synthesis/walk/stride.py). */
+/** What one cycle does, as its end says (service/posefield/locomotion/stride.py). */
 function stride(ends: Answers): Way {
   const { travel, root_position: roots } = ends;
   const gap = { x: travel[3]!, z: travel[4]! };

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.motion.conventions import Floats
-from service.motion.measure import Measure
-from service.synthesis.exact import holding
-from service.synthesis.exact.aims import Place
-from service.synthesis.exact.holding import Bench, Held
-from service.synthesis.session import Session
+from posefield.common.units import Floats
+from posefield.constraints import constrained_motion
+from posefield.constraints.constrained_motion import Bench, Held
+from posefield.constraints.constraint import Place
+from posefield.inference.session import Session
+from posefield.motion.measures import Measure
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Begun:
 
 def begin(opened: Session, level: int = 0) -> Begun:
     """A motion in the middle of the controls, of the first performer."""
-    bench = holding.bench(opened, level)
+    bench = constrained_motion.bench(opened, level)
     point = np.array([[control.default for control in opened.card.controls]])
     performers = len(opened.card.performers)
     state = opened.state(point, np.array([0.0, 0.3, 0.61]), np.eye(1, performers), level)

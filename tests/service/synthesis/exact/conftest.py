@@ -3,7 +3,7 @@
 import pytest
 from beginning import Begun, begin
 
-from service.synthesis import session
+from posefield.inference import session
 
 
 @pytest.fixture(scope="session")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from beginning import covariance
 
-from service.motion.measure import Measure
-from service.synthesis.exact import reach
-from service.synthesis.exact.aims import Place
+from posefield.constraints import reachability
+from posefield.constraints.constraint import Place
+from posefield.motion.measures import Measure
 
 
 def poses(begun, held):
@@ -82,7 +82,7 @@ def test_what_is_out_of_reach_is_told_and_approached_as_far_as_motions_go(reachi
     assert np.abs(one.numbers - ten.numbers).max() < 1e-6
     assert roughness(reaching, one) < 1.5 * roughness(reaching, begun)
     # Negative control: what is met moves less.
-    limit = reach.far(3) / one.distance
+    limit = reachability.far(3) / one.distance
     inside, outside = held(0.99 * limit), held(1.01 * limit)
     assert inside.met[0].reached
     assert np.abs(inside.numbers - one.numbers).max() > 1e-6
@@ -110,7 +110,9 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
     # And of a motion so uncertain that nothing is far the hand jerks from one to the other, where
     # there is time for it.
     state = reaching.held.state
-    uncertain = replace(reaching.held, state=replace(state, sigma=100.0 / reach.FAR * state.sigma))
+    uncertain = replace(
+        reaching.held, state=replace(state, sigma=100.0 / reachability.FAR * state.sigma)
+    )
     jerked = reaching.bench.held(uncertain, aims)
     assert (roughness(reaching, jerked) > 2.5 * before) == (apart > 0.0)
 

@@ -5,24 +5,24 @@ import pytest
 from scipy.spatial import distance as apart
 from scipy.stats import chi
 
-from service.synthesis.exact import aims as looking
-from service.synthesis.exact import reach
-from service.synthesis.exact.reach import Reach
+from posefield.constraints import constraint as looking
+from posefield.constraints import reachability
+from posefield.constraints.reachability import Reach
 
 
 def looked_at(begun, aims) -> Reach:
     scene, numbers = begun.held.scene, begun.held.numbers
     seen = looking.look(aims, scene, numbers)
-    return reach.of(scene, begun.bench.spread, begun.held.state.sigma, numbers, aims, seen)
+    return reachability.of(scene, begun.bench.spread, begun.held.state.sigma, numbers, aims, seen)
 
 
 @pytest.mark.parametrize("values", [1, 2, 3, 6, 12, 30])
 def test_the_limit_is_as_unlikely_whatever_the_number_of_values(values):
     """Oracle: the chi distribution of SciPy; the formula is an approximation of it."""
-    share = chi.sf(reach.FAR, 3)
-    assert chi.sf(reach.far(values), values) == pytest.approx(share, rel=0.15)
+    share = chi.sf(reachability.FAR, 3)
+    assert chi.sf(reachability.far(values), values) == pytest.approx(share, rel=0.15)
     # Negative control: that of three is no limit for others.
-    assert values == 3 or abs(chi.sf(reach.FAR, values) / share - 1.0) > 0.15
+    assert values == 3 or abs(chi.sf(reachability.FAR, values) / share - 1.0) > 0.15
 
 
 def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
@@ -53,10 +53,10 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
 
 def test_all_of_the_way_is_gone_within_the_limit():
     near = Reach(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
-    assert near.distance < reach.far(3)
+    assert near.distance < reachability.far(3)
     assert np.array_equal(near.way, near.left)
     far = Reach(10.0 * near.left, near.covariance, near.members)
-    assert np.allclose(far.way, reach.far(3) / far.distance * far.left, rtol=1e-6, atol=0)
+    assert np.allclose(far.way, reachability.far(3) / far.distance * far.left, rtol=1e-6, atol=0)
     assert not np.array_equal(far.way, far.left)
 
 
@@ -66,7 +66,7 @@ def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
     found = Reach(left, own @ own.T + 1e-3 * np.eye(6), np.repeat(np.eye(2), 3, axis=0))
     shares = found.way / np.where(left == 0.0, 1.0, left)
     length = np.sqrt(found.way @ np.linalg.solve(found.covariance, found.way))
-    assert length <= reach.far(6) * (1.0 + 1e-6)
+    assert length <= reachability.far(6) * (1.0 + 1e-6)
     assert np.ptp(shares[[0, 2]]) < 1e-9 and np.ptp(shares[3:]) < 1e-9
     assert np.all((0.0 <= shares) & (shares <= 1.0))
     assert shares[5] < 0.5

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from beginning import begin
 
-from service.motion import skeleton
-from service.motion.measure import Measure
-from service.synthesis.exact.aims import Place, Step, Travelled
+from posefield.constraints.constraint import Place, Step, Travelled
+from posefield.motion import skeleton
+from posefield.motion.measures import Measure
 
 SMALL = 1e-6
 

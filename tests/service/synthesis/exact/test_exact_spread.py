@@ -5,16 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export import export, train
-from service.motion import cross_validation
-from service.synthesis import freeze, session
-from service.synthesis.exact import holding, spread
+from posefield.constraints import constrained_motion
+from posefield.inference import residual_covariance, session
+from posefield.kriging import leave_one_out
+from posefield.model_file import subgraph
+from posefield_train import train
+from posefield_train.graph import onnx_export
 
 
 def strays(trained) -> np.ndarray:
     """What training's leave-one-out misses of each clip's coefficients (n, r3), standardised."""
     pose, laid, model = trained.pose, trained.laid, trained.model
-    left_out = cross_validation.leave_out(pose.hyper, laid.points, laid.groups)
+    left_out = leave_one_out.leave_out(pose.hyper, laid.points, laid.groups)
     sigmas = np.sqrt(model.bank.sill * pose.variances * len(laid.points))
     return left_out @ model.decoder.reduced.bases[2] / sigmas[:, None]
 
@@ -32,11 +34,11 @@ def gap(found, trained) -> float:
 def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_exported):
     """The file holds its samples in an order of its own."""
     opened = session.open_bytes(labelled_exported.content, "labelled.onnx")
-    weights = freeze.weights(opened.content)
+    weights = subgraph.weights(opened.content)
     samples = opened.weigher.samples
-    found = spread.coefficients(opened.card, weights, samples)
+    found = residual_covariance.coefficients(opened.card, weights, samples)
     bases = labelled.model.decoder.reduced.bases[2]
-    order = spread.order_of(opened.card, weights, samples)
+    order = residual_covariance.order_of(opened.card, weights, samples)
     assert np.abs(found - bases).max() < 1e-5
     assert not np.array_equal(order, np.arange(len(order)))
     # Negative control: in the order of the file they are other clips'.
@@ -45,7 +47,7 @@ def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_ex
 
 def read(content):
     """Spread of a file's finest level, and its rank of samples."""
-    own = holding.bench(session.open_bytes(content, "x.onnx"), 0)
+    own = constrained_motion.bench(session.open_bytes(content, "x.onnx"), 0)
     return own.spread, own.reduced.core.shape[2]
 
 
@@ -66,7 +68,7 @@ def test_clips_at_the_same_controls_are_not_confused(labelled_recipe, examples):
     twice = [*examples[:-1], replace(examples[-1], controls=examples[-2].controls)]
     twice[-1] = replace(twice[-1], row=replace(twice[-1].row, performer=twice[-2].row.performer))
     trained = train.train(labelled_recipe, twice, lambda _: None)
-    found = read(export.finest(labelled_recipe, trained))
+    found = read(onnx_export.finest(labelled_recipe, trained))
     assert gap(found, trained) < 1e-3
 
 
@@ -74,7 +76,7 @@ def test_clips_at_the_same_controls_are_not_confused(labelled_recipe, examples):
 def test_a_coarser_level_strays_by_what_it_keeps(reaching, level):
     """Its residuals are those of the finest, in the leading parts that it has."""
     whole = reaching.bench
-    own = holding.bench(reaching.opened, level)
+    own = constrained_motion.bench(reaching.opened, level)
     t, d, _ = own.reduced.core.shape
     r2, r1, _ = whole.reduced.core.shape
     kept = whole.spread.captured.reshape(-1, r2, r1)[:, :t, :d]

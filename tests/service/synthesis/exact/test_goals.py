@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from service.motion.card import Event
-from service.motion.errors import InvalidField
-from service.motion.measure import Measure
-from service.question.motion_question import MotionQuestion, Target
-from service.synthesis import session
-from service.synthesis.door import Door
-from service.synthesis.exact import goals
+from posefield.common.errors import InvalidField
+from posefield.constraints import targets as goals
+from posefield.inference import session
+from posefield.model_file.model_card import Event
+from posefield.motion.measures import Measure
+from posefield.question.motion_question import MotionQuestion, Target
+from posefield.validation.question_validation import Door
 
 PLACE = (0.3, 1.2, 0.4)
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.motion.measure import Measure
-from service.question.motion_question import ClipQuestion, Target
-from service.synthesis import clips, session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference import session
+from posefield.motion.measures import Measure
+from posefield.question.motion_question import ClipQuestion, Target
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.motion import skeleton
-from service.motion.card import Event
-from service.motion.errors import InvalidField
-from service.motion.measure import Measure
-from service.question.motion_question import ClipQuestion, PoseQuestion, Target
-from service.synthesis import clips, poses, session
-from service.synthesis.exact.goals import NOTHING, Goals
-from service.synthesis.session import Session
-from service.synthesis.synthesizer import Synthesizer
+from posefield.common.errors import InvalidField
+from posefield.constraints.targets import NOTHING, Goals
+from posefield.inference import session
+from posefield.inference.session import Session
+from posefield.model_file.model_card import Event
+from posefield.motion import skeleton
+from posefield.motion.measures import Measure
+from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 FREE = {"exact": "none"}
 

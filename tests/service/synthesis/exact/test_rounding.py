@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from service.synthesis import session
-from service.synthesis.exact import rounding
-from service.synthesis.synthesizer import Synthesizer
+from posefield.inference import named_model, session
+from posefield.synthesis.synthesizer import Synthesizer
 
 
 def test_a_machine_that_rounds_otherwise_has_other_tags(model_path, monkeypatch):
@@ -13,7 +12,7 @@ def test_a_machine_that_rounds_otherwise_has_other_tags(model_path, monkeypatch)
     assert Synthesizer("reaching", opened).fingerprint == here
     solve = np.linalg.solve
     monkeypatch.setattr(np.linalg, "solve", lambda a, b: np.nextafter(solve(a, b), 2.0))
-    rounding.mark.cache_clear()
+    named_model.mark.cache_clear()
     there = Synthesizer("reaching", opened).fingerprint
-    rounding.mark.cache_clear()
+    named_model.mark.cache_clear()
     assert there != here

@@ -4,37 +4,40 @@ import hashlib
 
 import pytest
 
-from service.motion.errors import InvalidField
-from service.web.access import keys, principal
-from service.web.access.principal import EVERYONE, METRICS, NOBODY, READ
+from posefield.common.errors import InvalidField
+from posefield.http.access import api_keys, principal
+from posefield.http.access.principal import EVERYONE, METRICS, NOBODY, READ
 
 DIGEST = "0" * 64
 
 
 def test_a_key_is_256_random_bits_and_none_twice():
-    made = {keys.make() for _ in range(100)}
+    made = {api_keys.make() for _ in range(100)}
     assert len(made) == 100
     assert all(key.startswith("pf_") and len(key) == 3 + 43 for key in made)
 
 
 def test_a_key_is_found_by_what_its_line_says():
-    key, other = keys.make(), keys.make()
-    lines = [keys.line("a", ["read:reach"], key), keys.line("b", ["read:*", "metrics"], other)]
-    known = keys.read("\n".join(lines), "KEYS")
+    key, other = api_keys.make(), api_keys.make()
+    lines = [
+        api_keys.line("a", ["read:reach"], key),
+        api_keys.line("b", ["read:*", "metrics"], other),
+    ]
+    known = api_keys.read("\n".join(lines), "KEYS")
     assert known.find(key) == principal.of("a", ["read:reach"])
     assert known.find(other) == principal.of("b", ["read:*", "metrics"])
 
 
 def test_a_line_does_not_hold_the_key():
-    key = keys.make()
-    line = keys.line("a", ["read:*"], key)
+    key = api_keys.make()
+    line = api_keys.line("a", ["read:*"], key)
     assert key not in line and key.removeprefix("pf_") not in line
     assert line.split()[1] == hashlib.sha256(key.encode()).hexdigest()
 
 
 def test_what_is_nearly_a_key_is_none():
-    key = keys.make()
-    known = keys.read(keys.line("a", ["read:*"], key), "KEYS")
+    key = api_keys.make()
+    known = api_keys.read(api_keys.line("a", ["read:*"], key), "KEYS")
     last = "A" if key[-1] != "A" else "B"
     for wrong in ("", "pf_", key[:-1], key + "A", key[:-1] + last, key.upper(), f" {key}"):
         assert known.find(wrong) is None
@@ -42,16 +45,16 @@ def test_what_is_nearly_a_key_is_none():
 
 
 def test_a_hash_that_only_begins_alike_is_another_key():
-    key = keys.make()
+    key = api_keys.make()
     digest = hashlib.sha256(key.encode()).hexdigest()
     forged = digest[:16] + "".join("0" if c != "0" else "1" for c in digest[16:])
-    assert keys.read(f"a {forged} read:*", "KEYS").find(key) is None
+    assert api_keys.read(f"a {forged} read:*", "KEYS").find(key) is None
 
 
 def test_comments_semicolons_and_empty_lines():
     text = f"# two\n\n  a {DIGEST} read:*  # first\n;b {DIGEST[:-1]}1 metrics;\n"
-    assert {k.principal.name for k in keys.read(text, "KEYS").known.values()} >= {"b"}
-    assert keys.read("# none\n\n", "KEYS").known == {}
+    assert {k.principal.name for k in api_keys.read(text, "KEYS").known.values()} >= {"b"}
+    assert api_keys.read("# none\n\n", "KEYS").known == {}
 
 
 @pytest.mark.parametrize(
@@ -69,16 +72,16 @@ def test_comments_semicolons_and_empty_lines():
 )
 def test_a_line_that_is_none_is_refused_by_its_place(text, words):
     with pytest.raises(InvalidField, match=words.replace("*", r"\*")):
-        keys.read(text, "KEYS")
+        api_keys.read(text, "KEYS")
 
 
 def test_a_key_in_the_place_of_its_hash_is_not_repeated():
-    key = keys.make()
+    key = api_keys.make()
     with pytest.raises(InvalidField) as refused:
-        keys.read(f"a {key} read:*", "KEYS")
+        api_keys.read(f"a {key} read:*", "KEYS")
     assert key not in str(refused.value)
     with pytest.raises(InvalidField) as refused:
-        keys.read(f"{key} read:*", "KEYS")
+        api_keys.read(f"{key} read:*", "KEYS")
     assert "expected 64" in str(refused.value) and "read:*" not in str(refused.value)
 
 

@@ -15,12 +15,12 @@ from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.motion.errors import FileError
-from service.web.access import policy
-from service.web.access.keyset import KeySet
-from service.web.access.principal import Rejected
-from service.web.access.tokens import LAST_MOMENT, Tokens
-from service.web.settings import Settings
+from posefield.common.errors import FileError
+from posefield.http.access import access_policy
+from posefield.http.access.bearer_tokens import LAST_MOMENT, Tokens
+from posefield.http.access.principal import Rejected
+from posefield.http.access.token_keys import KeySet
+from posefield.http.api.settings import Settings
 
 UNREADABLE = "not a token that can be verified"
 SETTINGS = Settings(jwt_issuer="https://issuer", jwt_audience="posefield", jwt_leeway=0)
@@ -427,4 +427,4 @@ def test_what_is_no_key_set_is_refused(content, tmp_path):
 
 
 def test_only_public_algorithms_can_be_chosen():
-    assert not any(name.startswith("HS") or name == "none" for name in policy.ALGORITHMS)
+    assert not any(name.startswith("HS") or name == "none" for name in access_policy.ALGORITHMS)

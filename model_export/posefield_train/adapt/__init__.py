@@ -1,0 +1,1 @@
+"""Adaptation of a trained model to new performers."""

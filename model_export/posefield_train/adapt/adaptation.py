@@ -1,0 +1,104 @@
+"""Adaptation of a trained model to a new performer from a few clips.
+
+The original clips are not needed: the model's samples, in reduced form, stand for them. The new
+clips are aligned to the model's prediction for an unseen performer, their residuals extend the
+bases, and every coefficient model is solved again with its existing parameters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.adapt import canonical_clips, extended_models, tensor_extension
+from posefield_train.adapt.canonical_clips import Known, Moved
+from posefield_train.adapt.extended_models import Laid
+from posefield_train.adapt.tensor_extension import Extended
+from posefield_train.align import travel as travels
+from posefield_train.graph.float_model import Model
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.kriging_bank import FieldBank
+from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.parallel import single_thread
+from posefield_train.source.ingest import Example
+from posefield_train.tensor.decoder import Decoder
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """A model with one more performer, and intermediate results.
+
+    missed: mean squared joint distance (k,), m², of each new clip from its leave-one-out
+    prediction.
+    """
+
+    model: Model
+    moved: Moved
+    extended: Extended
+    missed: Floats
+
+
+def adapt(known: Known, examples: Sequence[Example], performer: str) -> Adapted:
+    """Return the model extended by a performer with an unused name and some examples."""
+    begun = canonical_clips.begin(known, examples)
+    return solve(known, canonical_clips.move(known, begun), performer)
+
+
+def solve(known: Known, moved: Moved, performer: str) -> Adapted:
+    """Return the adapted model for examples that are already in the model's canonical time."""
+    with single_thread.one():
+        parents, weights = known.skeleton.parents, known.joint_weights
+        extended = tensor_extension.extend(
+            known.model, parents, weights, moved.numbers, known.truncation
+        )
+        laid = extended_models.lay(known.model.bank, known.groups, moved.examples, performer)
+        return _solved(known.model, moved, extended, laid)
+
+
+def _solved(model: Model, moved: Moved, extended: Extended, laid: Laid) -> Adapted:
+    reduced = extended.full.truncated(extended.ranks)
+    pose = universal_kriging.solve(
+        laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2]
+    )
+    bones, proportions = extended_models.bones(laid, model.bank, model.proportions, moved.offsets)
+    durations = np.log(moved.aligned.durations)[:, None]
+    new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
+    solved = {
+        name: extended_models.solve(laid, model.bank, name, values) for name, values in new.items()
+    }
+    # Keep the model's order of quantities.
+    others = {name: solved.get(name, bones) for name in model.bank.others}
+    missed, sill = _missed(model.bank, laid, moved, extended)
+    bank = FieldBank(laid.low, laid.high, laid.performers, pose, others, sill)
+    own = extended.tensor
+    decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
+    adapted = Model(bank, model.timing, decoder, proportions, model.travel)
+    return Adapted(adapted, moved, extended, missed)
+
+
+def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tuple[Floats, float]:
+    """Return leave-one-out errors of the new clips, and the sill updated with them.
+
+    The errors are mean squared joint distances (k,), m²; the sill is in m².
+    """
+    hyper, points, k = laid.hyper(old.pose.hyper), laid.samples.points, len(moved.examples)
+    left_out = universal_kriging.leave_out(hyper, points, laid.samples.groups)
+    variances = universal_kriging.left_out_variances(hyper, points, left_out)[-k:]
+    residuals = left_out[-k:] @ extended.full.motions
+    frames = extended.tensor.values.shape[1]
+    missed = np.sum(np.square(residuals), axis=1) / (extended.tensor.weight * frames)
+    for values in moved.travels.values():
+        missed += travels.spread(_travel_residuals(old, laid, values))
+    n = len(points) - k
+    return missed, float((n * old.sill + np.sum(missed / variances)) / (n + k))
+
+
+def _travel_residuals(old: FieldBank, laid: Laid, new: Floats) -> Floats:
+    """Return leave-one-out residuals (k, 3) of the new clips' travel, m."""
+    field, both = old.others["travel"], np.vstack([old.at_samples("travel"), new])
+    if isinstance(field, Kriging):
+        hyper, groups = laid.hyper(field.hyper), laid.samples.groups
+        left_out = universal_kriging.leave_out(hyper, laid.samples.points, groups)
+        return left_out[-len(new) :] @ both
+    return laid.samples.from_mean(both)[-len(new) :]

@@ -1,0 +1,245 @@
+"""Model file of an adapted model: levels of detail, model card and parity check."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
+from posefield.model_file.level_of_detail import Level
+from posefield.model_file.model_card import Control, ModelCard
+from posefield_train.adapt import adaptation, canonical_clips, new_clips
+from posefield_train.adapt.adaptation import Adapted
+from posefield_train.adapt.model_reconstruction import Reopened
+from posefield_train.graph import level_errors, onnx_export, truncation_cost
+from posefield_train.graph.level_errors import Exam
+from posefield_train.graph.levels import FINALS, QUESTIONS, Laddered, Workshop
+from posefield_train.graph.onnx_export import FEW_VALUES, Exported
+from posefield_train.kriging import thinning
+from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.parallel import single_thread
+from posefield_train.source.ingest import Example
+from posefield_train.tensor import truncation_error
+from posefield_train.tensor.truncation_error import Judge, Moment
+
+
+@dataclass(frozen=True)
+class Newcomer:
+    """Clips of a new performer.
+
+    performer: name. examples: the clips. licence: of the clips. notes: findings of the import.
+    """
+
+    performer: str
+    examples: Sequence[Example]
+    licence: str
+    notes: Sequence[str] = ()
+
+
+def refuse_name(card: ModelCard, performer: str) -> None:
+    """Raise InvalidField for a model without performers, or for a known or invalid name."""
+    if not card.performers:
+        raise InvalidField(
+            "performer", f"model {card.name} tells no performers apart, expected one that does"
+        )
+    if performer in card.performers:
+        known = ", ".join(card.performers)
+        raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
+    if not performer or performer != performer.strip() or not performer.isprintable():
+        raise InvalidField(
+            "performer",
+            f"{performer!r}, expected a name of printable characters, without blanks at its ends",
+        )
+
+
+def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
+    """Return the exported model with the new performer; equal inputs give equal bytes.
+
+    Raises InvalidField for an invalid or known name, TrainingError for clips of another action, and
+    ExportRefused as `export.finished` does.
+    """
+    refuse_name(reopened.card, newcomer.performer)
+    with single_thread.one():
+        begun = canonical_clips.begin(reopened.known, newcomer.examples)
+        examples = new_clips.measured_again(reopened, newcomer.examples, begun)
+        moved = canonical_clips.move(reopened.known, examples)
+        canonical_clips.refuse_strangers(reopened.known, moved)
+        adapted = adaptation.solve(reopened.known, moved, newcomer.performer)
+        laddered = _ladder(reopened, adapted)
+        return onnx_export.finished(
+            laddered.model,
+            lambda parity: _card(reopened, adapted, newcomer, laddered.levels, parity),
+        )
+
+
+def _ladder(reopened: Reopened, adapted: Adapted) -> Laddered:
+    """Build the levels of detail with the error bounds of the parent model's levels.
+
+    Joints are compared with the finest level; the errors of the parent's finest level are added.
+    """
+    shop = _workshop(reopened, adapted)
+    finest, *coarser = reopened.card.levels
+    model = shop.model
+    for level in coarser:
+        allowed = np.sqrt(max(level.rms**2 - finest.rms**2, finest.rms**2))
+        model = shop.lowered(model, level.joints, float(allowed))
+    every = range(len(model.decoder.rungs))
+    return Laddered(model, tuple(_as_lost(shop.level(model, n), finest) for n in every))
+
+
+def _as_lost(found: Level, finest: Level) -> Level:
+    """Add the errors of the parent's finest level in quadrature; the two are independent."""
+
+    def both(name: str) -> float:
+        return _short(np.hypot(getattr(found, name), getattr(finest, name)))
+
+    return replace(
+        found,
+        rms=both("rms"),
+        p99=both("p99"),
+        max=both("max"),
+        pose=both("pose"),
+        effector=None if found.effector is None else both("effector"),
+    )
+
+
+def _workshop(reopened: Reopened, adapted: Adapted) -> Workshop:
+    known, extended = reopened.known, adapted.extended
+    parents, moment = known.skeleton.parents, _moment(reopened.card)
+    bank = thinning.ordered(adapted.model.bank)
+    offsets = adapted.model.proportions.numpy(adapted.model.bank.at_samples("offsets"))
+    whole = truncation_error.positions(extended.tensor, extended.tensor.values, parents, offsets)
+    uncut = level_errors.uncut(adapted.model, extended.full)
+
+    def exam(questions: int) -> Exam:
+        return level_errors.against(uncut, parents, moment, questions)
+
+    return Workshop(
+        extended.full,
+        replace(adapted.model, bank=bank),
+        {"rms": 1.0},
+        Judge(extended.tensor, parents, offsets, known.joint_weights, moment, whole),
+        exam(QUESTIONS),
+        exam(FINALS),
+        thinning.lesson(bank),
+    )
+
+
+def _moment(card: ModelCard) -> Moment | None:
+    if card.event is None:
+        return None
+    return Moment(card.event.joint, round((card.frames - 1) * card.event.share))
+
+
+def _card(
+    reopened: Reopened,
+    adapted: Adapted,
+    newcomer: Newcomer,
+    levels: tuple[Level, ...],
+    parity: float,
+) -> ModelCard:
+    """Return the parent's card updated for the new performer.
+
+    The rest pose of the skeleton stays that of the parent, so bound characters stay valid.
+    """
+    old, bank, clips = reopened.card, adapted.model.bank, adapted.moved.examples
+    own = tuple(tuple(map(float, clip.controls)) for clip in clips)
+    seconds = (*old.durations, *adapted.moved.aligned.durations.tolist())
+    left_out = (*old.left_out, *map(_short, np.sqrt(adapted.missed)))
+    fields = bank.others.items()
+    made = {n: onnx_export.solved_with(f.hyper) for n, f in fields if isinstance(f, Kriging)}
+    return replace(
+        old,
+        controls=_controls(old.controls, np.array([*old.examples, *own])),
+        samples=len(bank.pose.samples),
+        levels=levels,
+        durations=(min(seconds), max(seconds)),
+        performers=bank.performers,
+        examples=(*old.examples, *own),
+        moved_by=tuple(np.argmax(bank.pose.samples[:, len(bank.low) :], axis=1).tolist()),
+        sources=(*old.sources, *(clip.row.source for clip in clips)),
+        left_out=left_out,
+        kriging=onnx_export.plainly(bank.pose.hyper),
+        making=replace(reopened.making, fields=made),
+        diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
+        provenance=_provenance(reopened, newcomer),
+    )
+
+
+def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
+    """Return the controls with ranges, defaults and values from samples (N, d)."""
+    return tuple(
+        replace(
+            control,
+            minimum=float(own.min()),
+            maximum=float(own.max()),
+            default=float(np.sort(own)[len(own) // 2]),
+            values=tuple(np.unique(own).tolist()) if len(np.unique(own)) <= FEW_VALUES else (),
+        )
+        for control, own in zip(old, values.T, strict=True)
+    )
+
+
+def _diagnostics(
+    reopened: Reopened,
+    adapted: Adapted,
+    newcomer: Newcomer,
+    left_out: Sequence[float],
+    parity: float,
+) -> dict[str, Any]:
+    """Return the parent's diagnostics with those updated that depend on the new clips.
+
+    `explained`, the truncation cost, `joint_sigma` and `beside` depend on the parent's data alone
+    and are copied.
+    """
+    old, model = reopened.card.diagnostics, adapted.model
+    freedoms, frames, samples = old["tensor"]
+    shape = freedoms, frames, samples + len(newcomer.examples)
+    kept = model.decoder.reduced.core.shape
+    compression = asdict(truncation_cost.compressed(shape, kept, len(model.bank.low)))
+    return {
+        **old,
+        "compression": {name: _short(ratio) for name, ratio in compression.items()},
+        "leave_one_out_rms_m": _short(np.sqrt(np.mean(np.square(left_out)))),
+        "scales": [_short(scale) for scale in model.bank.pose.hyper.scales],
+        "tensor": list(shape),
+        "parity_m": float(f"{parity:.1e}"),
+        "notes": [*old["notes"], *_notes(reopened, adapted, newcomer)],
+    }
+
+
+def _notes(reopened: Reopened, adapted: Adapted, newcomer: Newcomer) -> list[str]:
+    moved, names = adapted.moved, reopened.card.skeleton.names
+    listed = ", ".join(example.row.source for example in moved.examples)
+    parent = f"{reopened.card.name}@{reopened.digest[:16]}"
+    said = f"adapted from {parent} to {newcomer.performer!r} by {len(moved.examples)} clips"
+    adapting = f"{said}: {listed}"
+    return [adapting, *newcomer.notes, *onnx_export.found(moved.findings, moved.examples, names)]
+
+
+def _provenance(reopened: Reopened, newcomer: Newcomer) -> Mapping[str, Any]:
+    """Return the parent's provenance with its digest and the source of the new clips appended."""
+    old = reopened.card.provenance
+    step = {
+        "parent_sha256": reopened.digest,
+        "performer": newcomer.performer,
+        "clips": len(newcomer.examples),
+        "data_sha256": onnx_export.digest(
+            {f"{i} {e.row.place.name}": e for i, e in enumerate(newcomer.examples)}
+        ),
+        "licence": newcomer.licence,
+    }
+    return {
+        **old,
+        "licence": f"{old['licence']}; clips of {newcomer.performer}: {newcomer.licence}",
+        "clips": old["clips"] + len(newcomer.examples),
+        "adapted": [*old.get("adapted", []), step],
+        "versions": {name: version(name) for name in old["versions"]},
+    }
+
+
+def _short(value: Any) -> float:
+    return float(f"{float(value):.4g}")

@@ -1,0 +1,185 @@
+"""Reconstruction of the float64 model from a model file, without the training data.
+
+The graph holds dual weights, not sample values. These are recovered from the dual weights and the
+kriging system, which depends on controls, performers and the parameters of each model. The card
+holds the pose's parameters, the graph the scales and labels of all, and `Making` the rest.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefield.common.errors import ModelError
+from posefield.common.units import Floats, Indices
+from posefield.inference import reduced_motion, residual_covariance
+from posefield.kriging import kriging_model
+from posefield.model_file import checked_file, subgraph
+from posefield.model_file.model_card import Making, ModelCard
+from posefield_train.adapt.canonical_clips import Known
+from posefield_train.align.canonical_timing import Timing
+from posefield_train.align.travel import Travel
+from posefield_train.align.warp import WarpBasis
+from posefield_train.graph.float_model import Model
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.kriging_bank import POSE, Constant, Field, FieldBank
+from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.tensor.decoder import Decoder, Proportions
+from posefield_train.tensor.hosvd import Multilinear
+
+# Largest rounding error of sample controls in float32, in half-ranges.
+SAME = 1e-5
+
+
+@dataclass(frozen=True)
+class Reopened:
+    """A reconstructed model. digest: SHA-256 of the file's content."""
+
+    known: Known
+    card: ModelCard
+    making: Making
+    digest: str
+
+
+@dataclass(frozen=True)
+class _File:
+    """Arrays of a model file by name, with its card. source: name of the file in errors."""
+
+    numbers: Mapping[str, Floats]
+    card: ModelCard
+    making: Making
+    source: str
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in self.numbers:
+            raise ModelError(self.source, f"has no numbers named {name!r}: it cannot be reopened")
+        return self.numbers[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.numbers
+
+
+def load(path: Path) -> Reopened:
+    """Return the model of a file; ModelError if it cannot be read."""
+    return reopen(checked_file.read(path), str(path))
+
+
+def reopen(content: bytes, source: str) -> Reopened:
+    """Return the model of one level, and its card, from the bytes of a file.
+
+    source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
+    """
+    own_card = checked_file.checked(content, source)
+    numbers = {name: _plain(array) for name, array in subgraph.weights(content).items()}
+    file = _File(numbers, own_card, own_card.making, source)
+    return Reopened(_known(file), own_card, own_card.making, checked_file.sha256(content))
+
+
+def _plain(array: Any) -> Floats:
+    return array if np.issubdtype(array.dtype, np.integer) else array.astype(np.float64)
+
+
+def _known(file: _File) -> Known:
+    card, making = file.card, file.making
+    bank = _bank(file)
+    model = Model(bank, _timing(file), _decoder(file, bank), _bones(file), _travel(card))
+    names = card.skeleton.names
+    return Known(
+        model,
+        card.skeleton,
+        np.array(list(making.landmarks.values())),
+        np.array([making.joint_weights.get(name, 1.0) for name in names]),
+        making.in_phase,
+        card.root == "in_place",
+        float(card.diagnostics["truncation_rms_m"]),
+        residual_covariance.groups(card, bank.pose.samples),
+    )
+
+
+def _travel(card: ModelCard) -> Travel | None:
+    return Travel(card.frames) if card.cyclic else None
+
+
+def _timing(file: _File) -> Timing:
+    return Timing(WarpBasis(len(file["warp_still"])), file.card.frames)
+
+
+def _bones(file: _File) -> Proportions:
+    directions = file["offset_directions"]
+    mean = file["offset_mean"].reshape(-1, 3)
+    return Proportions(mean, directions.reshape(len(directions), -1, 3))
+
+
+def _bank(file: _File) -> FieldBank:
+    """Return the coefficient models over the samples in the order of the card."""
+    card = file.card
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    points = kriging_model.half_ranges(np.array(card.examples), low, high)
+    points = np.hstack([points, card.labels])
+    order = _order(file, points)
+    others = {name: _other(file, name, points, order) for name in _widths(file)}
+    pose = _solved(file, POSE, (card.kriging, points, order))
+    return FieldBank(low, high, card.performers, pose, others, float(file["sill"]))
+
+
+def _order(file: _File, points: Floats) -> Indices:
+    """Return the index (n,) on the card of each sample of the graph."""
+    order, held = (
+        residual_covariance.order_of(file.card, file.numbers, points),
+        file["samples"][0].T,
+    )
+    if np.abs(points[order, : len(file.card.controls)] - held).max() > SAME:
+        raise ModelError(file.source, "its card lists other samples than its graph holds")
+    return order
+
+
+def _widths(file: _File) -> dict[str, int]:
+    """Return the number of values of each quantity besides the pose, in their order."""
+    travel = {"travel": 3} if file.card.cyclic else {}
+    bones, warp = len(file["offset_directions"]), len(file["warp_still"])
+    return {**travel, "offsets": bones, "duration": 1, "warp": warp}
+
+
+def _columns(file: _File, name: str) -> slice:
+    """Return the columns of a quantity in the drift weights; the variance takes the first two."""
+    start = 2
+    for other, width in _widths(file).items():
+        if other == name:
+            return slice(start, start + width)
+        start += width
+    return slice(start, None)
+
+
+def _other(file: _File, name: str, points: Floats, order: Indices) -> Field:
+    if f"{name}_weights" not in file:
+        return Constant(file["drift_weights"][0, _columns(file, name)])
+    if name not in file.making.fields:
+        raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
+    nugget, *drifts = file.making.fields[name]
+    fields = [POSE, *(other for other in _widths(file) if f"{other}_weights" in file)]
+    place, own = fields.index(name), file.card.kriging
+    assert own is not None
+    label = np.sqrt(file["squared_labels"][place].item()) if file.card.performers else 0.0
+    scales = np.sqrt(file["squared_scales"][place, :, 0])
+    hyper = Hyper(own.covariance, tuple(map(int, drifts)), scales, nugget, label)
+    return _solved(file, name, (hyper, points, order))
+
+
+def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Kriging:
+    """Return one kriging model, solved for the sample values recovered from its dual weights."""
+    hyper, points, order = laid
+    near = np.empty_like(file[f"{name}_weights"])
+    near[order] = file[f"{name}_weights"]
+    functions = 1 + max(hyper.drifts) * len(hyper.scales)
+    dual = np.vstack([near, file["drift_weights"][:functions, _columns(file, name)]])
+    return universal_kriging.solve(hyper, points, universal_kriging.values(hyper, points, dual))
+
+
+def _decoder(file: _File, bank: FieldBank) -> Decoder:
+    """Return a decoder with the core's coordinates for the first mode."""
+    held = reduced_motion.read(file.numbers, file.card.levels[0])
+    core = held.core.transpose(1, 0, 2)
+    bases = np.eye(len(core)), held.time, bank.pose.values
+    return Decoder(Multilinear(core, bases), held.mean, held.directions.T, held.rotations)

@@ -1,0 +1,182 @@
+"""Examples from files of new clips, checked against the model card of a trained model.
+
+Controls with a measure on the card are measured from the clip; all others come from a table.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from posefield.common.errors import RecipeError
+from posefield.common.units import Floats
+from posefield.model_file.model_card import Control
+from posefield.motion import measures
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.adapt.model_reconstruction import Reopened
+from posefield_train.source import bvh, clip_table, data_folder, ingest, measured_controls
+from posefield_train.source.clip_table import Row, Table
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Source
+
+
+def of_files(
+    reopened: Reopened, paths: Sequence[Path], source: Source, performer: str
+) -> tuple[list[Example], list[str]]:
+    """Return examples of whole files, with all controls measured, and notes on assumptions.
+
+    Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
+    another skeleton; BvhError for a file that cannot be read.
+    """
+    typed = [control.name for control in reopened.card.controls if control.measure is None]
+    needed = [*typed, *reopened.making.landmarks]
+    if needed:
+        raise RecipeError(
+            paths[0],
+            f"nothing says {', '.join(map(repr, needed))}, which cannot be measured, expected a "
+            "table with a column for each",
+        )
+    rows = [_row(path, performer) for path in paths]
+    clip_table.refuse_repeats(rows)
+    return _examples(reopened, rows, source, [{} for _ in rows])
+
+
+def of_table(
+    reopened: Reopened, path: Path, source: Source, performer: str
+) -> tuple[list[Example], list[str]]:
+    """Return examples of a table's rows, and notes on assumptions.
+
+    Columns: `file`, relative to the table; optionally `first_frame` and `last_frame`; landmarks;
+    controls by name, optional for those that can be measured. Raises RecipeError, naming line and
+    column, for an invalid cell, and as `of_files`.
+    """
+    own = clip_table.opened(path)
+    landmarks, controls = reopened.making.landmarks, reopened.card.controls
+    typed = [control.name for control in controls if control.measure is None]
+    own.require(
+        {
+            "file": "the motion file",
+            **dict.fromkeys(landmarks, "a landmark"),
+            **dict.fromkeys(typed, "a control that cannot be measured"),
+        }
+    )
+    own.expect_only({"file", "first_frame", "last_frame", *landmarks, *(c.name for c in controls)})
+    rows, given = [], []
+    for line, record in own.records:
+        rows.append(_row_of(own, line, record, performer, tuple(landmarks)))
+        names = [control.name for control in controls if control.name in record]
+        given.append({name: own.number(line, record, name) for name in names})
+    clip_table.refuse_repeats(rows)
+    return _examples(reopened, rows, source, given)
+
+
+def _row(path: Path, performer: str) -> Row:
+    return Row(path, str(path), None, performer, 0, None, np.zeros(0), ())
+
+
+def _row_of(
+    own: Table, line: int, record: dict[str, str], performer: str, landmarks: tuple[str, ...]
+) -> Row:
+    first = own.frame(line, record, "first_frame") if "first_frame" in record else 0
+    last = own.frame(line, record, "last_frame") if "last_frame" in record else None
+    if last is not None and last <= first:
+        raise RecipeError(own.name, f"frames {first} to {last}, expected at least two", line)
+    try:
+        place = data_folder.find(Path(own.name).parent, record["file"])
+    except RecipeError as fault:
+        raise RecipeError(own.name, f"column 'file': {fault.message}", line) from fault
+    marks = tuple(own.frame(line, record, column) for column in landmarks)
+    return Row(place, own.name, line, performer, first, last, np.zeros(0), marks)
+
+
+def _examples(
+    reopened: Reopened, rows: Sequence[Row], source: Source, given: Sequence[Mapping[str, float]]
+) -> tuple[list[Example], list[str]]:
+    files = ingest.read(rows)
+    examples, notes = [], []
+    for row, values in zip(rows, given, strict=True):
+        example, said = _example(reopened, row, source, files[str(row.place)])
+        controls = _controls(reopened, example, values)
+        examples.append(replace(example, controls=controls))
+        notes += [note for note in said if note not in notes]
+    return examples, notes
+
+
+def _example(
+    reopened: Reopened, row: Row, source: Source, file: bvh.BvhFile
+) -> tuple[Example, list[str]]:
+    own = reopened.card
+    cut, last = ingest.cut(ingest.whole(file, source), row)
+    clip, notes = _of_skeleton(cut, own.skeleton, row)
+    if source.root_offset is None:
+        notes += ingest.offset_notes(file, row)
+    clip, jumps, said = ingest.canonical(clip, row, own.cyclic, own.root == "in_place")
+    marks = ingest.landmarks(row, last)
+    nothing = np.full(len(own.controls), np.nan)
+    return Example(row, clip, nothing, marks, jumps), notes + said
+
+
+def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str]]:
+    """Return the clip of the family's joints alone, and a note on its other joints.
+
+    Raises RecipeError if joints are missing or have other parents.
+    """
+    own = clip.skeleton
+    missing = [name for name in family.names if name not in own.names]
+    if missing:
+        raise row.fault(
+            f"{row.place} has no joints {missing}, which the model has: expected a clip of the "
+            "same skeleton"
+        )
+    kept = [joint for joint, name in enumerate(own.names) if name in family.names]
+    smaller = ingest.keep(clip, kept) if ingest.closed(own, kept) else None
+    if smaller is None or not smaller.skeleton.same_tree(family):
+        raise row.fault(
+            f"{row.place} has the model's joints in another order or hierarchy: expected a clip of "
+            "the same skeleton"
+        )
+    others = [name for name in own.names if name not in family.names]
+    said = f"{row.place}: joints {others}, which the model does not have, were left out"
+    return smaller, [said] if others else []
+
+
+def measured_again(
+    reopened: Reopened, before: Sequence[Example], after: Sequence[Example]
+) -> list[Example]:
+    """Return shifted examples with their measured controls measured again.
+
+    The travel of a cycle on an arc depends on the phase at which it begins.
+    """
+    found = []
+    for old, new in zip(before, after, strict=True):
+        said = zip(reopened.card.controls, old.controls, _controls(reopened, old, {}), strict=True)
+        given = {control.name: float(own) for control, own, again in said if own != again}
+        found.append(replace(new, controls=_controls(reopened, new, given)))
+    return found
+
+
+def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) -> Floats:
+    """Return the controls (d,) of an example: given, measured, or else unchanged."""
+    seen = measured_controls.seen(example.clip)
+
+    def value(control: Control, own: float) -> float:
+        if control.name in given:
+            return given[control.name]
+        if control.measure is None:
+            return own
+        at = _landmark(reopened, control, example) * (len(example.clip) - 1)
+        found = measures.value(control.measure, replace(seen, landmark=at))
+        return round(found, measured_controls.DECIMALS) + 0.0
+
+    pairs = zip(reopened.card.controls, example.controls.tolist(), strict=True)
+    return np.array([value(control, own) for control, own in pairs])
+
+
+def _landmark(reopened: Reopened, control: Control, example: Example) -> float:
+    """Return the share of the clip at which a control is measured; 0 without landmark."""
+    if control.measure is None or control.measure.share is None:
+        return 0.0
+    times = np.array(list(reopened.making.landmarks.values()))
+    return example.landmarks[int(np.argmin(np.abs(times - control.measure.share)))]

@@ -1,0 +1,1 @@
+"""Temporal alignment: dynamic time warping, warps, cycles and travel."""

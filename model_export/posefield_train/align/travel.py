@@ -1,0 +1,90 @@
+"""Travel of a cycle: displacement and change of heading from its first to its last frame.
+
+The last pose of a cycle leads into the first. Travel is removed from the root evenly over the
+cycle, so the first and last frame of the tensor are equal, also after truncation, and a synthesized
+cycle closes exactly. Travel has its own kriging model and is added back at the end.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefield.common.units import UP, Floats
+from posefield.motion import quat, root_travel
+from posefield_train.align.time_alignment import Aligned
+from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.source import measured_controls
+
+# A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.
+TURN = quat.mul(quat.about(UP, np.array(np.pi)), np.eye(4))
+# A slice to the end, however long the axis is.
+END = 2**31 - 1
+
+
+def take_out(aligned: Aligned) -> tuple[Aligned, Floats]:
+    """Return clips (N) with their travel removed, and the travel (N, 3).
+
+    Its components are left and forward, m, and the change of heading, rad.
+    """
+    travel = measured_controls.travel(aligned.rotations[:, :, 0], aligned.root_path)
+    share = np.linspace(0.0, 1.0, aligned.rotations.shape[1])
+    rotations, root_path = put_back(aligned.rotations, aligned.root_path, -travel, share)
+    # The cycles were closed before alignment; remove the rounding error.
+    rotations[:, -1], root_path[:, -1] = rotations[:, 0], root_path[:, 0]
+    return replace(aligned, rotations=rotations, root_path=root_path), travel
+
+
+def put_back(
+    rotations: Floats, root_path: Floats, travel: Floats, share: Floats
+) -> tuple[Floats, Floats]:
+    """Return rotations (B, S, J, 4) and root path (B, S, 3) with travel (B, 3) added.
+
+    share: (..., S), share of the travel completed at each frame.
+    """
+    return root_travel.put_back(rotations, root_path, share[..., None] * travel[:, None])
+
+
+def spread(residuals: Floats) -> Floats:
+    """Return the mean squared distance (N,), m², of all joints due to travel errors (N, 3).
+
+    The error grows linearly from zero, so its mean square is a third of the square at the end.
+    Errors of the heading move the joints by far less and are ignored.
+    """
+    return np.sum(np.square(residuals[:, :2]), axis=1) / 3.0
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Travel of a cycle. frames: number of canonical frames."""
+
+    frames: int
+
+    def numpy(
+        self, rotations: Floats, root: Floats, travel: Floats, place: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) added.
+
+        The third value is the travel completed (B, S, 3). place: canonical frames (B, S).
+        """
+        share = place / (self.frames - 1)
+        return *put_back(rotations, root, travel, share), share[..., None] * travel[:, None]
+
+    def onnx(
+        self, net: Net, rotations: str, root: str, travel: str, place: str
+    ) -> tuple[str, str, str]:
+        """Build `numpy` in a graph; canonical frames are (B, S, 1)."""
+        share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
+        gone = net("Mul", share, net("Unsqueeze", travel, net.indices(1)))
+        axes = np.vstack([np.eye(3)[[0, 2]], np.zeros(3)])
+        moved = net("Add", root, net("MatMul", gone, net.weights("travel_axes", axes)))
+        # Half the angle, with axes for the root's four numbers: (B, S, 1, 1).
+        angle = net("Slice", gone, net.indices(2), net.indices(3), net.indices(2))
+        half = net("Unsqueeze", net("Mul", angle, net.number(0.5)), net.indices(3))
+        row, shape = net.padded(half), net("Shape", half)
+        cosine, sine = (net.unpadded(net(turn, row), shape) for turn in ("Cos", "Sin"))
+        joints = net.indices(2)
+        own = net("Slice", rotations, net.indices(0), net.indices(1), joints)
+        others = net("Slice", rotations, net.indices(1), net.indices(END), joints)
+        across = net("MatMul", own, net.weights("travel_quarter", TURN))
+        turned = net("Add", net("Mul", own, cosine), net("Mul", across, sine))
+        return net("Concat", turned, others, axis=2), moved, gone

@@ -1,0 +1,99 @@
+"""Time warps with few parameters: monotone cubic B-splines from clip time to canonical time.
+
+A warp s(u) maps [0, 1] onto itself. Its coefficients rise from 0 to 1, so it is monotone (variation
+diminishing), and its acceleration is continuous, so it adds no jerk. The logarithms of its
+increments relative to the identity are stored, averaged and predicted: any real values make a valid
+warp, and zeros make the identity.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import lsq_linear
+
+from posefield.common.units import Floats
+
+DEGREE = 3
+# Least increment as a share of the identity's, so that no pose is frozen.
+FLOOR = 0.15
+DENSE = np.linspace(0.0, 1.0, 501)
+
+
+@dataclass(frozen=True)
+class WarpBasis:
+    """Basis of warps. knots: number of free increments."""
+
+    knots: int
+
+    def __post_init__(self) -> None:
+        if self.knots < DEGREE:
+            raise ValueError(f"{self.knots} knots, expected at least {DEGREE}")
+
+    @cached_property
+    def breaks(self) -> Floats:
+        """Return the interior ends of the polynomial pieces in (0, 1)."""
+        return np.linspace(0.0, 1.0, self.knots - DEGREE + 2)[1:-1]
+
+    @cached_property
+    def _vector(self) -> Floats:
+        return np.concatenate([np.zeros(DEGREE + 1), self.breaks, np.ones(DEGREE + 1)])
+
+    @cached_property
+    def still(self) -> Floats:
+        """Return increments (knots,) of the identity: differences of the Greville abscissae."""
+        greville = [self._vector[i + 1 : i + 1 + DEGREE].mean() for i in range(self.knots + 1)]
+        return np.diff(greville)
+
+    @cached_property
+    def _dense(self) -> Floats:
+        return self.design(DENSE)
+
+    def design(self, u: Floats) -> Floats:
+        """Return basis values (..., knots) that multiply increments to give s(u)."""
+        values = BSpline(self._vector, np.eye(self.knots + 1), DEGREE)(u)
+        return np.cumsum(values[..., ::-1], axis=-1)[..., ::-1][..., 1:]
+
+    @cached_property
+    def power_form(self) -> Floats:
+        """Return the matrix (2 + pieces, knots) of the basis over u, u² and (u - break)³₊.
+
+        The first break is zero. The graph evaluates this form with products and a Relu.
+        """
+        u = np.linspace(0.0, 1.0, 64)
+        coefficients, *_ = np.linalg.lstsq(self.powers(u), self.design(u), rcond=None)
+        return np.asarray(coefficients, dtype=np.float64)
+
+    def powers(self, u: Floats) -> Floats:
+        """Return functions (..., 2 + pieces) of the power form at u (...)."""
+        hinges = np.maximum(u[..., None] - np.concatenate([[0.0], self.breaks]), 0.0)
+        return np.concatenate([np.stack([u, u * u], axis=-1), hinges**3], axis=-1)
+
+    def increments(self, logs: Floats) -> Floats:
+        """Return increments (..., knots), with sum one, of log increments (..., knots)."""
+        raw = self.still * np.exp(logs - logs.max(axis=-1, keepdims=True))
+        return raw / raw.sum(axis=-1, keepdims=True)
+
+    def evaluate(self, logs: Floats, u: Floats) -> Floats:
+        """Return canonical time s (..., S) at clip times u (..., S) in [0, 1]."""
+        # Training evaluates the times DENSE a thousand times.
+        design = self._dense if u is DENSE else self.design(u)
+        return np.einsum("...sk,...k->...s", design, self.increments(logs))
+
+    def invert(self, logs: Floats, s: Floats) -> Floats:
+        """Return clip times u (S,) at which one warp reaches canonical times s (S,)."""
+        return np.interp(s, self.evaluate(logs, DENSE), DENSE)
+
+    def fit(self, s: Floats, weights: Floats) -> Floats:
+        """Return log increments (knots,) of the warp nearest to samples s (501,) at DENSE.
+
+        Least squares with a lower bound FLOOR; the large weight of the last sample makes the
+        increments sum to one.
+        """
+        worth = np.sqrt(weights)
+        worth[-1] = 1e3
+        bounds = (FLOOR * self.still, np.ones(self.knots))
+        fitted = lsq_linear(self._dense * worth[:, None], s * worth, bounds, method="bvls")
+        increments = fitted.x / fitted.x.sum()
+        return np.log(increments / self.still)

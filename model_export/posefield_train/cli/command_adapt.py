@@ -1,0 +1,71 @@
+"""Command `posefield adapt`: a new performer for an existing model."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField
+from posefield.console.arguments import Json, ModelPath
+from posefield_train.cli import output_files
+from posefield_train.cli.progress_messages import Progress
+
+Up = Literal["y", "z"]
+RootOffset = Literal["replace", "add"]
+
+
+def adapt(
+    model: ModelPath,
+    clips: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="BVH files of one new performer, one to five or more", metavar="CLIP..."
+        ),
+    ] = None,
+    *,
+    output: Annotated[Path, typer.Option("--output", "-o", help="the .onnx file to write")],
+    performer: Annotated[str, typer.Option(help="their name, by which they are asked for")],
+    unit: Annotated[float, typer.Option(help="length of one unit of the files", metavar="METRES")],
+    up: Annotated[Up, typer.Option(help="up axis of the files")],
+    licence: Annotated[str, typer.Option(help="of the new clips, with what it asks to be said")],
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            help="instead of clips: CSV with columns file, first_frame, last_frame and controls by "
+            "name; what the model can measure may be left out"
+        ),
+    ] = None,
+    root_offset: Annotated[
+        RootOffset | None,
+        typer.Option(help="whether root position channels replace the root's OFFSET or add to it"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Add a performer to a model by a few clips, without the data that it was trained from."""
+    from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
+    from posefield_train.adapt.adapted_file import Newcomer
+    from posefield_train.source.recipe import Source
+
+    output_files.expect_onnx(output)
+    if bool(clips) == bool(table):
+        raise InvalidField("clips", "expected either motion files or --table")
+    if not (0.0 < unit < float("inf")):
+        raise InvalidField("unit", f"{unit}, expected a length in metres")
+    if not licence.strip():
+        raise InvalidField("licence", "blank, expected a text")
+    progress = Progress()
+    progress(f"reading {model}")
+    known = model_reconstruction.load(model)
+    adapted_file.refuse_name(known.card, performer)
+    source = Source(metres_per_unit=unit, up=up, root_offset=root_offset)
+    progress("reading clips")
+    if table:
+        examples, notes = new_clips.of_table(known, table, source, performer)
+    else:
+        examples, notes = new_clips.of_files(known, clips or [], source, performer)
+    progress("adapting, and comparing the graph with the reference")
+    made = adapted_file.make(known, Newcomer(performer, examples, licence, notes))
+    atomic_files.write(made.content, output)
+    progress("done")
+    typer.echo(output_files.wrote(made, output, json))

@@ -1,0 +1,189 @@
+"""Command `posefield evaluate`: errors of a recipe's models on held-out motions."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField
+from posefield.console.output import as_json
+from posefield_train.cli import executors, output_files
+from posefield_train.cli.executors import Scheduler
+
+if TYPE_CHECKING:
+    from posefield_train.evaluate.learning_curves import Learning
+    from posefield_train.evaluate.protocol import Result
+    from posefield_train.evaluate.support_flags import Flags
+    from posefield_train.source.ingest import Example
+    from posefield_train.source.recipe import Recipe
+
+
+class Protocol(StrEnum):
+    """Evaluation protocols."""
+
+    CLIP = "clip"
+    PERFORMER = "performer"
+    TRUTH = "truth"
+
+
+def evaluate(
+    recipe_file: Annotated[Path, typer.Argument(help="a TOML file", metavar="RECIPE")],
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the motion data; default: the recipe's")
+    ] = None,
+    protocol: Annotated[
+        list[Protocol] | None,
+        typer.Option(help="hold out clips or performers, or compare with the truth; default: all"),
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="the .html file to write")] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
+    ] = None,
+    joined: Annotated[
+        Path | None,
+        typer.Option(
+            help="another recipe: share of the gap between both that is flagged", metavar="RECIPE"
+        ),
+    ] = None,
+    learning: Annotated[
+        bool, typer.Option(help="compare suggested with random captures, on the procedural family")
+    ] = False,
+    scheduler: Scheduler = None,
+) -> None:
+    """Measure the error of a recipe's models on unseen motions, beside other methods.
+
+    Everything is fitted again without the clips that are held out.
+    """
+    output_files.expect_html(report)
+    asked = [one.value for one in protocol or []]
+    wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
+    _evaluate(recipe_file, data or recipe_file.parent, wanted)
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """Options of the command. protocols: empty for all that the recipe allows."""
+
+    protocols: list[str]
+    report: Path | None
+    json_file: Path | None
+    scheduler: str | None
+    joined: Path | None
+    learning: bool
+
+
+@dataclass(frozen=True)
+class _Family:
+    """A recipe and its examples."""
+
+    recipe: "Recipe"
+    examples: "list[Example]"
+
+
+def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
+    from posefield_train.evaluate import evaluation_summary
+
+    # Errors in the arguments are reported before minutes of work.
+    own = _family(recipe_file, data, wanted)
+    other = _joined(own, data, wanted)
+    results = _protocols(own, wanted)
+    typer.echo(evaluation_summary.legend(results))
+    curve = _learning(wanted)
+    more = _beside(own, other, results, curve)
+    first, *others = map(evaluation_summary.facts, results)
+    if wanted.json_file:
+        atomic_files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
+    if wanted.report:
+        from posefield_train.evaluate.pages import evaluation_page
+
+        atomic_files.write(
+            evaluation_page.html(own.recipe.description, results, curve), wanted.report
+        )
+
+
+def _family(recipe_file: Path, data: Path, wanted: _Wanted) -> _Family:
+    """Read a recipe's family. Raises InvalidField for options that it does not allow."""
+    from posefield_train.evaluate import protocol
+    from posefield_train.source import ingest, recipe
+
+    own = recipe.read(recipe_file)
+    if wanted.learning and not own.truth:
+        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
+    examples, _ = ingest.ingest(own, data)
+    can = protocol.protocols(own, examples)
+    for name in wanted.protocols:
+        if name not in can:
+            raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
+    return _Family(own, examples)
+
+
+@dataclass(frozen=True)
+class _Joined:
+    """Name of a joined family, and the support flags of both families together."""
+
+    name: str
+    flags: "Flags"
+
+
+def _joined(own: _Family, data: Path, wanted: _Wanted) -> _Joined | None:
+    """Return None if no other family is named."""
+    from posefield_train.evaluate import support_flags
+    from posefield_train.source import ingest, recipe
+
+    if not wanted.joined:
+        return None
+    other = recipe.read(wanted.joined)
+    examples, _ = ingest.ingest(other, data)
+    return _Joined(other.name, support_flags.joined(own.recipe, own.examples, other, examples))
+
+
+def _protocols(own: _Family, wanted: _Wanted) -> "list[Result]":
+    """Run the protocols and print each result when it is complete."""
+    from posefield.console.progress import Bar
+    from posefield_train.evaluate import corrections, evaluation_summary, protocol
+
+    can = protocol.protocols(own.recipe, own.examples)
+    results = []
+    with executors.jobs(wanted.scheduler) as jobs:
+        for name in wanted.protocols or can:
+            with Bar(name) as bar:
+                results.append(protocol.run(own.recipe, own.examples, name, jobs, bar.update))
+            trust = "\n".join(evaluation_summary.trust_text(results[-1]))
+            typer.echo(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
+            if results[-1].corrections:
+                typer.echo(f"{corrections.table(results[-1])}\n")
+    for text in evaluation_summary.performer_text(results):
+        typer.echo(text)
+    return results
+
+
+def _beside(
+    own: _Family, other: _Joined | None, results: "list[Result]", curve: "Learning | None"
+) -> dict[str, Any]:
+    """Print and return the results for a joined family, for performers and for suggested clips."""
+    from posefield_train.evaluate import evaluation_summary, learning_curves
+
+    more: dict[str, Any] = {}
+    if other:
+        typer.echo(f"\n{own.recipe.name} and {other.name} joined, {other.flags.text()}")
+        more["joined"] = {"family": other.name, "support": other.flags.facts()}
+    if named := evaluation_summary.performer_facts(results):
+        more["performers"] = named
+    if curve:
+        more["learning"] = learning_curves.facts(curve)
+        typer.echo(f"\n{learning_curves.table(curve)}")
+    return more
+
+
+def _learning(wanted: _Wanted) -> "Learning | None":
+    """Measure the learning curves; None if they are not wanted."""
+    from posefield.console.progress import Bar
+    from posefield_train.evaluate import learning_curves
+
+    if not wanted.learning:
+        return None
+    with executors.jobs(wanted.scheduler) as jobs, Bar("learning") as bar:
+        return learning_curves.measure(jobs, bar.update)

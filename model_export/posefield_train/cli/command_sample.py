@@ -1,0 +1,41 @@
+"""Command `posefield sample`: procedural motions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField
+from posefield.console.arguments import Json, encoder
+from posefield.console.output import as_json, wrote
+from posefield.console.question_options import Controls, numbers
+from posefield.question.results import ClipAnswer, Trust
+
+
+def sample(
+    family: Annotated[str, typer.Argument(help="reaching")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder, or with --truth a file")],
+    truth: Annotated[bool, typer.Option(help="write the noise-free motion of --control")] = False,
+    control: Controls = None,
+    fps: Annotated[float, typer.Option(help="frames a second, with --truth")] = 120.0,
+    json: Json = False,
+) -> None:
+    """Write a procedural family of motions, or the truth behind it at any control point."""
+    from posefield_train.sample import noise_free as truths
+    from posefield_train.sample import sample_files
+
+    if family != "reaching":
+        raise InvalidField("family", f"{family!r}, expected reaching")
+    if not truth:
+        path = sample_files.family(output)
+        typer.echo(
+            as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
+        )
+        return
+    encode = encoder(output).encode
+    controls = numbers(control or [])
+    clip = truths.clip(controls, fps)
+    answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
+    atomic_files.write(encode(answer), output)
+    typer.echo(wrote(output, answer, json))

@@ -1,0 +1,110 @@
+"""Command `posefield train`: one or several recipes to models."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField, TrainingError
+from posefield.console.arguments import Json
+from posefield.console.output import as_json
+from posefield_train.cli import executors, output_files
+from posefield_train.cli.executors import Place, Scheduler
+from posefield_train.cli.progress_messages import Progress
+
+if TYPE_CHECKING:
+    from posefield_train.graph.onnx_export import Exported
+    from posefield_train.graph.trained_model import Trained
+    from posefield_train.source.recipe import Recipe
+
+
+def train_command(
+    recipe_files: Annotated[list[Path], typer.Argument(help="TOML files", metavar="RECIPE...")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="the .onnx file to write; of several recipes a folder"),
+    ],
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="the .html file to write on the training, with a .json beside it"),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(help="of several recipes: processes")] = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+) -> None:
+    """Train a recipe's model and write it as one .onnx file; several recipes at once."""
+    output_files.expect_html(report)
+    if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):
+        _train(recipe_files[0], data, output, report, json)
+    elif report:
+        raise InvalidField("report", "of several recipes or on a cluster, expected none")
+    else:
+        _sweep(recipe_files, data, output, Place(jobs, scheduler), json)
+
+
+def _train(
+    recipe_file: Path, data: Path | None, output: Path, report: Path | None, json: bool
+) -> None:
+    # SciPy and onnx take a second to import, and other commands do not need them.
+    from posefield_train import train
+    from posefield_train.graph import onnx_export
+    from posefield_train.source import ingest, recipe
+
+    output_files.expect_onnx(output)
+    progress = Progress()
+    progress(f"reading {recipe_file}")
+    own = recipe.read(recipe_file)
+    examples, notes = ingest.ingest(own, data or recipe_file.parent)
+    trained = train.train(own, examples, progress)
+    progress("writing the graph and comparing it with the reference")
+    exported = onnx_export.export(own, trained, notes)
+    atomic_files.write(exported.content, output)
+    if report:
+        _write_report(own, trained, exported, progress, report)
+    progress("done")
+    typer.echo(output_files.wrote(exported, output, json))
+
+
+def _write_report(
+    recipe: "Recipe", trained: "Trained", exported: "Exported", progress: Progress, path: Path
+) -> None:
+    # matplotlib takes a second to import, and only the report needs it.
+    from posefield_train.report import levels_of_detail, training_report
+    from posefield_train.report.provenance import Step
+
+    progress("measuring levels of detail")
+    others = levels_of_detail.alternatives(recipe, trained, exported.card)
+    levels = levels_of_detail.of(exported, others)
+    progress("drawing the report")
+    steps = [Step(name, seconds) for name, seconds in progress.finished]
+    rendered = training_report.render(trained, exported, levels, steps)
+    atomic_files.write(rendered.html, path)
+    atomic_files.write(rendered.json, path.with_suffix(".json"))
+
+
+def _sweep(
+    recipe_files: list[Path], data: Path | None, folder: Path, place: Place, json: bool
+) -> None:
+    from posefield_train import sweep
+
+    if folder.suffix == ".onnx":
+        raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
+    found, failed = [], []
+    with executors.jobs(place.scheduler, place.jobs) as jobs:
+        for made in sweep.models(recipe_files, data, jobs):
+            if isinstance(made.found, TrainingError):
+                failed.append(made.name)
+                typer.echo(f"{made.name}: {made.found}", err=True)
+                continue
+            path = folder / f"{made.name}.onnx"
+            atomic_files.write(made.found.content, path)
+            found.append(output_files.facts(made.found, path))
+            typer.echo(output_files.summary(made.found, path), err=json)
+    if json:
+        typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
+    if failed:
+        raise TrainingError(f"{', '.join(sorted(failed))} of {len(recipe_files)} made no model")

@@ -1,0 +1,50 @@
+"""Executors of a command's jobs: processes of this machine, or a cluster."""
+
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posefield.common.errors import InvalidField
+
+if TYPE_CHECKING:
+    from posefield_train.parallel.jobs import Jobs
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        help="run on the workers of a Dask scheduler, which must have posefield installed too",
+        metavar="tcp://HOST:PORT",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Executor of the training of several models.
+
+    jobs: number of processes; None for one per core. scheduler: address of a cluster's scheduler;
+    None for this machine.
+    """
+
+    jobs: int | None
+    scheduler: str | None
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
+
+
+def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextManager[Jobs]":
+    """Open an executor of jobs: a cluster, or processes of this machine if scheduler is None.
+
+    count: number of processes; None for one per core.
+    """
+    if scheduler is None:
+        from posefield_train.parallel.jobs import Processes
+
+        return nullcontext(Processes(count))
+    from posefield_train.parallel import dask_jobs
+
+    return dask_jobs.connect(scheduler)

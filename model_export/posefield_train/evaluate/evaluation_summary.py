@@ -1,0 +1,263 @@
+"""Results of a protocol as means over clips: as JSON, as a table and in sentences."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.evaluate import corrections, motion_errors
+from posefield_train.evaluate.methods import DEFINITIONS, EXACT, OURS
+from posefield_train.evaluate.motion_errors import Errors
+from posefield_train.evaluate.new_performers import NOBODY, SHOWN
+from posefield_train.evaluate.protocol import Result
+from posefield_train.report.drawing import markdown_table, significant_digits
+
+DISTANCES = {
+    "relative": "relative",
+    "absolute": "global",
+    "plain_relative": "relative, unwarped",
+    "plain_absolute": "global, unwarped",
+    "shell": "shell",
+}
+"""Distances of `Errors`, and their titles."""
+COLUMNS = (
+    ("method", "defined below"),
+    ("relative", "distance without the root's position, after time warping"),
+    ("±", "standard error of the column before, over clips"),
+    ("difference", "relative distance less that of posefield, clip by clip"),
+    ("±", "standard error of the column before, over clips"),
+    ("global", "distance with the root's position, after time warping"),
+    ("effector", "distance of the event's joint at its event"),
+    ("rel. unwarped", "relative distance at equal shares of the duration, without time warping"),
+    ("glob. unwarped", "global distance at equal shares of the duration, without time warping"),
+    ("duration", "RMS of the logarithm of synthesised over captured duration"),
+    ("accel.", "mean acceleration, synthesised over captured"),
+    ("skate", "speed of feet on the ground, synthesised over captured"),
+)
+"""Titles of the table's columns, and their meanings."""
+UNITS = (
+    "Distances are in centimetres, mean over joints, frames and clips. Sigma ratio: mean squared "
+    "error over the squared error that the model predicts; 1 is ideal."
+)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Errors of one method over all clips that it predicted.
+
+    clips: number of those. left_out: number of all others. mean: its errors. standard_error: of the
+    mean relative distance, m. worse: mean difference of its relative distance from posefield's on
+    the same clips, m. worse_error: standard error of that difference, m.
+    """
+
+    name: str
+    clips: int
+    left_out: int
+    mean: Errors
+    standard_error: float
+    worse: float
+    worse_error: float
+
+    @property
+    def skate(self) -> float:
+        """Return the ratio of foot speed on the ground to that of captured feet; 0 without feet."""
+        captured = self.mean.skate_captured
+        return self.mean.skate / captured if captured else 0.0
+
+    def facts(self) -> dict[str, Any]:
+        """Return the figures by name, distances in centimetres."""
+        mean = self.mean
+        return {
+            "clips": self.clips,
+            "clips_left_out": self.left_out,
+            "relative_cm": centimetres(mean.relative.mean),
+            "global_cm": centimetres(mean.absolute.mean),
+            "effector_cm": centimetres(mean.effector),
+            "plain_relative_cm": centimetres(mean.plain_relative.mean),
+            "plain_global_cm": centimetres(mean.plain_absolute.mean),
+            "standard_error_cm": centimetres(self.standard_error),
+            "difference_cm": centimetres(self.worse),
+            "difference_standard_error_cm": centimetres(self.worse_error),
+            "duration_error": significant_digits.number(mean.duration),
+            "acceleration_ratio": significant_digits.number(mean.acceleration),
+            "skate_ratio": significant_digits.number(self.skate) if mean.skate_captured else None,
+            "skate_cm_per_s": centimetres(mean.skate),
+            "distances_cm": {
+                name: {
+                    key: centimetres(value) for key, value in asdict(getattr(mean, name)).items()
+                }
+                for name in DISTANCES
+            },
+            "definition": DEFINITIONS[self.name],
+        }
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row of the table under COLUMNS."""
+        mean = self.mean
+        ours = self.name == OURS
+        return (
+            f"{self.name} ({self.clips} clips)" if self.left_out else self.name,
+            _two(mean.relative.mean),
+            _two(self.standard_error),
+            "" if ours else f"{100 * self.worse:+.2f}",
+            "" if ours else _two(self.worse_error),
+            _two(mean.absolute.mean),
+            "" if np.isnan(mean.effector) else _two(mean.effector),
+            _two(mean.plain_relative.mean),
+            _two(mean.plain_absolute.mean),
+            f"{100 * mean.duration:.1f} %",
+            f"{mean.acceleration:.2f}",
+            f"{self.skate:.2f}" if mean.skate_captured else "",
+        )
+
+
+def _two(metres: float) -> str:
+    return f"{100 * metres:.2f}"
+
+
+def centimetres(metres: float) -> float | None:
+    """Return a rounded length in centimetres; None for NaN."""
+    return None if np.isnan(metres) else significant_digits.number(100.0 * metres)
+
+
+def relative(found: Sequence[Errors]) -> Floats:
+    """Return the mean relative distance (C,) of each clip, m."""
+    return np.array([error.relative.mean for error in found])
+
+
+def of(result: Result) -> list[Summary]:
+    """Return the summary of each method, posefield's first."""
+    return [_summary(result, name) for name in result.errors if result.asked(name)]
+
+
+def _summary(result: Result, name: str) -> Summary:
+    places = result.asked(name)
+    found = result.of(name, places)
+    own, ours = relative(found), relative(result.of(OURS, places))
+    return Summary(
+        name,
+        len(found),
+        len(result.clips) - len(found),
+        motion_errors.mean(found),
+        _standard_error(own),
+        float((own - ours).mean()),
+        _standard_error(own - ours),
+    )
+
+
+def _standard_error(values: Floats) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+
+
+def sigma_ratio(result: Result) -> float:
+    """Return the mean of squared error over squared sigma."""
+    squared = np.array([error.squared for error in result.of(OURS, result.asked(OURS))])
+    return float(np.mean(squared / np.square(result.sigma)))
+
+
+def joint_sigma_ratios(result: Result) -> dict[str, float]:
+    """Return the mean of squared error over squared sigma of each joint."""
+    squared = np.stack([error.joints for error in result.of(OURS, result.asked(OURS))])
+    ratios = np.mean(squared / np.square(result.joint_sigma), axis=0)
+    return dict(zip(result.joints, ratios.tolist(), strict=True))
+
+
+def facts(result: Result) -> dict[str, Any]:
+    """Return the figures of a result as JSON values."""
+    held = {} if result.flags is None else {"support": result.flags.facts()}
+    by_joint = joint_sigma_ratios(result)
+    methods = {summary.name: summary.facts() for summary in of(result)}
+    if EXACT in methods:
+        methods[EXACT]["exact"] = corrections.facts(result)
+    return {
+        "family": result.family,
+        "protocol": result.protocol,
+        "clips": len(result.clips),
+        "sigma_ratio": significant_digits.number(sigma_ratio(result)),
+        "joint_sigma_ratio": {
+            name: significant_digits.number(ratio) for name, ratio in by_joint.items()
+        },
+        **held,
+        "methods": methods,
+    }
+
+
+def table(result: Result) -> str:
+    """Return a result as a table in Markdown under a title."""
+    title = (
+        f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
+        f"sigma ratio {sigma_ratio(result):.2f}"
+    )
+    head = [title for title, _ in COLUMNS]
+    return f"{title}\n\n{markdown_table.table(head, [summary.cells() for summary in of(result)])}"
+
+
+def trust_text(result: Result) -> list[str]:
+    """Return a sentence on sigma by joint, and one on the support flag."""
+    ratios = joint_sigma_ratios(result)
+    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    joints = (
+        f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
+        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
+    )
+    return [joints] + ([result.flags.text()] if result.flags else [])
+
+
+def legend(results: Sequence[Result]) -> str:
+    """Return units, columns and methods of the tables of some results, one per line."""
+    meanings = [f"  {title}: {meaning}" for title, meaning in COLUMNS if title != "±"]
+    names = dict.fromkeys(name for result in results for name in result.errors)
+    definitions = [f"  {name}: {DEFINITIONS[name]}" for name in names]
+    return "\n".join([UNITS, *meanings, "  ±: standard error over clips", "Methods:", *definitions])
+
+
+def performer_facts(results: Sequence[Result]) -> dict[str, Any]:
+    """Return the error reduction by performer names and by clips of new performers.
+
+    Empty unless both protocols were run on a model that distinguishes performers.
+    """
+    by_name = {result.protocol: result for result in results}
+    clips, others = (by_name.get(f"leave_one_{held}_out") for held in ("clip", "performer"))
+    if not clips or not others or NOBODY not in clips.errors:
+        return {}
+    everyone = clips.asked(NOBODY)
+    named, unnamed = (_mean_relative(clips, name, everyone) for name in (OURS, NOBODY))
+    adapted = {name: _adapted(clips, others, name) for name in SHOWN if others.asked(name)}
+    return {"named_nearer": significant_digits.number(1.0 - named / unnamed), **adapted}
+
+
+def _adapted(clips: Result, others: Result, name: str) -> dict[str, Any]:
+    """Compare an adapted model with models of none, and of the other clips of the performer."""
+    places = others.asked(name)
+    own, none = (_mean_relative(others, one, places) for one in (name, OURS))
+    whole = _mean_relative(clips, OURS, places)
+    return {
+        "clips": len(places),
+        "relative_cm": centimetres(own),
+        "shown_none_cm": centimetres(none),
+        "shown_all_cm": centimetres(whole),
+        "farther_than_all": significant_digits.number(own / whole - 1.0),
+    }
+
+
+def _mean_relative(result: Result, name: str, places: Sequence[int]) -> float:
+    return float(relative(result.of(name, places)).mean())
+
+
+def performer_text(results: Sequence[Result]) -> list[str]:
+    """Return the performer facts, a sentence each."""
+    found = performer_facts(results)
+    if not found:
+        return []
+    return [
+        f"with the performer's name the error is {100 * found['named_nearer']:.1f} % smaller",
+        *(
+            f"{name}: {one['relative_cm']:.2f} cm on {one['clips']} clips; without clips of the "
+            f"performer {one['shown_none_cm']:.2f} cm; trained with all other clips "
+            f"{one['shown_all_cm']:.2f} cm ({100 * one['farther_than_all']:+.1f} %)"
+            for name in SHOWN
+            if (one := found.get(name))
+        ),
+    ]

@@ -1,0 +1,34 @@
+"""Noise-free motions of the procedural family at control points that were not sampled."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.evaluate import compared_motion
+from posefield_train.evaluate.compared_motion import Event, Motion
+from posefield_train.sample import noise_free, sample_controls
+
+POINTS, SEED = 2_000, 2006
+RATE = 120.0
+"""Frames per second of the noise-free motions."""
+
+
+def points(count: int = POINTS) -> Floats:
+    """Return control points (count, 4), seeded, spread evenly over the possible range."""
+    rng = np.random.Generator(np.random.PCG64(SEED))
+    return np.array([_point(rng) for _ in range(count)])
+
+
+def _point(rng: np.random.Generator) -> list[float]:
+    stature = rng.uniform(*sample_controls.RANGES["stature"][:2])
+    hip = rng.uniform(*sample_controls.limits("hip_height", stature, 0.0))
+    rest = [
+        rng.uniform(*sample_controls.limits(n, stature, hip)) for n in ("turn", "target_height")
+    ]
+    return [float(stature), float(hip), *map(float, rest)]
+
+
+def motions(points: Floats, event: Event | None) -> Sequence[Motion]:
+    """Return the noise-free motions at control points (Q, 4)."""
+    return [compared_motion.of_clip(noise_free.clip(list(point), RATE), event) for point in points]

@@ -1,0 +1,172 @@
+"""Other interpolation methods, which predict values at queries from values at samples.
+
+A peer is a method of a library, not a copy of it. Its inputs are the controls in half-ranges and
+the quantities that posefield kriges: reduced motions, bone offsets, duration, warp and travel.
+"""
+
+import warnings
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RBFInterpolator
+from sklearn.dummy import DummyRegressor
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+from sklearn.linear_model import LinearRegression
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
+
+from posefield.common.units import Floats
+from posefield_train.kriging.sample_points import Samples
+
+Peer = Callable[[Samples, Floats, Floats], Floats]
+"""Function of samples, their values (n, m) and queries (q, d + p) that returns values (q, m)."""
+
+SMOOTHINGS = (0.0, *np.geomspace(1e-3, 1e2, 11))
+
+
+def _controls(samples: Samples, queries: Floats) -> tuple[Floats, Floats]:
+    return samples.half_ranges, queries[:, : samples.controls]
+
+
+Kernel = Literal["thin_plate_spline", "linear", "cubic"]
+
+
+def _rbf(kernel: Kernel) -> Peer:
+    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        return _through(known, values, kernel, 0.0)(asked)
+
+    return predict
+
+
+def _through(known: Floats, values: Floats, kernel: Kernel, smoothing: float) -> RBFInterpolator:
+    return RBFInterpolator(*_merged(known, values), kernel=kernel, degree=1, smoothing=smoothing)
+
+
+def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return distinct points and the mean value at each: an interpolator needs distinct points."""
+    points, place, counts = np.unique(known, axis=0, return_inverse=True, return_counts=True)
+    sums = np.zeros((len(points), values.shape[1]))
+    np.add.at(sums, np.ravel(place), values)
+    return points, sums / counts[:, None]
+
+
+def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Return thin-plate predictions with the smoothing of the least leave-one-out error."""
+    known, asked = _controls(samples, queries)
+    losses = [_left_out(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
+    best = SMOOTHINGS[int(np.argmin(losses))]
+    return _through(known, values, "thin_plate_spline", best)(asked)
+
+
+def _left_out(samples: Samples, known: Floats, values: Floats, smoothing: float) -> float:
+    total = 0.0
+    for group in np.unique(samples.groups):
+        out = samples.groups == group
+        found = _through(known[~out], values[~out], "thin_plate_spline", smoothing)(known[out])
+        total += float(np.sum(np.square(found - values[out])))
+    return total
+
+
+def gp(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Return predictions of a Gaussian process with a length scale for each control and performer.
+
+    Length scales, amplitude and noise maximise the marginal likelihood.
+    """
+    centre, size = values.mean(axis=0), max(float(values.std()), 1e-12)
+    lengths = np.ones(samples.points.shape[1])
+    kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(lengths, (0.1, 100.0))
+    model = GaussianProcessRegressor(kernel + WhiteKernel(0.1, (1e-5, 10.0)), random_state=0)
+    with warnings.catch_warnings():
+        # A length scale at its bound is a valid result: the control has no influence, or all.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        found = model.fit(samples.points, (values - centre) / size).predict(queries)
+    return centre + size * found.reshape(len(queries), -1)
+
+
+def gp_controls(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Return the predictions of `gp` from the controls alone."""
+    known, asked = _controls(samples, queries)
+    return gp(Samples(known, samples.controls, samples.groups), values, asked)
+
+
+def _regression(degree: int) -> Peer:
+    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        model = make_pipeline(PolynomialFeatures(degree), LinearRegression())
+        return model.fit(known, values).predict(asked)
+
+    return predict
+
+
+def _neighbours(count: int | None, weights: str | Callable[[Floats], Floats]) -> Peer:
+    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        model = KNeighborsRegressor(min(count or len(known), len(known)), weights=weights)
+        return model.fit(known, values).predict(asked)
+
+    return predict
+
+
+def _inverse_square(distances: Floats) -> Floats:
+    # At a sample the prediction is that of the sample.
+    return 1.0 / np.maximum(np.square(distances), 1e-12)
+
+
+def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Return the nearest example of the same performer, or of any if that performer has none."""
+    found = np.empty((len(queries), values.shape[1]))
+    for row, query in enumerate(queries):
+        same = samples.points[:, samples.controls :] @ query[samples.controls :] > 0.5
+        among = same if same.any() else np.ones(len(values), dtype=bool)
+        known = samples.half_ranges[among]
+        model = KNeighborsRegressor(1).fit(known, values[among])
+        found[row] = model.predict(query[None, : samples.controls])[0]
+    return found
+
+
+def linear_coefficients(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Interpolate linearly over simplices of the samples; outside their hull, take the nearest."""
+    known, asked = _controls(samples, queries)
+    if samples.controls == 1:
+        order = np.argsort(known[:, 0])
+        columns = [np.interp(asked[:, 0], known[order, 0], v[order]) for v in values.T]
+        return np.stack(columns, axis=1)
+    inside = LinearNDInterpolator(known, values)(asked)
+    outside = NearestNDInterpolator(known, values)(asked)
+    return np.where(np.isnan(inside), outside, inside)
+
+
+def mean(samples: Samples, values: Floats, queries: Floats) -> Floats:
+    """Return the mean of all samples for each query."""
+    return DummyRegressor().fit(samples.points, values).predict(queries).reshape(len(queries), -1)
+
+
+PEERS: dict[str, tuple[Peer, str]] = {
+    "thin_plate": (_rbf("thin_plate_spline"), "scipy RBFInterpolator, thin plate, degree 1"),
+    "thin_plate_smoothed": (
+        thin_plate_smoothed,
+        "the same, smoothing tuned by leave-one-take-out for each of motion, bones, duration, warp",
+    ),
+    "linear_rbf": (_rbf("linear"), "scipy RBFInterpolator, linear kernel, degree 1"),
+    "cubic_rbf": (_rbf("cubic"), "scipy RBFInterpolator, cubic kernel, degree 1"),
+    "gp": (gp, "scikit-learn GaussianProcessRegressor, ARD RBF + white noise, label as columns"),
+    "gp_controls": (gp_controls, "the same without the performer's label"),
+    "inverse_distance": (_neighbours(None, _inverse_square), "scikit-learn, weights 1 / distance²"),
+    "k_nearest": (_neighbours(5, "distance"), "scikit-learn, 5 nearest, weights 1 / distance"),
+    "nearest": (_neighbours(1, "uniform"), "scikit-learn, nearest example"),
+    "nearest_same_performer": (nearest_same, "scikit-learn, nearest of the same performer"),
+    "linear_regression": (_regression(1), "scikit-learn LinearRegression"),
+    "quadratic_regression": (_regression(2), "scikit-learn, quadratic polynomial"),
+    "linear_coefficients": (
+        linear_coefficients,
+        "multilinear model, coefficients interpolated linearly (scipy LinearNDInterpolator; "
+        "nearest outside the hull)",
+    ),
+    "mean": (mean, "the mean motion"),
+}
+"""Peers by name, each with its definition."""

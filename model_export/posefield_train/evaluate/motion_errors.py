@@ -1,0 +1,150 @@
+"""Errors of a synthesised motion against a captured one, and their means over clips."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import foot_skate
+from posefield_train.align import dtw, time_alignment
+from posefield_train.evaluate.compared_motion import FRAMES, Motion
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Statistics of distances over joints and frames, m.
+
+    mean, rms: root mean square, p95, p99: percentiles, largest.
+    """
+
+    mean: float
+    rms: float
+    p95: float
+    p99: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one synthesized motion relative to the captured one.
+
+    relative, absolute: after time warping, without and with the root's position; plain_…: at equal
+    shares of the duration. shell: largest of three points around each joint, after time warping,
+    without the root's position. effector: distance at the event, m; NaN without an event.
+    acceleration: mean magnitude, synthesized over captured, at equal durations. skate,
+    skate_captured: mean speed of feet on the ground, m/s. duration: logarithm of synthesized over
+    captured. joints: mean squared absolute distance (J,) of each joint, m².
+    """
+
+    relative: Distances
+    absolute: Distances
+    plain_relative: Distances
+    plain_absolute: Distances
+    shell: Distances
+    effector: float
+    acceleration: float
+    skate: float
+    skate_captured: float
+    duration: float
+    joints: Floats
+
+    @property
+    def squared(self) -> float:
+        """Return the mean squared absolute distance, m², which sigma predicts."""
+        return self.absolute.rms**2
+
+
+def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
+    """Return the errors of a synthesized motion. feet: joint indices."""
+    own, true = made.points, captured.points
+    phase = dtw.warp(_around(true)[None], _around(own))[0]
+    warped = _at(own, phase)
+    return Errors(
+        _distances(_apart(_rooted(warped), _rooted(true))),
+        _distances(_apart(warped, true)),
+        _distances(_apart(_rooted(own), _rooted(true))),
+        _distances(_apart(own, true)),
+        _distances(np.linalg.norm(_rooted(warped) - _rooted(true), axis=-1)[:, :, 1:].max(axis=2)),
+        _effector(made.event, captured.event),
+        acceleration(own) / acceleration(true),
+        skate(made, feet),
+        skate(captured, feet),
+        float(np.log(made.duration / captured.duration)),
+        np.mean(np.square(_apart(warped, true)), axis=0),
+    )
+
+
+def _effector(made: Floats | None, captured: Floats | None) -> float:
+    if made is None or captured is None:
+        return math.nan
+    return float(np.linalg.norm(made - captured))
+
+
+def _rooted(points: Floats) -> Floats:
+    return points - points[:, :1, :1]
+
+
+def _around(points: Floats) -> Floats:
+    """Return joint positions (FRAMES, J * 3) relative to the root, for time warping."""
+    return _rooted(points)[:, :, 0].reshape(FRAMES, -1)
+
+
+def _at(points: Floats, phase: Floats) -> Floats:
+    return time_alignment.at(points.reshape(FRAMES, -1), phase).reshape(points.shape)
+
+
+def _apart(a: Floats, b: Floats) -> Floats:
+    return np.linalg.norm(a[:, :, 0] - b[:, :, 0], axis=-1)
+
+
+def _distances(apart: Floats) -> Distances:
+    p95, p99 = np.percentile(apart, [95, 99])
+    rms = np.sqrt(np.mean(np.square(apart)))
+    return Distances(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
+
+
+def acceleration(points: Floats) -> float:
+    """Return the mean size of second differences of points (FRAMES, J, 4, 3), root-relative, m."""
+    joints = _rooted(points)[:, 1:, 0]
+    return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
+
+
+def skate(motion: Motion, feet: tuple[int, ...]) -> float:
+    """Return the mean horizontal speed of feet on the ground, m/s; 0 without feet."""
+    return float(foot_skate.skate(motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration))
+
+
+def mean(errors: Sequence[Errors]) -> Errors:
+    """Return the means over clips.
+
+    RMS distances are pooled, the largest is the largest of all, and the duration's error is an RMS.
+    """
+
+    def pooled(name: str) -> Distances:
+        return _pool([getattr(error, name) for error in errors])
+
+    def average(name: str) -> float:
+        return float(np.mean([getattr(error, name) for error in errors]))
+
+    return Errors(
+        relative=pooled("relative"),
+        absolute=pooled("absolute"),
+        plain_relative=pooled("plain_relative"),
+        plain_absolute=pooled("plain_absolute"),
+        shell=pooled("shell"),
+        effector=average("effector"),
+        acceleration=average("acceleration"),
+        skate=average("skate"),
+        skate_captured=average("skate_captured"),
+        duration=float(np.sqrt(np.mean(np.square([error.duration for error in errors])))),
+        joints=np.mean([error.joints for error in errors], axis=0),
+    )
+
+
+def _pool(parts: Sequence[Distances]) -> Distances:
+    listed = np.array([[d.mean, d.rms, d.p95, d.p99, d.largest] for d in parts])
+    average = listed.mean(axis=0)
+    rms = np.sqrt(np.mean(np.square(listed[:, 1])))
+    return Distances(*map(float, (average[0], rms, average[2], average[3], listed[:, 4].max())))

@@ -1,0 +1,130 @@
+"""HTML page of an evaluation."""
+
+from collections.abc import Sequence
+
+from posefield_train.evaluate import corrections, evaluation_summary
+from posefield_train.evaluate.evaluation_summary import Summary
+from posefield_train.evaluate.learning_curves import Learning
+from posefield_train.evaluate.methods import DEFINITIONS, OURS
+from posefield_train.evaluate.pages import evaluation_charts
+from posefield_train.evaluate.protocol import Result
+from posefield_train.report.drawing.html_page import Page, Section, Table
+
+TITLES = {
+    "leave_one_clip_out": "Each clip predicted from the other clips",
+    "leave_one_performer_out": "Each performer predicted from the other performers",
+    "truth": "Comparison with the noise-free truth",
+}
+
+
+def html(description: str, results: Sequence[Result], curve: Learning | None = None) -> bytes:
+    """Return the page of a recipe's results and learning curve; equal results, equal bytes."""
+    first = evaluation_summary.of(results[0])[0]
+    figures = [
+        ("root-relative error", f"{100 * first.mean.relative.mean:.2f} cm"),
+        ("global error", f"{100 * first.mean.absolute.mean:.2f} cm"),
+        ("error of the duration", f"{100 * first.mean.duration:.1f} %"),
+        ("sigma ratio (1 is ideal)", f"{evaluation_summary.sigma_ratio(results[0]):.2f}"),
+    ]
+    sections = [part for result in results for part in (_section(result), _distances(result))]
+    sections += [] if curve is None else [_learning(curve)]
+    sections += [_legend(results)]
+    return Page("evaluation", results[0].family, description, figures, sections).html()
+
+
+def _section(result: Result) -> Section:
+    found = evaluation_summary.of(result)
+    caption = "Mean error of each method (cm; columns are explained under Methods and columns)"
+    head = tuple(title for title, _ in evaluation_summary.COLUMNS)
+    rival = min(_rivals(found), key=lambda one: one.worse).name
+    return Section(
+        result.protocol,
+        TITLES[result.protocol],
+        (
+            evaluation_summary.UNITS,
+            _verdict(found),
+            *map(_sentence, evaluation_summary.trust_text(result)),
+        ),
+        (Table(caption, head, tuple(one.cells() for one in found)), *_corrections(result)),
+        (
+            evaluation_charts.bars(found),
+            evaluation_charts.clips(result, rival),
+            evaluation_charts.calibration(result),
+            *evaluation_charts.event(result),
+        ),
+    )
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _corrections(result: Result) -> list[Table]:
+    rows = corrections.rows(result)
+    caption = "Answers corrected to the captured position of the effector"
+    return [Table(caption, corrections.HEAD, rows)] if rows else []
+
+
+def _rivals(found: Sequence[Summary]) -> list[Summary]:
+    """Return the methods other than the variants of posefield."""
+    return [one for one in found if not one.name.startswith(OURS)]
+
+
+def _verdict(found: Sequence[Summary]) -> str:
+    """Return which methods are better than posefield, or tie with it."""
+    others = _rivals(found)
+    ahead = [one.name for one in others if one.worse < -one.worse_error]
+    tied = [one.name for one in others if abs(one.worse) <= one.worse_error]
+    if ahead:
+        return f"Better than posefield by more than one standard error: {', '.join(ahead)}."
+    if tied:
+        return (
+            "No method is better than posefield by more than one standard error. Within one "
+            f"standard error: {', '.join(tied)}."
+        )
+    return "Posefield is better than every other method by more than one standard error."
+
+
+def _distances(result: Result) -> Section:
+    """Return the statistics of every distance of every method."""
+    heading = ("method", "distance", "mean", "RMS", "p95", "p99", "largest")
+    rows = [
+        (one.name, title, *(f"{100 * value:.2f}" for value in vars(spread).values()))
+        for one in evaluation_summary.of(result)
+        for name, title in evaluation_summary.DISTANCES.items()
+        for spread in (getattr(one.mean, name),)
+    ]
+    paragraphs = (
+        "Centimetres over joints and frames. p95 and p99 are percentiles within a clip, averaged "
+        "over clips. Global distances include the root's position; relative ones do not. Unwarped "
+        "distances are taken at equal shares of the duration, the others after time warping. The "
+        "shell distance is the largest of three points 3 cm from each joint, without the root's "
+        "position.",
+    )
+    title = f"All distances: {result.protocol.replace('_', ' ')}"
+    table = Table("Distances by method (cm)", heading, tuple(rows))
+    return Section(f"{result.protocol}-distances", title, paragraphs, (table,))
+
+
+def _learning(curve: Learning) -> Section:
+    paragraphs = (
+        f"Samples were added from {curve.sizes[0]} to {curve.sizes[-1]}: those that `posefield "
+        f"suggest` ranks first, or random ones. {curve.text()}",
+    )
+    title = "Suggested captures against random ones"
+    return Section("learning", title, paragraphs, (), (evaluation_charts.learning(curve),))
+
+
+def _legend(results: Sequence[Result]) -> Section:
+    names = dict.fromkeys(name for result in results for name in result.errors)
+    methods = tuple((name, DEFINITIONS[name]) for name in names)
+    paragraphs = (
+        "All methods get the same aligned clips, and predict motion, bone lengths and timing.",
+    )
+    tables = (
+        Table("Methods", ("method", "definition"), methods),
+        Table(
+            "Columns", ("column", "meaning"), tuple(dict.fromkeys(evaluation_summary.COLUMNS[1:]))
+        ),
+    )
+    return Section("methods", "Methods and columns", paragraphs, tables)

@@ -1,0 +1,1 @@
+"""The model, its levels of detail and its file."""

@@ -1,0 +1,143 @@
+"""Complete model in float64, the reference for the graph."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.model_file import checksum
+from posefield.motion import skeleton
+from posefield_train.align.canonical_timing import Timing
+from posefield_train.align.travel import Travel
+from posefield_train.kriging import kriging_graph
+from posefield_train.kriging.kriging_bank import POSE, VARIANCE, FieldBank
+from posefield_train.onnx_graph.graph_builder import Net, Shapes
+from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.tensor.decoder import Decoder, Proportions
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Outputs of a model.
+
+    rotations: (B, S, J, 4). root_position: (B, S, 3), m. bone_offsets: (B, J, 3), m. duration:
+    (B,), s. sigma: (B,), m. travel: (B, S, 3).
+    """
+
+    rotations: Floats
+    root_position: Floats
+    bone_offsets: Floats
+    duration: Floats
+    sigma: Floats
+    travel: Floats
+
+    def positions(self, parents: tuple[int, ...]) -> Floats:
+        """Return joint positions (B, S, J, 3), m."""
+        translations = skeleton.translations(self.bone_offsets, self.root_position)
+        return skeleton.positions(parents, self.rotations, translations)
+
+
+@dataclass(frozen=True)
+class Model:
+    """Stages of a trained model. travel: None if it is not cyclic."""
+
+    bank: FieldBank
+    timing: Timing
+    decoder: Decoder
+    proportions: Proportions
+    travel: Travel | None
+
+    def evaluate(
+        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+    ) -> Outputs:
+        """Return outputs at controls (B, d) in their own units and times (B, S), s, of a level.
+
+        labels: performers (B, p), by default an unseen performer.
+        """
+        nobody = np.zeros((len(controls), len(self.bank.performers)))
+        fields = self.fields(controls, nobody if labels is None else labels, level)
+        return self.timed(fields, time, level)
+
+    def fields(self, controls: Floats, labels: Floats, level: int) -> dict[str, Floats]:
+        """Return the values (B, m) of all kriged quantities by name."""
+        return self.bank.numpy(self.bank.points(controls, labels), level)
+
+    def timed(self, fields: dict[str, Floats], time: Floats, level: int) -> Outputs:
+        """Return the outputs for `fields` at times (B, S), s."""
+        _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
+        return self._decoded(fields, place, level)
+
+    def durations(self, controls: Floats, labels: Floats) -> Floats:
+        """Return the durations (B,), s, at the finest level."""
+        logs = self.bank.others["duration"].predict(self.bank.points(controls, labels))
+        return np.exp(logs[:, 0])
+
+    def posed(self, controls: Floats, place: Floats, labels: Floats, level: int) -> Outputs:
+        """Return outputs at canonical frames (B, S)."""
+        return self._decoded(self.fields(controls, labels, level), place, level)
+
+    def joint_at_frame(
+        self, fields: dict[str, Floats], chain: Sequence[int], frame: int, level: int
+    ) -> Floats:
+        """Return the positions (B, 3), m, of the last joint of a chain at one canonical frame.
+
+        chain: joints from the root on, each the parent of the next.
+        """
+        decoder = self.decoder.at(level).of_joints(chain)
+        rotations, root = (found[:, None] for found in decoder.at_frame(fields[POSE], frame))
+        if self.travel:
+            place = np.full((len(root), 1), float(frame))
+            rotations, root, _ = self.travel.numpy(rotations, root, fields["travel"], place)
+        offsets = self.proportions.numpy(fields["offsets"])[:, list(chain)]
+        translations = skeleton.translations(offsets, root)
+        parents = tuple(range(-1, len(chain) - 1))
+        return skeleton.positions(parents, rotations, translations)[:, 0, -1]
+
+    def _decoded(self, fields: dict[str, Floats], place: Floats, level: int) -> Outputs:
+        rotations, root = self.decoder.at(level).numpy(fields[POSE], place)
+        gone, duration = np.zeros((*place.shape, 3)), np.exp(fields["duration"][:, 0])
+        if self.travel:
+            rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], place)
+        offsets = self.proportions.numpy(fields["offsets"])
+        sigma = self.bank.sigma(fields[VARIANCE])
+        return Outputs(rotations, root, offsets, duration, sigma, gone)
+
+    def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
+        """Return the file of the model: one graph with metadata, producer fields and a checksum."""
+        net = Net()
+        ranks = [rung.ranks[2] for rung in self.decoder.rungs]
+        ladder = Ladder({**kriging_graph.entries(self.bank, ranks), **self.decoder.entries()})
+        ends = ladder.onnx(net)
+        fields = kriging_graph.onnx(self.bank, net, "controls", ends)
+        # service/posefield/constraints reads the coefficients by this name.
+        fields[POSE] = net.called("coefficients", fields[POSE])
+        duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
+        place = net.called("frame", place)
+        rotations, root = self.decoder.onnx(net, fields[POSE], place, ends)
+        if self.travel:
+            way = net.called("way", fields["travel"])
+            rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
+        else:
+            gone = net("Mul", place, net.weights("no_travel", np.zeros(3)))
+        net.named("rotations", rotations)
+        net.named("root_position", root)
+        net.named("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
+        net.named("duration", duration)
+        net.named("sigma", fields["sigma"])
+        net.named("travel", gone)
+        joints = len(self.decoder.means)
+        inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
+        if self.bank.performers:
+            # Its default has one row, so its axis must not share the name "batch".
+            inputs["performer"] = ["batch_or_one", len(self.bank.performers)]
+        inputs["level"] = []
+        outputs: Shapes = {
+            "rotations": ["batch", "steps", joints, 4],
+            "root_position": ["batch", "steps", 3],
+            "bone_offsets": ["batch", joints, 3],
+            "duration": ["batch"],
+            "sigma": ["batch"],
+            "travel": ["batch", "steps", 3],
+        }
+        return checksum.sealed(net.model(inputs, outputs, metadata, about))

@@ -1,0 +1,109 @@
+"""Cost of a truncation: numbers stored, or multiply-adds per pose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from posefield_train.graph.float_model import Model
+from posefield_train.kriging.kriging_bank import FieldBank
+from posefield_train.tensor.motion_tensor import MotionTensor
+
+
+@dataclass(frozen=True)
+class Price:
+    """Cost of ranks (r1, r2, r3): the core's r1 r2 r3 plus linear terms.
+
+    ranks: cost per rank of each mode. pair: cost per pair of ranks of the first two modes.
+    """
+
+    ranks: tuple[int, int, int]
+    pair: int = 0
+
+    def of(self, r1: Any, r2: Any, r3: Any) -> Any:
+        """Return the cost of ranks, integers or arrays that broadcast against each other."""
+        alone = sum(price * rank for price, rank in zip(self.ranks, (r1, r2, r3), strict=True))
+        return r1 * r2 * r3 + self.pair * r1 * r2 + alone
+
+
+def numbers(own_tensor: MotionTensor, controls: int) -> Price:
+    """Return the price in numbers stored for the motion: core, bases and kriging weights.
+
+    A rank of the first mode is a direction of the D' degrees of freedom that vary, one of the
+    second a column over the frames, one of the third a weight for every sample and every drift
+    function. Parts that do not grow with the ranks are left out: the means, the samples' controls,
+    the coefficient models of duration, warp and bones, and sigma's matrix.
+    """
+    return stored(own_tensor.values.shape, controls)
+
+
+def stored(shape: Sequence[int], controls: int) -> Price:
+    """Return the price in stored numbers for a tensor shape (D', T, N)."""
+    freedoms, frames, samples = shape
+    return Price((freedoms, frames, samples + controls + 1))
+
+
+def operations(own_tensor: MotionTensor, controls: int) -> Price:
+    """Return the price in multiply-adds of one pose, counting terms that grow with the ranks.
+
+    Counted are the kriging weights, the core, the interpolation between two frames, its product
+    with the motion, and directions of three numbers for the root and a quaternion for each joint.
+    """
+    joints, samples = len(own_tensor.chart.means), own_tensor.values.shape[2]
+    return Price((4 * joints + 3, 1, samples + controls + 1), pair=1)
+
+
+def read(model: Model, level: int) -> int:
+    """Return how many numbers a level reads: core, bases, kriging weights and samples."""
+    bank, rung = model.bank, model.decoder.rungs[level]
+    r1, r2, r3 = rung.ranks
+    samples, varies = bank.samples(level), np.any(model.decoder.at(level).unwhiten != 0.0, axis=1)
+    bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
+    asked = samples * len(bank.low) + _precision(bank, level)
+    return int(r1 * r2 * r3 + bases + asked + _weights(bank, level))
+
+
+def _precision(bank: FieldBank, level: int) -> int:
+    return 0 if level else (bank.drift + len(bank.pose.samples)) ** 2
+
+
+def _weights(bank: FieldBank, level: int) -> int:
+    if level:
+        return bank.coarse[level - 1].size
+    return sum(field.dual.size for field in bank.kriged)
+
+
+def work(model: Model, level: int) -> int:
+    """Return the multiply-adds of one pose of a level, from controls to quaternions."""
+    bank, rung = model.bank, model.decoder.rungs[level]
+    (r1, r2, r3), columns = rung.ranks, bank.columns(level)
+    distances = columns * (2 + 2 * len(bank.low) + len(bank.performers))
+    values = (bank.linear + columns) * sum(bank.sizes(r3))
+    decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3)
+    return distances + values + _precision(bank, level) + decoding
+
+
+PRICES = {"numbers": numbers, "operations": operations}
+
+
+@dataclass(frozen=True)
+class Compression:
+    """Compression ratios of the raw tensor (D', T, N).
+
+    core: relative to the core alone. stored: relative to all stored numbers.
+    """
+
+    core: float
+    stored: float
+
+
+def compression(own_tensor: MotionTensor, ranks: Sequence[int], controls: int) -> Compression:
+    """Return the compression at ranks (r1, r2, r3); `numbers` defines what counts as stored."""
+    return compressed(own_tensor.values.shape, ranks, controls)
+
+
+def compressed(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
+    """Return the compression of a tensor of shape (D', T, N) at ranks (r1, r2, r3)."""
+    raw, held = float(np.prod(shape)), stored(shape, controls).of(*ranks)
+    return Compression(raw / float(np.prod(ranks)), raw / float(held))

@@ -1,0 +1,1 @@
+"""Universal kriging of the coefficients and of timing."""

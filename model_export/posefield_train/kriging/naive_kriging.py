@@ -1,0 +1,91 @@
+"""Naive kriging, the paper's baseline: a variogram and a kriging system for every frame.
+
+This is the method of Mukai & Kuriyama (TOG 2005) and the "naive" row of table 1 of Mukai & Kuriyama
+2006. It serves as a reference only. The dissimilarity of two poses is the distance between their
+joints; pose vectors are interpolated directly.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.kriging import universal_kriging, variogram
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.kriging.variogram import Experimental, Fit
+from posefield_train.onnx_graph.graph_builder import Net
+
+Fitter = Callable[[Experimental, str], Fit]
+
+
+@dataclass(frozen=True)
+class Naive:
+    """One isotropic kriging model per frame over the same samples.
+
+    values: pose vectors (N, T, D).
+    """
+
+    fields: tuple[Kriging, ...]
+    values: Floats
+
+    def numpy(self, points: Floats) -> Floats:
+        """Return pose vectors (B, T, D) at points (B, d) in half-ranges, as weighted averages."""
+        weights = np.stack([field.weights(points) for field in self.fields], axis=1)
+        return np.einsum("btn,ntd->btd", weights, self.values, optimize=True)
+
+    def onnx(self, net: Net, points: str) -> str:
+        """Build pose vectors (T, D) at one point (1, d) by weighted averages of the samples.
+
+        The weights come from the inverse of each frame's system, as in the paper.
+        """
+        basis = self.basis(net, points)
+        inverse = np.stack([field.weighing for field in self.fields])
+        weights = net("MatMul", basis, net.weights("inverses", inverse))
+        samples = net.weights("values", self.values.transpose(1, 0, 2))
+        return net("Squeeze", net("MatMul", weights, samples), net.indices(1))
+
+    def onnx_dual(self, net: Net, points: str) -> str:
+        """Build `onnx` with premultiplied weights and samples, which halves the numbers read."""
+        duals = np.stack(
+            [
+                field.weighing @ values
+                for field, values in zip(self.fields, self.values.swapaxes(0, 1), strict=True)
+            ]
+        )
+        product = net("MatMul", self.basis(net, points), net.weights("duals", duals))
+        return net("Squeeze", product, net.indices(1))
+
+    def basis(self, net: Net, points: str) -> str:
+        """Build covariances and drift (T, 1, n + k) of one point for every frame's model."""
+        samples = self.fields[0].samples
+        gaps = net("Sub", points, net.weights("naive_samples", samples))
+        squared = net("ReduceSum", net("Mul", gaps, gaps), net.indices(1), keepdims=0)
+        worth = np.array([field.hyper.scales[:1] ** 2 for field in self.fields])
+        near = net("Mul", net.weights("naive_scales", worth), squared)
+        covariance = COVARIANCES[self.fields[0].hyper.covariance].onnx(net, near)
+        one = net.weights("one", np.ones((1, 1)))
+        drift = net("Concat", one, points, axis=1)
+        frames = net.indices(len(self.fields), samples.shape[1] + 1)
+        both = net("Concat", covariance, net("Expand", drift, frames), axis=1)
+        return net("Unsqueeze", both, net.indices(1))
+
+
+def fit(
+    points: Floats, positions: Floats, values: Floats, covariance: str, fitter: Fitter
+) -> Naive:
+    """Fit naive kriging to pose vectors (N, T, D), joint positions (N, T, J, 3) at points (N, d).
+
+    fitter: fits a variogram model to each frame's experimental variogram.
+    """
+    fields = []
+    for frame in range(values.shape[1]):
+        poses = positions[:, frame].reshape(len(points), -1)
+        left = variogram.residuals(points, poses, 1)
+        found = fitter(variogram.experimental(points, left), covariance)
+        nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
+        scales = np.full(points.shape[1], 1.0 / found.range)
+        hyper = Hyper(covariance, (1,), scales, float(nugget), 0.0)
+        fields.append(universal_kriging.solve(hyper, points, values[:, frame]))
+    return Naive(tuple(fields), values)

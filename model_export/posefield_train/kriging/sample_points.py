@@ -1,0 +1,121 @@
+"""Sample points: controls and performers of the examples."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.errors import TrainingError
+from posefield.common.units import Floats, Indices
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import half_ranges
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
+
+EMPTY = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Sample points of a kriging model.
+
+    points: (n, d + p), controls in half-ranges, then the performers' labels. controls: d. groups:
+    group (n,) of each sample; a group is left out together.
+    """
+
+    points: Floats
+    controls: int
+    groups: Indices
+
+    @property
+    def half_ranges(self) -> Floats:
+        """Return the controls (n, d) in half-ranges, without labels."""
+        return self.points[:, : self.controls]
+
+    @property
+    def labelled(self) -> bool:
+        """Return True if performers have labels."""
+        return self.points.shape[1] > self.controls
+
+    @property
+    def moved_by(self) -> Indices:
+        """Return the index (n,) of each sample's performer; empty without labels."""
+        return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else EMPTY
+
+    def from_mean(self, values: Floats) -> Floats:
+        """Return the differences of values (n, m) from the mean of all other groups."""
+        _, inverse, counts = np.unique(self.groups, return_inverse=True, return_counts=True)
+        sums = np.zeros((len(counts), values.shape[1]))
+        for group, own in zip(inverse, values, strict=True):
+            sums[group] += own
+        others = (values.sum(axis=0) - sums[inverse]) / (len(values) - counts[inverse])[:, None]
+        return values - others
+
+
+def labels(names: Sequence[str], performers: Sequence[str]) -> Floats:
+    """Return one-hot labels (N, p) of performers, zeros for an unknown name."""
+    own = [[float(name == performer) for performer in performers] for name in names]
+    return np.array(own).reshape(len(names), len(performers))
+
+
+def lay(recipe: Recipe, examples: Sequence[Example]) -> tuple[Samples, tuple[str, ...]]:
+    """Return the samples of a recipe's examples, and the labelled performers sorted by name.
+
+    Raises TrainingError if a drift depends on a single example.
+    """
+    points = _points(examples)
+    names = [example.row.performer for example in examples]
+    # A single performer needs no label.
+    apart = recipe.kriging.label is not None and len(set(names)) > 1
+    performers = tuple(sorted(set(names))) if apart else ()
+    both = np.hstack([points, labels(names, performers)])
+    return Samples(both, points.shape[1], _groups(recipe, examples, points)), performers
+
+
+def notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
+    """Return one note per setting of the recipe that the examples are too few for."""
+    said = []
+    laid, performers = lay(recipe, examples)
+    if recipe.kriging.label and not performers:
+        name = examples[0].row.performer
+        said.append(f"all clips are of one performer, {name!r}: kriging.label tells nobody apart")
+    if len(np.unique(laid.groups)) > len(np.unique(takes(examples))):
+        said.append(
+            "clips of one file are not left out together: those of the other files alone could "
+            "not carry the drift"
+        )
+    return said
+
+
+def _points(examples: Sequence[Example]) -> Floats:
+    controls = np.stack([example.controls for example in examples])
+    return half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
+
+
+def takes(examples: Sequence[Example]) -> Indices:
+    """Return the number (N,) of the file that each example was cut from."""
+    return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
+
+
+def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indices:
+    """Return groups (N,) by file, or singletons if the drift is undetermined without a file.
+
+    Raises TrainingError if the drift is undetermined without a single example.
+    """
+    degree = recipe.kriging.degree
+    by_file, alone = takes(examples), np.arange(len(examples))
+    if _needed(by_file, points, degree) is None:
+        return by_file
+    needed = _needed(alone, points, degree)
+    if needed is not None:
+        raise TrainingError(
+            f"without the clip of line {examples[needed].row.line} the controls of all others "
+            "follow linearly from one another, and it can only be predicted by a drift of degree "
+            "0; expected at least two clips that differ there: add one, or set kriging.drift to 0"
+        )
+    return alone
+
+
+def _needed(groups: Indices, points: Floats, degree: int) -> int | None:
+    """Return the first group without which points (N, d) do not determine the drift, or None."""
+    return kriging_model.needed(groups, kriging_model.drift(points, points.shape[1], degree))

@@ -1,0 +1,102 @@
+"""Kriging with fewer samples for coarser levels of detail.
+
+At the finest level most of the cost of a pose is in distances and covariances, which truncation of
+the tensor does not reduce. A coarser level uses only the most informative samples and the pose's
+covariance, with weights for all quantities that fit the full models by least squares.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.kriging_bank import VARIANCE, Constant, Field, FieldBank
+from posefield_train.kriging.universal_kriging import Kriging
+
+QUESTIONS = 2_000
+# Range of the fit in half-ranges: beyond the samples, so that the weights hold there too.
+BEYOND = 1.25
+# Directions of the basis below this share of the largest are dropped: their large weights would
+# lose precision in float32.
+FAINTEST = 1e-5
+
+
+def ordered(bank: FieldBank) -> FieldBank:
+    """Return the bank with its samples sorted by how much they explain of the pose."""
+    order = spread_order(bank.pose)
+    others = {name: _reordered(field, order) for name, field in bank.others.items()}
+    return replace(bank, pose=_permuted(bank.pose, order), others=others)
+
+
+def spread_order(pose: Kriging) -> Indices:
+    """Return samples (n,), each the least determined by the previous ones (pivoted Cholesky)."""
+    left = universal_kriging.covariances(pose.hyper, pose.samples, pose.samples)
+    taken: list[int] = []
+    for _ in range(len(left)):
+        unknown = np.diagonal(left).copy()
+        unknown[taken] = -1.0
+        # Rounded, so that rounding errors do not break ties.
+        chosen = int(np.argmax(np.round(unknown, 9)))
+        taken.append(chosen)
+        if unknown[chosen] > FAINTEST:
+            left = left - np.outer(left[chosen], left[chosen]) / unknown[chosen]
+    return np.array(taken)
+
+
+def _reordered(field: Field, order: Indices) -> Field:
+    return field if isinstance(field, Constant) else _permuted(field, order)
+
+
+def _permuted(field: Kriging, order: Indices) -> Kriging:
+    rows = np.concatenate([order, np.arange(len(order), len(field.dual))])
+    return Kriging(
+        field.hyper,
+        field.samples[order],
+        field.dual[rows],
+        field.weighing[np.ix_(rows, order)],
+        field.form[np.ix_(rows, rows)],
+    )
+
+
+def questions(bank: FieldBank, reach: float, count: int) -> Floats:
+    """Return random points (Q, d + p) within `reach` half-ranges.
+
+    No performer is as likely as each of the performers.
+    """
+    rng = np.random.Generator(np.random.PCG64(count))
+    controls = rng.uniform(-reach, reach, (count, len(bank.low)))
+    performers = len(bank.performers)
+    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, count)]
+    return np.hstack([controls, labels])
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """Fit data of coarser levels: values of a bank's models at points beyond its samples.
+
+    basis: labels, one, controls and all covariances (P, p + 1 + d + m). said: values (P, m) by
+    name.
+    """
+
+    basis: Floats
+    said: dict[str, Floats]
+    bank: FieldBank
+
+    def weights(self, columns: int, rank: int, error: float) -> Floats:
+        """Return weights (p + 1 + d + m, M) of the first m covariances.
+
+        rank: number of pose coefficients. error: of the level, m, added to its variance.
+        """
+        own = np.log(self.said[VARIANCE] + error**2 / self.bank.sill)
+        values = np.hstack(list({**self.said, VARIANCE: own}.values()))
+        kept = values.shape[1] - (self.bank.pose.dual.shape[1] - rank)
+        known = self.basis[:, : self.bank.linear + columns]
+        found = np.linalg.lstsq(known, values[:, :kept], rcond=FAINTEST)
+        return np.asarray(found[0], np.float64)
+
+
+def lesson(bank: FieldBank) -> Lesson:
+    """Return the fit data of a bank of one level."""
+    points = np.vstack([questions(bank, BEYOND, QUESTIONS), bank.pose.samples])
+    return Lesson(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)

@@ -1,0 +1,116 @@
+"""Universal kriging of many values at once, in its dual form (Mukai & Kuriyama 2006, section 2).
+
+The dual weights of the system (posefield.kriging.kriging_model) answer a query by one product; its
+inverse gives the variance.
+
+The nugget is filtered: it is on the diagonal of the system only, so that the
+prediction is continuous in the controls.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.errors import TrainingError
+from posefield.common.units import Floats
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper as Hyper
+from posefield.kriging.kriging_model import covariances as covariances
+from posefield.kriging.kriging_model import drift as drift
+from posefield.kriging.kriging_model import noisy as noisy
+
+# Shared with the service; training imports them from here.
+from posefield.kriging.leave_one_out import LeaveOneOut as LeaveOneOut
+from posefield.kriging.leave_one_out import leave_out as leave_out
+from posefield.kriging.leave_one_out import left_out_variances as left_out_variances
+
+
+@dataclass(frozen=True)
+class Kriging:
+    """A solved kriging model.
+
+    samples: (n, d + p). dual: weights (n + k, m) of the values. weighing: (n + k, n), maps values
+    to dual weights. form: quadratic form (n + k, n + k) of the variance.
+
+    A point is d controls and p labels, one-hot for a performer and zero for an unseen performer.
+    """
+
+    hyper: Hyper
+    samples: Floats
+    dual: Floats
+    weighing: Floats
+    form: Floats
+
+    def predict(self, points: Floats) -> Floats:
+        """Return values (B, m) at points (B, d + p)."""
+        return self._basis(points) @ self.dual
+
+    def weights(self, points: Floats) -> Floats:
+        """Return the weight of each sample (B, n); they sum to one, and may be negative."""
+        return self._basis(points) @ self.weighing
+
+    def variance(self, points: Floats) -> Floats:
+        """Return the kriging variance (B,) of the filtered model, as a share of the sill."""
+        basis = self._basis(points)
+        return 1.0 - np.sum(basis @ self.form * basis, axis=1)
+
+    @property
+    def values(self) -> Floats:
+        """Return the sample values (n, m) that the model was solved for."""
+        return values(self.hyper, self.samples, self.dual)
+
+    def _basis(self, points: Floats) -> Floats:
+        return kriging_model.basis(self.hyper, points, self.samples)
+
+
+def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
+    """Return the kriging model of values (n, m) at samples (n, d + p); `check` the samples first.
+
+    With more than one drift the weights are averaged, and the variance is that of their average.
+    """
+    n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
+    weighing = kriging_model.weighing(hyper, samples)
+    toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
+    form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
+    return Kriging(hyper, samples, weighing @ values, weighing, form)
+
+
+def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
+    """Return the sample values (n, m) for dual weights (n + k, m): the system times the weights."""
+    n, degree = len(samples), max(hyper.drifts)
+    functions = drift(samples, len(hyper.scales), degree)
+    return noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
+
+
+def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:
+    """Raise TrainingError for samples that make the kriging system singular.
+
+    These are fewer samples than drift functions plus one, a control with a single value, linearly
+    dependent controls, and, with a nugget of zero, two samples at one point.
+    """
+    count, needed = len(samples), len(names) * degree + 2
+    if count < needed:
+        raise TrainingError(
+            f"{count} samples, expected at least {needed} for {len(names)} controls and a drift "
+            f"of degree {degree}"
+        )
+    for name, column in zip(names, samples.T, strict=True):
+        if np.ptp(column) == 0:
+            raise TrainingError(
+                f"control {name!r} has the value {column[0]:g} in all {count} samples, expected "
+                "at least two values; leave it out of the recipe"
+            )
+    if np.linalg.matrix_rank(drift(samples, len(names), degree)) < 1 + len(names) * degree:
+        raise TrainingError(f"controls {names}: one of them follows linearly from the others")
+    if nugget_is_zero:
+        _refuse_twins(samples)
+
+
+def _refuse_twins(samples: Floats) -> None:
+    _, first, inverse = np.unique(samples, axis=0, return_index=True, return_inverse=True)
+    for row, group in enumerate(np.ravel(inverse)):
+        if first[group] != row:
+            raise TrainingError(
+                f"samples {first[group] + 1} and {row + 1} have equal controls: a nugget of zero "
+                "expects them to differ; allow a nugget, or leave one out"
+            )

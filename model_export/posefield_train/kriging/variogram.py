@@ -1,0 +1,142 @@
+"""Experimental variogram of reduced motions and its fit, for diagnosis and as a first guess.
+
+The dissimilarity of two motions is the distance between their slices of the core tensor (Mukai &
+Kuriyama 2006, section 2), which equals that of their rows of the sample basis scaled by the
+singular values. With a drift it is computed on least-squares residuals, because a trend in the data
+would be mistaken for a long range.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from posefield.common.units import Floats, Indices
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
+
+LAGS = 15
+# Largest lag as a share of the largest distance; farther pairs are few.
+FAR = 0.7
+FEWEST_PAIRS = 3
+RANGES = np.geomspace(0.2, 8.0, 40)
+# Numbers per batch of pairs: half a megabyte.
+CACHED = 65_536
+
+
+@dataclass(frozen=True)
+class Experimental:
+    """Mean distance, semivariance and number of pairs of each lag (L,)."""
+
+    distances: Floats
+    values: Floats
+    pairs: Floats
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Isotropic variogram model: nugget, partial sill above the nugget, and practical range."""
+
+    nugget: float
+    sill: float
+    range: float
+
+
+def residuals(samples: Floats, values: Floats, drift: int) -> Floats:
+    """Return the residuals of values (n, m) at samples (n, d) after least squares on the drift."""
+    functions = universal_kriging.drift(samples, samples.shape[1], drift)
+    coefficients, *_ = np.linalg.lstsq(functions, values, rcond=None)
+    return values - functions @ coefficients
+
+
+def of_residuals(samples: Floats, values: Floats, drift: int) -> Experimental:
+    """Return the experimental variogram of the residuals of values (n, m) from a drift."""
+    return experimental(samples, residuals(samples, values, drift))
+
+
+def lags(samples: Floats) -> tuple[Indices, Indices, Floats, Indices]:
+    """Return pairs of samples (n, d) by lag: indices of both, their distances, and their lag."""
+    first, second = np.triu_indices(len(samples), k=1)
+    distances = np.linalg.norm(samples[first] - samples[second], axis=1)
+    edges = np.linspace(0.0, FAR * distances.max(), LAGS + 1)
+    lag = np.searchsorted(edges, distances, side="left") - 1
+    near = (lag >= 0) & (lag < LAGS)
+    return first[near], second[near], distances[near], lag[near]
+
+
+def experimental(samples: Floats, values: Floats) -> Experimental:
+    """Return Matheron's estimate over lags with enough pairs."""
+    first, second, distances, lag = lags(samples)
+    halves = 0.5 * _squared_distances(values, first, second)
+    pairs = np.bincount(lag, minlength=LAGS)
+    enough = pairs >= FEWEST_PAIRS
+    return Experimental(
+        (np.bincount(lag, distances, LAGS)[enough] / pairs[enough]),
+        (np.bincount(lag, halves, LAGS)[enough] / pairs[enough]),
+        pairs[enough].astype(np.float64),
+    )
+
+
+def _squared_distances(values: Floats, first: Indices, second: Indices) -> Floats:
+    """Return the squared distances (P,) of pairs of rows of values (n, m).
+
+    Pairs are taken in batches that stay in the processor's cache: the differences of all pairs
+    would take as much memory as n / 2 copies of the values.
+    """
+    squared = np.empty(len(first))
+    step = max(1, CACHED // values.shape[1])
+    for start in range(0, len(first), step):
+        batch = slice(start, start + step)
+        gaps = values[first[batch]] - values[second[batch]]
+        np.sum(np.square(gaps, out=gaps), axis=1, out=squared[batch])
+    return squared
+
+
+def fit(experimental: Experimental, covariance: str) -> Fit:
+    """Fit by weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
+
+    Nugget and sill enter linearly and are solved for at each range. If no lag has enough pairs, as
+    for a control of two values, the sill is zero.
+    """
+    if not len(experimental.pairs):
+        return Fit(0.0, 0.0, float(RANGES[-1]))
+    squared = np.square(experimental.distances[None] / RANGES[:, None])
+    rising = 1.0 - COVARIANCES[covariance].numpy(squared)
+    weights = experimental.pairs / np.maximum(experimental.values, 1e-30) ** 2
+    nuggets, sills = _lines(rising, experimental.values, weights)
+    misfit = (nuggets[:, None] + sills[:, None] * rising - experimental.values) ** 2 @ weights
+    best = int(np.argmin(misfit))
+    return Fit(float(nuggets[best]), float(sills[best]), float(RANGES[best]))
+
+
+def _lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Return intercepts and slopes (R,), not negative, of values (L,) over rising (R, L)."""
+    mean_x, mean_y = rising @ weights / weights.sum(), values @ weights / weights.sum()
+    spread = (rising - mean_x[:, None]) ** 2 @ weights
+    slopes = ((rising - mean_x[:, None]) * (values - mean_y)) @ weights / np.maximum(spread, 1e-30)
+    through_zero = (rising * values) @ weights / np.maximum(rising**2 @ weights, 1e-30)
+    slopes = np.maximum(slopes, 0.0)
+    nuggets = mean_y - slopes * mean_x
+    slopes = np.where(nuggets < 0.0, through_zero, slopes)
+    return np.maximum(nuggets, 0.0), slopes
+
+
+def fit_by_search(experimental: Experimental, covariance: str) -> Fit:
+    """Fit nugget, sill and range together by a general least-squares solver.
+
+    This is the common method; the naive baseline is timed with it.
+    """
+    top, far = float(experimental.values.max()), float(experimental.distances.max())
+    roots = np.sqrt(experimental.pairs) / np.maximum(experimental.values, 1e-30)
+
+    def misfit(x: Floats) -> Floats:
+        squared = np.square(experimental.distances / x[2])
+        return roots * (
+            x[0] + x[1] * (1.0 - COVARIANCES[covariance].numpy(squared)) - experimental.values
+        )
+
+    low, high = [0.0, 0.0, RANGES[0]], [2.0 * top, 10.0 * top, RANGES[-1]]
+    found = least_squares(
+        misfit, [0.1 * top, 0.9 * top, 0.5 * far], bounds=(low, high), x_scale=[top, top, far]
+    )
+    return Fit(*map(float, found.x))

@@ -1,0 +1,1 @@
+"""Outlier detection: clips that do not fit their family."""

@@ -1,0 +1,209 @@
+"""Detection of clips that do not fit their family, with the evidence.
+
+The clips stay in the training data: an outlier can be the only clip in a part of the control space.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import skeleton
+from posefield.motion.clip import Clip
+from posefield_train.graph.trained_model import Outlier, Trained
+from posefield_train.outliers import mirrored_clips, outlier_distances
+from posefield_train.outliers.mirrored_clips import Disguise
+from posefield_train.outliers.outlier_distances import Judged
+from posefield_train.source import bone_lengths
+from posefield_train.source.bone_lengths import Foreign
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
+
+# The speed around a frame is the median over this time to either side, s. A jump, or a jump and its
+# return, does not change the median; the start of a motion does.
+AROUND = 0.035
+# A step is a jump if it exceeds the median by the factor TIMES and by FARTHER, m.
+TIMES, FARTHER = 8.0, 0.03
+
+
+@dataclass(frozen=True)
+class Leap:
+    """The largest jump of a clip, from frame to frame + 1.
+
+    distance: of the joint, m. times: ratio to the median step around it. whole: True if more than
+    half of the joints jump too.
+    """
+
+    frame: int
+    joint: int
+    distance: float
+    times: float
+    whole: bool
+
+
+def worst(clip: Clip) -> Leap | None:
+    """Return the largest jump of a clip; None if there is none."""
+    steps = np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1)
+    pace = np.maximum(_pace(steps, max(2, round(AROUND * clip.rate))), FARTHER / TIMES / 4)
+    beyond = steps - pace
+    leaping = (beyond > FARTHER) & (steps > TIMES * pace)
+    if not leaping.any():
+        return None
+    frame, joint = np.unravel_index(int(np.argmax(np.where(leaping, beyond, 0.0))), steps.shape)
+    found, usual = float(steps[frame, joint]), float(pace[frame, joint])
+    return Leap(int(frame), int(joint), found, found / usual, bool(leaping[frame].mean() > 0.5))
+
+
+def _pace(steps: Floats, reach: int) -> Floats:
+    """Return the median (F - 1, J) of steps over `reach` frames to either side."""
+    padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0)
+    return np.asarray(np.median(windows, axis=-1))
+
+
+# Multiple of the median distance above which a clip is tested for mirroring, turns and swaps.
+SUSPECT = 1.5
+# A duration or travel is an outlier beyond STRANGE robust standard deviations, and by at least the
+# factor FACTOR, or WAY, m.
+STRANGE, FACTOR, WAY = 8.0, 1.5, 0.3
+
+
+def find(recipe: Recipe, trained: Trained) -> tuple[Outlier, ...]:
+    """Return the evidence against the clips of a trained family, sorted by clip."""
+    own = _Family(recipe, trained)
+    parts = (own.sized(), own.far(), own.disguised(), own.leaping(), own.late(), own.astray())
+    return tuple(sorted((one for part in parts for one in part), key=lambda one: one.clip))
+
+
+@dataclass(frozen=True)
+class _Family:
+    recipe: Recipe
+    trained: Trained
+
+    @cached_property
+    def judged(self) -> Judged:
+        return outlier_distances.judge(self.trained.pose.hyper, self.trained.laid, self.motions)
+
+    @cached_property
+    def motions(self) -> Floats:
+        """Return motions (N, m) whose differences are root mean square joint distances, m."""
+        whole = self.trained.tensor
+        return self.trained.values["pose"] / np.sqrt(whole.weight * whole.values.shape[1])
+
+    def far(self) -> Iterator[Outlier]:
+        for clip in self.judged.outside:
+            said = (
+                f"lies {_cm(self.judged.distances[clip])} from what the others predict, "
+                f"{self.judged.times[clip]:.0f} times as far as is usual "
+                f"({_cm(self.judged.usual)}); {self._nearest(clip)}"
+            )
+            yield Outlier(clip, "far", said)
+
+    def _nearest(self, clip: int) -> str:
+        apart = np.linalg.norm(self.motions - self.motions[clip], axis=1)
+        apart[clip] = np.inf
+        nearest = int(np.argmin(apart))
+        named = self.trained.examples[nearest].row.named
+        return f"most like it is {named}, {_cm(apart[nearest])} away"
+
+    def disguised(self) -> Iterator[Outlier]:
+        """Yield clips that would fit better mirrored, turned or with sides exchanged."""
+        suspects = np.flatnonzero(self.judged.times > SUSPECT)
+        if not len(suspects):
+            return
+        names, whole = self.trained.skeleton.names, self.trained.tensor.values
+        offsets = np.stack([example.offsets for example in self.trained.examples])
+        usual = np.median(offsets, axis=0)
+        left = mirrored_clips.leftwards(self._around(whole, usual), names)
+        for clip, size in zip(suspects, bone_lengths.sizes(offsets)[suspects], strict=True):
+            expected = whole[:, :, clip] - whole @ self.judged.left_out[clip]
+            own = self._around(whole[:, :, [clip]], offsets[clip] / size)[0]
+            there = self._around(expected[:, :, None], usual)[0]
+            worn = mirrored_clips.found(own, there, names, left)
+            if worn:
+                yield Outlier(int(clip), "disguise", _worn(worn))
+
+    def _around(self, values: Floats, offsets: Floats) -> Floats:
+        """Return joint positions (B, T, J, 3), m, relative to the root, of slices (D', T, B).
+
+        offsets: bone offsets (J, 3), m.
+        """
+        whole = self.trained.tensor
+        rotations, _ = whole.chart.poses(whole.numbers(values))
+        translations = np.broadcast_to(offsets, (*rotations.shape[:-1], 3))
+        return skeleton.positions(self.trained.skeleton.parents, rotations, translations)
+
+    def leaping(self) -> Iterator[Outlier]:
+        for clip, example in enumerate(self.trained.examples):
+            leap = worst(example.clip)
+            if leap:
+                yield Outlier(clip, "leap", _leapt(leap, example))
+
+    def sized(self) -> Iterator[Outlier]:
+        """Yield clips with bones of another size, or another performer's."""
+        offsets = np.stack([example.offsets for example in self.trained.examples])
+        performers = tuple(example.row.performer for example in self.trained.examples)
+        for clip, size in enumerate(bone_lengths.sizes(offsets)):
+            other = bone_lengths.foreign(offsets, performers, clip)
+            if not 1.0 / bone_lengths.SIZE < size < bone_lengths.SIZE:
+                yield Outlier(clip, "size", _sized(size, self.recipe.source.metres_per_unit))
+            elif other:
+                yield Outlier(clip, "bones", _boned(other, performers[clip]))
+
+    def late(self) -> Iterator[Outlier]:
+        """Yield clips with a duration far from the prediction."""
+        gaps = self.trained.residuals["duration"][:, 0]
+        for clip in _strange(np.abs(gaps), np.log(FACTOR)):
+            lasts = self.trained.aligned.durations[clip]
+            said = f"lasts {lasts:.2f} s, expected about {lasts / np.exp(gaps[clip]):.2f} s"
+            yield Outlier(clip, "duration", said)
+
+    def astray(self) -> Iterator[Outlier]:
+        """Yield cycles with travel far from the prediction."""
+        gaps = self.trained.residuals.get("travel", np.zeros((1, 2)))[:, :2]
+        lost = np.linalg.norm(gaps, axis=1)
+        for clip in _strange(lost, WAY):
+            said = f"its cycle ends {lost[clip]:.2f} m from where the others predict"
+            yield Outlier(clip, "travel", said)
+
+
+def _strange(gaps: Floats, least: float) -> list[int]:
+    strange = (outlier_distances.deviations(gaps) > STRANGE) & (gaps > least)
+    return [int(clip) for clip in np.flatnonzero(strange)]
+
+
+def _cm(metres: float) -> str:
+    return f"{100 * metres:.1f} cm" if metres < 0.1 else f"{100 * metres:.0f} cm"
+
+
+def _worn(worn: Disguise) -> str:
+    return (
+        f"{worn.said} its joints would lie {_cm(worn.after)} from what is expected, seen from the "
+        f"root, not {_cm(worn.before)}"
+    )
+
+
+def _leapt(leap: Leap, example: Example) -> str:
+    cycle = len(example.clip) - 1
+    frame = example.row.first_frame + (leap.frame + round(example.shift * cycle)) % cycle
+    what = "its whole body" if leap.whole else example.clip.skeleton.names[leap.joint]
+    return (
+        f"{what} leaps {_cm(leap.distance)} between frames {frame} and {frame + 1}, "
+        f"{leap.times:.0f} times the pace around them"
+    )
+
+
+def _sized(size: float, given: float) -> str:
+    unit = bone_lengths.unit(given, size)
+    guess = f": is the file in {unit}, not in units of {given:g} m?" if unit else ""
+    return f"its bones are {size:.3g} times as long as the family's, expected about 1{guess}"
+
+
+def _boned(other: Foreign, performer: str) -> str:
+    alike = f", and by {_cm(other.within)} from those of {other.alike}" if other.alike else ""
+    return (
+        f"its bones differ by {_cm(other.apart)} from those of {performer} elsewhere "
+        f"({other.others} clips){alike}"
+    )

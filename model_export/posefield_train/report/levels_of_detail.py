@@ -1,0 +1,271 @@
+"""Levels of detail: error, size and time of each, beside alternative levels.
+
+Times depend on the machine. They are measured before the model is reported and are not stored in
+the model file.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+
+from posefield.inference import cost_model, session
+from posefield.inference.level_selection import Camera
+from posefield.inference.session import Session
+from posefield.model_file import model_card
+from posefield.model_file.level_of_detail import Level
+from posefield.model_file.model_card import ModelCard
+from posefield_train.graph import levels
+from posefield_train.graph.float_model import Model
+from posefield_train.graph.onnx_export import Exported
+from posefield_train.graph.trained_model import Trained
+from posefield_train.report.drawing import significant_digits, svg_chart
+from posefield_train.report.drawing.html_page import Section, Table
+from posefield_train.source.recipe import Recipe
+
+# Common resolution and field of view of games: 1080 lines, 60 degrees vertically.
+CAMERA = Camera(np.zeros(3), math.radians(60.0), 1080.0)
+# Measurements of one level differ by a few per cent, as some levels do, so take the median of many.
+ROUNDS = 51
+# Alternative levels are built for 1 to FARTHEST times the error limits of the finest level.
+POINTS, FARTHEST = 7, 16.0
+
+_EXPLANATION = (
+    "Errors are distances of joints from the model before truncation, over random controls, "
+    "performers and times; they include the effect of clips that a level leaves out. A pixel is "
+    f"one of an image of {CAMERA.height:.0f} lines with a vertical field of view of "
+    f"{math.degrees(CAMERA.fov):.0f} degrees. Times are for one pose in batches of "
+    f"{cost_model.BATCH}, measured on one thread of the machine that trained, with the service's "
+    "own code. A coarser level is never listed as slower than a finer one. Times are not stored in "
+    "the model file."
+)
+
+
+@dataclass(frozen=True)
+class TimedLevels:
+    """Levels, the finest first. seconds: time per pose of each."""
+
+    levels: tuple[Level, ...]
+    seconds: tuple[float, ...]
+
+    @property
+    def centimetres(self) -> list[float]:
+        """Return the RMS errors, cm."""
+        return [100 * level.rms for level in self.levels]
+
+    @property
+    def microseconds(self) -> list[float]:
+        """Return the times per pose, µs."""
+        return [1e6 * seconds for seconds in self.seconds]
+
+    def facts(self) -> list[dict[str, Any]]:
+        """Return the figures of each level."""
+        return list(map(_facts, self.levels, self.seconds))
+
+
+@dataclass(frozen=True)
+class LevelCosts:
+    """The levels of a model, and alternative levels.
+
+    times: multiples of the finest level's error limits, for which the alternatives were built.
+    """
+
+    chosen: TimedLevels
+    others: TimedLevels
+    times: tuple[float, ...]
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """Return the distance, m, beyond which each level's worst pose is off by under a pixel.
+
+        Never less than that of a finer level.
+        """
+        found = [CAMERA.pixels * own.pose for own in self.chosen.levels]
+        return tuple(np.maximum.accumulate(found).tolist())
+
+    def facts(self) -> dict[str, Any]:
+        """Return the figures of the model's levels and of the alternatives."""
+        chosen = zip(self.chosen.facts(), self.distances, strict=True)
+        others = zip(self.others.facts(), self.times, strict=True)
+        return {
+            "poses_a_call": cost_model.BATCH,
+            "image_lines": CAMERA.height,
+            "field_of_view_rad": significant_digits.number(CAMERA.fov),
+            "levels": [
+                {**facts, "one_pixel_from_m": significant_digits.number(distance)}
+                for facts, distance in chosen
+            ],
+            "others": [{**facts, "times_budget": times} for facts, times in others],
+        }
+
+    def section(self) -> Section:
+        """Return the use, size, time and error of each level, and a chart of all levels."""
+        drawn = svg_chart.draw(
+            3.7,
+            self._paint,
+            f"Error against numbers read and time per pose; chosen: {self._summary()}.",
+            "Orange: the levels of this model. Blue: alternative levels, built for 1 to "
+            f"{self.times[-1]:g} times the error limits of the finest level. The time has a lower "
+            "bound: every level computes rotations and bone offsets of all joints.",
+        )
+        tables = self._sizes(), self._errors()
+        return Section(
+            "levels", "Levels of detail", (_EXPLANATION, *self._uses()), tables, (drawn,)
+        )
+
+    def _uses(self) -> tuple[str, ...]:
+        """Return one sentence per level on its use."""
+        pairs = zip_longest(self.distances, self.distances[1:])
+        return tuple(self._use(number, *pair) for number, pair in enumerate(pairs))
+
+    def _use(self, number: int, start: float, end: float | None) -> str:
+        until = "" if end is None else f" to {end:.0f} m"
+        if not number:
+            near = f", and for characters up{until}" if until else ""
+            return f"Level 0 is for export and measurement{near}."
+        share = self.chosen.seconds[number] / self.chosen.seconds[0]
+        return (
+            f"Level {number} is for characters from {start:.0f} m{until or ' onwards'}: its worst "
+            f"pose is off by less than a pixel there, in {100 * share:.0f} % of the time of the "
+            "finest level."
+        )
+
+    def _summary(self) -> str:
+        return ", ".join(
+            f"level {number} {100 * own.rms:.2f} cm at {own.numbers} numbers"
+            for number, own in enumerate(self.chosen.levels)
+        )
+
+    def _sizes(self) -> Table:
+        heading = ("ranks", "clips used", "joints that move", "numbers", "kB")
+        cells = map(_sizes, self.chosen.levels, self.chosen.seconds)
+        titles = (*heading, "multiply-adds per pose", "µs per pose")
+        return _numbered("Size and time of each level", titles, cells)
+
+    def _errors(self) -> Table:
+        heading = ("RMS", "99th percentile", "RMS of the worst pose", "largest")
+        cells = map(_errors, self.chosen.levels, self.distances)
+        titles = (*heading, "effector at its event", "below a pixel from (m)")
+        return _numbered("Error of each level (cm)", titles, cells)
+
+    def _paint(self, figure: Figure) -> None:
+        left, right = figure.subplots(1, 2, sharey=True)
+        for timed, style, colour, label in (
+            (self.others, ".-", svg_chart.BLUE, "alternative levels"),
+            (self.chosen, "o", svg_chart.ORANGE, "levels of this model"),
+        ):
+            drawn: dict[str, Any] = {"color": colour, "label": label, "zorder": 4}
+            left.loglog([own.numbers for own in timed.levels], timed.centimetres, style, **drawn)
+            right.semilogy(timed.microseconds, timed.centimetres, style, **drawn)
+        _name(left, [own.numbers for own in self.chosen.levels], self.chosen.centimetres)
+        _name(right, self.chosen.microseconds, self.chosen.centimetres)
+        left.set(xlabel="numbers read", ylabel="error (cm, RMS)", title="size")
+        right.set(xlabel="time (µs per pose)", title="time", xlim=(0.0, None))
+        left.margins(y=0.12)
+        left.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        svg_chart.plain_logarithm(left.xaxis)
+        svg_chart.plain_logarithm(left.yaxis)
+        left.legend(loc="upper right")
+
+
+def _name(ax: Axes, across: Sequence[float], errors: Sequence[float]) -> None:
+    """Write the levels' names to the lower left, where a falling curve leaves space."""
+    paper = {"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8}
+    for number, at in enumerate(zip(across, errors, strict=True)):
+        beside = ax.annotate(f"level {number}", at, (-7, -2), textcoords="offset points", size=8)
+        beside.set(ha="right", va="top", bbox=paper, zorder=3)
+
+
+def _numbered(caption: str, heading: tuple[str, ...], cells: Iterable[tuple[str, ...]]) -> Table:
+    rows = tuple((str(number), *row) for number, row in enumerate(cells))
+    return Table(caption, ("level", *heading), rows)
+
+
+def _sizes(level: Level, seconds: float) -> tuple[str, ...]:
+    return (
+        " × ".join(map(str, level.ranks)),
+        str(level.samples),
+        str(len(level.joints)),
+        f"{level.numbers:,}",
+        f"{level.bytes / 1000:.1f}",
+        f"{level.operations:,}",
+        f"{1e6 * seconds:.2f}",
+    )
+
+
+def _errors(level: Level, distance: float) -> tuple[str, ...]:
+    effector = "" if level.effector is None else f"{100 * level.effector:.2f}"
+    lengths = (level.rms, level.p99, level.pose, level.max)
+    return (*(f"{100 * length:.3g}" for length in lengths), effector, f"{distance:.0f}")
+
+
+def _facts(level: Level, seconds: float) -> dict[str, Any]:
+    """Return a level as in the card, with the number of its joints and the seconds per pose."""
+    lengths = {
+        f"{name}_m": getattr(level, name) for name in ("rms", "p99", "pose", "max", "effector")
+    }
+    return {
+        "ranks": list(level.ranks),
+        "clips_asked": level.samples,
+        "joints_that_move": len(level.joints),
+        "numbers": level.numbers,
+        "bytes": level.bytes,
+        "operations": level.operations,
+        **lengths,
+        "seconds_per_pose": significant_digits.number(seconds),
+    }
+
+
+@dataclass(frozen=True)
+class Alternatives:
+    """Levels below a model's own size, the finest first.
+
+    times: multiples of the error limits that they were built for. opened: session with the model's
+    own size as level 0 and these levels after it.
+    """
+
+    times: tuple[float, ...]
+    levels: tuple[Level, ...]
+    opened: Session
+
+
+def alternatives(recipe: Recipe, trained: Trained, own_card: ModelCard) -> Alternatives:
+    """Build each alternative level on its own, and combine all of them in one graph."""
+    shop = levels.workshop(recipe, trained)
+    farthest = max([FARTHEST, *(detail.times for detail in recipe.size.details)])
+    times = tuple(float(f"{times:.3g}") for times in np.geomspace(1.0, farthest, POINTS))
+    joints = shop.model.decoder.rungs[0].joints
+    model = _together([shop.lowered(shop.model, joints, one) for one in times])
+    found = tuple(shop.level(model, number) for number in range(len(times) + 1))
+    content = model.onnx(model_card.dump(replace(own_card, levels=found)), {})
+    return Alternatives(times, found[1:], session.open_bytes(content, "alternative levels"))
+
+
+def _together(models: list[Model]) -> Model:
+    """Return the model with the levels of several models of one size."""
+    bank, decoder = models[0].bank, models[0].decoder
+    return replace(
+        models[0],
+        bank=replace(bank, coarse=tuple(model.bank.coarse[0] for model in models)),
+        decoder=replace(decoder, coarse=tuple(model.decoder.coarse[0] for model in models)),
+    )
+
+
+def of(exported: Exported, others: Alternatives) -> LevelCosts:
+    """Measure the times of the levels of an exported model and of the alternatives."""
+    own = session.open_bytes(exported.content, f"{exported.card.name}.onnx")
+    chosen = exported.card.levels
+    asked = [(own, number) for number in range(len(chosen))]
+    asked += [(others.opened, 1 + number) for number in range(len(others.levels))]
+    seconds = cost_model.in_turn(asked, ROUNDS)
+    return LevelCosts(
+        TimedLevels(chosen, cost_model.falling(seconds[: len(chosen)])),
+        TimedLevels(others.levels, cost_model.falling(seconds[len(chosen) :])),
+        others.times,
+    )

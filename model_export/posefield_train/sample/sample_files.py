@@ -1,0 +1,205 @@
+"""Files of the family: motions in BVH, the table of their controls, and the recipe."""
+
+import csv
+import io
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+
+from posefield.common.errors import FileError
+from posefield.common.units import Floats
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.sample import sample_body
+from posefield_train.sample.sample_controls import RANGES
+from posefield_train.sample.sample_family import Sample, samples
+
+_RECIPE = """\
+schema = 1
+name = "reaching"
+description = "Procedural reaching motions of three performers, standing and sitting"
+licence = "CC0-1.0"
+truth = "reaching"
+
+[source]
+metres_per_unit = 1.0
+up = "y"
+root_offset = "replace"
+
+[clips]
+table = "clips.csv"
+file = "file"
+performer = "performer"
+{controls}
+[motion]
+frames = 100
+cyclic = false
+root = "travelling"
+
+[event]
+joint = "RightHand"
+at = "end"
+
+[roles]
+hips = "Hips"
+spine = "LowerBack"
+chest = "Spine"
+upperChest = "Spine1"
+neck = "Neck"
+head = "Head"
+leftShoulder = "LeftShoulder"
+leftUpperArm = "LeftArm"
+leftLowerArm = "LeftForeArm"
+leftHand = "LeftHand"
+leftUpperLeg = "LeftUpLeg"
+leftLowerLeg = "LeftLeg"
+leftFoot = "LeftFoot"
+leftToes = "LeftToeBase"
+rightShoulder = "RightShoulder"
+rightUpperArm = "RightArm"
+rightLowerArm = "RightForeArm"
+rightHand = "RightHand"
+rightUpperLeg = "RightUpLeg"
+rightLowerLeg = "RightLeg"
+rightFoot = "RightFoot"
+rightToes = "RightToeBase"
+
+[size]
+rms_budget_cm = 0.5
+"""
+
+_CONTROL = """
+[[controls]]
+name = "{name}"
+column = "{name}"
+unit = "{unit}"
+description = "{description}"
+"""
+
+_BALL = "Zrotation Yrotation Xrotation"
+
+
+def _files(chosen: Iterable[Sample]) -> dict[str, bytes]:
+    """Return the contents of all files of some samples, by path relative to their directory."""
+    files: dict[str, bytes] = {}
+    rows: list[list[str]] = []
+    for number, sample in enumerate(chosen, start=1):
+        path = f"bvh/reach_{number:03}.bvh"
+        files[path] = bvh(sample.clip).encode()
+        rows.append(_row(path, sample))
+    return files | {"clips.csv": _table(rows).encode(), "recipe.toml": _recipe().encode()}
+
+
+def family(output: Path, chosen: Iterable[Sample] | None = None) -> Path:
+    """Write samples to a directory atomically and return their recipe's path.
+
+    chosen: samples; default: the family's 92. A directory with exactly these files is left
+    unchanged; raises FileError for an existing file, or a directory with other content.
+    """
+    files = _files(samples() if chosen is None else chosen)
+    if output.exists() and not output.is_dir():
+        raise FileError(output, "found a file, expected a new or empty directory")
+    if output.is_dir() and any(output.iterdir()):
+        _expect_same(output, files)
+    else:
+        _place(output, files)
+    return output / "recipe.toml"
+
+
+def _place(output: Path, files: dict[str, bytes]) -> None:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}-") as scratch:
+        # A subdirectory, because the temporary directory is readable by its owner only.
+        whole = Path(scratch) / "family"
+        for path, content in files.items():
+            (whole / path).parent.mkdir(parents=True, exist_ok=True)
+            (whole / path).write_bytes(content)
+        whole.rename(output)
+
+
+def _expect_same(output: Path, files: dict[str, bytes]) -> None:
+    found = {path.relative_to(output).as_posix() for path in output.rglob("*") if path.is_file()}
+    for path in sorted(found ^ files.keys()):
+        state = "is in the way" if path in found else "is missing"
+        raise FileError(output, f"not empty and not this family: {path} {state}")
+    for path, content in files.items():
+        if (output / path).read_bytes() != content:
+            raise FileError(output, f"not empty and not this family: {path} differs")
+
+
+def _recipe() -> str:
+    parts = [
+        _CONTROL.format(name=name, unit=unit, description=description)
+        for name, (_, _, unit, description) in RANGES.items()
+    ]
+    return _RECIPE.format(controls="".join(parts))
+
+
+def _row(path: str, sample: Sample) -> list[str]:
+    point = [f"{value:.4f}" for value in astuple(sample.controls)]
+    return [path, sample.performer, *point, str(len(sample.clip) - 1)]
+
+
+def _table(rows: list[list[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["file", "performer", *RANGES, "event_frame"])
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def bvh(clip: Clip) -> str:
+    """Return the BVH text of a clip of the family, in metres.
+
+    Hinges have one channel, other joints three. The root's offset is zero; its channels contain its
+    whole path.
+    """
+    head = "\n".join(["HIERARCHY", *_joint(clip.skeleton, 0), "MOTION"])
+    lines = (" ".join(f"{value:.6f}" for value in row) for row in _channels(clip).tolist())
+    rate = f"Frames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.12f}"
+    return "\n".join([head, rate, *lines]) + "\n"
+
+
+def _offset(indent: str, offset: Floats) -> str:
+    x, y, z = offset + 0.0
+    return f"{indent}OFFSET {x:.6f} {y:.6f} {z:.6f}"
+
+
+def _joint(figure: Skeleton, joint: int, depth: int = 0) -> Iterator[str]:
+    """Yield the lines of a joint and its descendants."""
+    outer, inner = "  " * depth, "  " * (depth + 1)
+    yield f"{outer}{'JOINT' if joint else 'ROOT'} {figure.names[joint]}"
+    yield f"{outer}{{"
+    yield _offset(inner, figure.offsets[joint] if joint else np.zeros(3))
+    yield f"{inner}CHANNELS {_channel_names(figure, joint)}"
+    for child, parent in enumerate(figure.parents):
+        if parent == joint:
+            yield from _joint(figure, child, depth + 1)
+    for holder, tip in zip(figure.tip_joints, figure.tip_offsets, strict=True):
+        if holder == joint:
+            yield from (f"{inner}End Site", f"{inner}{{", _offset(inner + "  ", tip), f"{inner}}}")
+    yield f"{outer}}}"
+
+
+def _channel_names(figure: Skeleton, joint: int) -> str:
+    if joint == 0:
+        return f"6 Xposition Yposition Zposition {_BALL}"
+    return "1 Xrotation" if figure.names[joint] in sample_body.HINGES else f"3 {_BALL}"
+
+
+def _channels(clip: Clip) -> Floats:
+    """Return values (F, 94) as printed: m and degrees, minus zero as zero."""
+    columns = [clip.root_path]
+    for joint, name in enumerate(clip.skeleton.names):
+        turn = clip.rotations[:, joint]
+        if name in sample_body.HINGES:
+            angles = quat.twist(turn, np.array([1.0, 0.0, 0.0]))[:, None]
+        else:
+            angles = np.unwrap(quat.to_euler(turn, "ZYX"), axis=0)
+        columns.append(np.degrees(angles))
+    values: Floats = np.concatenate(columns, axis=1)
+    return values.round(6) + 0.0

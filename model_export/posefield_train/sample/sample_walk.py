@@ -1,0 +1,136 @@
+"""A procedural walk with fixed stance feet: strides of two walkers at several speeds and turns.
+
+Its controls have unusual names and units, to test that clients read them from the model.
+"""
+
+import tomllib
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from posefield.common.units import UP, Floats
+from posefield.motion import bvh_writer, quat
+from posefield.motion.clip import Clip, assemble
+from posefield.motion.skeleton import Skeleton
+from posefield_train.sample import two_bone_ik
+from posefield_train.source.recipe import Recipe
+
+RATE = 60.0
+THIGH = SHIN = 0.45
+ANKLE, HIPS, WIDTH = 0.08, 0.82, 0.1
+STANCE = 0.6
+SIDES = {"Left": (1.0, 0.0), "Right": (-1.0, 0.5)}
+"""Sign of each foot's sideways offset, and the phase at which it lands."""
+
+SKELETON = Skeleton(
+    ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot"),
+    (-1, 0, 1, 2, 0, 4, 5),
+    np.array(
+        [(0, 0, 0)]
+        + [row for s in (1, -1) for row in ((s * WIDTH, 0, 0), (0, -THIGH, 0), (0, -SHIN, 0))],
+        dtype=float,
+    ),
+    (3, 6),
+    np.array([(0, 0, 0.15)] * 2, dtype=float),
+)
+
+TOML = """\
+schema = 1
+name = "stroll"
+description = "Strides of two walkers"
+licence = "CC0-1.0"
+[source]
+metres_per_unit = 1.0
+up = "y"
+[clips]
+table = "strides.csv"
+file = "file"
+performer = "who"
+[[controls]]
+name = "haste"
+column = "haste"
+unit = "km/h"
+description = "How fast"
+[[controls]]
+name = "veer"
+column = "veer"
+unit = "mrad"
+description = "How much the heading changes in a stride"
+[motion]
+frames = 40
+cyclic = true
+root = "travelling"
+feet = ["LeftFoot", "RightFoot"]
+[kriging]
+label = "performer"
+covariance = "matern52"
+drift = 1
+[size]
+rms_budget_cm = 0.2
+"""
+
+
+def recipe() -> Recipe:
+    """Return the recipe of the strides."""
+    return Recipe.model_validate(tomllib.loads(TOML))
+
+
+def stride(speed: float, turn: float, sway: float) -> Clip:
+    """Return one stride at a speed, m/s, with a turn, rad, and a sideways sway, m."""
+    frames = round(RATE * (0.5 + 0.45 * speed) / speed)
+    length = speed * frames / RATE
+    u = np.linspace(0.0, 1.0, frames + 1)
+    roll = 0.05 * np.cos(2 * np.pi * u)
+    pelvis = quat.mul(quat.about(UP, turn * u), quat.about(np.array([0.0, 0.0, 1.0]), roll))
+    hips = _along(u, length, turn, sway * np.sin(2 * np.pi * u))
+    hips[:, 1] = HIPS + 0.01 * np.cos(4 * np.pi * u)
+    legs = [_leg(side, u, length, turn, hips, pelvis) for side in SIDES]
+    rotations = np.stack([pelvis, *legs[0], *legs[1]], axis=1)
+    return assemble(SKELETON, rotations, hips, SKELETON.offsets, RATE)
+
+
+def _along(u: Floats, length: float, turn: float, left: Floats | float) -> Floats:
+    """Return points on the floor (..., 3) beside the arc of a stride after shares u of it."""
+    on = length * u * np.exp(0.5j * turn * u) * np.sinc(turn * u / (2 * np.pi))
+    place = on + 1j * left * np.exp(1j * turn * u)
+    return np.stack([place.imag, np.zeros_like(u), place.real], axis=-1)
+
+
+def _leg(
+    side: str, u: Floats, length: float, turn: float, hips: Floats, pelvis: Floats
+) -> list[Floats]:
+    """Return the rotations of a leg; the foot is fixed in stance, then swings to the next."""
+    off, down = SIDES[side]
+    steps = np.floor(u - down)
+    since = u - down - steps
+    swing = np.clip((since - STANCE) / (1.0 - STANCE), 0.0, 1.0)
+    # A foot stands at the path's position in the middle of its stance.
+    at = steps + down + 0.5 * STANCE
+    # The foot lifts before it moves ahead, and stops before it lands.
+    share = np.clip((swing - 0.2) / 0.6, 0.0, 1.0)
+    gone = share * share * (3.0 - 2.0 * share)
+    here, there = (_along(at + more, length, turn, off * WIDTH) for more in (0.0, 1.0))
+    ankle = here + gone[:, None] * (there - here)
+    ankle[:, 1] = ANKLE + 0.08 * np.sin(np.pi * swing) ** 2
+    flat = quat.about(UP, turn * (at + gone))
+    back = quat.conj(pelvis)
+    hip = hips + quat.rotate(pelvis, np.array([off * WIDTH, 0.0, 0.0]))
+    to_ankle = quat.rotate(back, ankle - hip)
+    upper, angle = two_bone_ik.knee(THIGH, SHIN, to_ankle, np.array([0.0, 0.0, 1.0]))
+    bend = quat.about(np.array([1.0, 0.0, 0.0]), angle)
+    lower = quat.mul(pelvis, quat.mul(upper, bend))
+    return [upper, bend, quat.mul(quat.conj(lower), flat)]
+
+
+def write(folder: Path) -> Path:
+    """Write the strides and their table to a folder and return it."""
+    rows = ["file,who,haste,veer"]
+    points = product((0.7, 0.9, 1.1, 1.3, 1.5), (-0.5, -0.2, 0.2, 0.5))
+    for index, (speed, turn) in enumerate(points):
+        who, sway = (("ann", 0.02), ("ben", 0.05))[index % 3 == 0]
+        clip = stride(speed, turn, sway)
+        (folder / f"{index}.bvh").write_bytes(bvh_writer.dumps(clip, metres_per_unit=1.0))
+        rows.append(f"{index}.bvh,{who},{3.6 * speed},{1000 * turn}")
+    (folder / "strides.csv").write_text("\n".join(rows) + "\n")
+    return folder

@@ -1,0 +1,1 @@
+"""Motion files, tables and recipes to clips."""

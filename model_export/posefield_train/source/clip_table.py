@@ -1,0 +1,233 @@
+"""Table of clips: one validated row per clip."""
+
+import csv
+import io
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from posefield.common.errors import RecipeError
+from posefield.common.units import Floats
+from posefield_train.source import data_folder
+from posefield_train.source.data_folder import Place
+from posefield_train.source.recipe import Clips, Condition, Recipe
+
+
+@dataclass(frozen=True)
+class Row:
+    """One clip: its file, frames, and controls.
+
+    line: in the table, for messages; None without table. first_frame, last_frame: indices in the
+    file from 0, last_frame inclusive; None is the end of the file. controls: those of the table.
+    landmarks: frames of the file.
+    """
+
+    place: Place
+    table: str
+    line: int | None
+    performer: str
+    first_frame: int
+    last_frame: int | None
+    controls: Floats
+    landmarks: tuple[int, ...]
+
+    @property
+    def named(self) -> str:
+        """Return the name of the row in messages: its line and its file."""
+        return self.place.name if self.line is None else f"line {self.line}, {self.place.name}"
+
+    @property
+    def source(self) -> str:
+        """Return the file's name, with frames if the clip is a part of it."""
+        if self.first_frame == 0 and self.last_frame is None:
+            return self.place.name
+        last = "the end" if self.last_frame is None else self.last_frame
+        return f"{self.place.name}, frames {self.first_frame} to {last}"
+
+    def fault(self, message: str) -> RecipeError:
+        """Return an error that names this row."""
+        return RecipeError(self.table, message, self.line)
+
+
+def read(recipe: Recipe, folder: Path) -> list[Row]:
+    """Return the rows of the recipe's table that meet its conditions.
+
+    Raises RecipeError, naming line and column, for the first invalid cell, and for a missing
+    column, no matching row, and two rows of the same frames.
+    """
+    place = data_folder.find(folder, recipe.clips.table)
+    cells = opened(place)
+    cells.require(_columns(recipe))
+    rows = [
+        _row(recipe, folder, cells, line, record)
+        for line, record in cells.records
+        if all(cells.meets(line, record, c, w) for c, w in recipe.clips.where.items())
+    ]
+    if not rows:
+        raise RecipeError(cells.name, f"none of {len(cells.records)} rows meets the conditions")
+    refuse_repeats(rows)
+    return rows
+
+
+MOST_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
+"""Limits of a table: a hundred times the size of the largest published families of motions."""
+
+
+def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
+    try:
+        text = data_folder.read(place, MOST_BYTES, "a table").decode("utf-8-sig")
+    except UnicodeDecodeError as fault:
+        raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
+    reader = csv.DictReader(io.StringIO(text, newline=None), strict=True)
+    try:
+        _refuse_columns(place, reader.fieldnames or [])
+        records = [(reader.line_num, record) for record in islice(reader, MOST_ROWS)]
+        further = next(reader, None)
+    except csv.Error as fault:
+        raise RecipeError(str(place), f"not CSV: {fault}", reader.line_num) from fault
+    if further is not None:
+        message = f"found more than {MOST_ROWS} rows, expected at most {MOST_ROWS}"
+        raise RecipeError(str(place), message, reader.line_num)
+    for line, record in records:
+        if None in record or None in record.values():
+            columns = len(reader.fieldnames or [])
+            raise RecipeError(str(place), f"not the {columns} cells of the heading", line)
+    return records
+
+
+def _refuse_columns(place: Place, names: Sequence[str]) -> None:
+    """Raise RecipeError for too many columns, and for two of one name."""
+    if len(names) > MOST_COLUMNS:
+        message = f"found {len(names)} columns, expected at most {MOST_COLUMNS}"
+        raise RecipeError(str(place), message, 1)
+    twins = sorted({name for name in names if names.count(name) > 1})
+    if twins:
+        raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
+
+
+def opened(place: Place) -> "Table":
+    """Return the table of a CSV file; RecipeError if it is invalid."""
+    return Table(str(place), _records(place))
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells of a file by line and column; errors name both."""
+
+    name: str
+    records: list[tuple[int, dict[str, str]]]
+
+    def expect_only(self, columns: Collection[str]) -> None:
+        """Raise RecipeError for unknown columns."""
+        unknown = sorted(set(self.records[0][1]) - set(columns))
+        if unknown:
+            known = ", ".join(sorted(columns))
+            raise RecipeError(self.name, f"columns {unknown}, expected some of {known}", 1)
+
+    def require(self, columns: Mapping[str, str]) -> None:
+        """Raise RecipeError for a table without rows, or without a required column.
+
+        columns: explanation of each, for the message.
+        """
+        if not self.records:
+            raise RecipeError(self.name, "no rows below the heading")
+        there = self.records[0][1]
+        for column, why in columns.items():
+            if column not in there:
+                raise RecipeError(
+                    self.name, f"no column {column!r} ({why}); there are {', '.join(there)}", 1
+                )
+
+    def number(self, line: int, record: dict[str, str], column: str) -> float:
+        """Return the number in a cell."""
+        try:
+            # float() accepts 1_000, which is not a number in CSV.
+            value = float(record[column].replace("_", "?"))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            found = record[column]
+            raise RecipeError(self.name, f"column {column!r}: {found!r}, expected a number", line)
+        return value
+
+    def frame(self, line: int, record: dict[str, str], column: str) -> int:
+        """Return the frame index in a cell."""
+        value = self.number(line, record, column)
+        if value != int(value) or value < 0:
+            raise RecipeError(
+                self.name, f"column {column!r}: {record[column]!r}, expected a frame from 0", line
+            )
+        return int(value)
+
+    def meets(self, line: int, record: dict[str, str], column: str, condition: Condition) -> bool:
+        """Return True if a cell meets a condition."""
+        cell = record[column]
+        if condition.among is not None and cell not in condition.among:
+            return False
+        if condition.without is not None and cell in condition.without:
+            return False
+        if condition.minimum is None and condition.maximum is None:
+            return True
+        low = -math.inf if condition.minimum is None else condition.minimum
+        high = math.inf if condition.maximum is None else condition.maximum
+        return low <= self.number(line, record, column) <= high
+
+
+def _columns(recipe: Recipe) -> dict[str, str]:
+    clips = recipe.clips
+    named = {
+        clips.file: "clips.file",
+        **dict.fromkeys(clips.where, "clips.where"),
+        **dict.fromkeys(clips.landmarks, "clips.landmarks"),
+        **{control.column: f"control {control.name}" for control in recipe.typed},
+    }
+    for key in ("performer", "first_frame", "last_frame"):
+        column = getattr(clips, key)
+        if column is not None:
+            named[column] = f"clips.{key}"
+    return named
+
+
+def _row(recipe: Recipe, folder: Path, cells: Table, line: int, record: dict[str, str]) -> Row:
+    clips = recipe.clips
+    first = cells.frame(line, record, clips.first_frame) if clips.first_frame else 0
+    last = cells.frame(line, record, clips.last_frame) if clips.last_frame else None
+    if last is not None and last <= first:
+        raise RecipeError(cells.name, f"frames {first} to {last}, expected at least two", line)
+    return Row(
+        place=_motion_file(folder, clips, cells, line, record),
+        table=cells.name,
+        line=line,
+        performer=record[clips.performer] if clips.performer else "",
+        first_frame=first,
+        last_frame=last,
+        controls=np.array([cells.number(line, record, c.column) for c in recipe.typed]),
+        landmarks=tuple(cells.frame(line, record, column) for column in clips.landmarks),
+    )
+
+
+def _motion_file(
+    folder: Path, clips: Clips, cells: Table, line: int, record: dict[str, str]
+) -> Place:
+    beside = clips.table.rpartition("/")[0]
+    name = f"{beside}/{record[clips.file]}" if beside else record[clips.file]
+    try:
+        return data_folder.find(folder, name)
+    except RecipeError as fault:
+        raise RecipeError(cells.name, f"column {clips.file!r}: {fault.message}", line) from fault
+
+
+def refuse_repeats(rows: Sequence[Row]) -> None:
+    """Raise RecipeError for two rows with the same frames of the same file."""
+    seen: dict[tuple[str, int, int | None], Row] = {}
+    for row in rows:
+        key = (str(row.place), row.first_frame, row.last_frame)
+        if key in seen:
+            line = seen[key].line
+            again = "as before" if line is None else f"as line {line}"
+            raise row.fault(f"the same frames of the same file {again}")
+        seen[key] = row

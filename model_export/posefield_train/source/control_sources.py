@@ -1,0 +1,153 @@
+"""Control parameters of a recipe: read from a column of the table, or measured from the motion."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    field_validator,
+    model_validator,
+)
+
+from posefield.motion import measures
+
+# Parameters that a clip query has besides the controls.
+RESERVED = frozenset(
+    "fps start end time times extrapolate performer level format names root loop unit up "
+    "across along columns rows margin nearest joint_sigma exact target targets pin_feet".split()
+)
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+Text = Annotated[str, Field(min_length=1)]
+
+ROOT_HEIGHT = "root_height"
+"""Quantity that measures the height of the root."""
+MOMENTS = tuple(moment for moment in measures.MOMENTS if moment != "landmark")
+"""Moments that need no column of the table."""
+# Keys that a quantity accepts besides its name, and those that it requires.
+PLACE, MOMENT, PAIR = ("joint", "at"), ("at",), ("joints",)
+TAKES = {
+    **dict.fromkeys(measures.AXES, PLACE),
+    ROOT_HEIGHT: MOMENT,
+    **dict.fromkeys(("step_length", "leg_length"), PAIR),
+}
+NEEDS = {quantity: keys for quantity, keys in TAKES.items() if keys != PAIR}
+
+
+class Part(BaseModel):
+    """Base of the parts of a recipe; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Auto(Part):
+    """Measurement that yields a control."""
+
+    quantity: Literal[measures.Quantity, "root_height"] = Field(
+        description="left, height, forward: a joint's place in the frame of the first pose, m; "
+        "root_height, m; step_length: the farthest that one foot gets ahead of the other, m; "
+        "stride_length, m, speed, m/s, turn, degrees to the left: of a whole cycle; leg_length, "
+        "stature: of the performer, m"
+    )
+    joint: Text | Annotated[list[Text], Field(min_length=1)] | None = Field(
+        default=None, description="of a place: the joint, or several whose middle it is"
+    )
+    joints: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = Field(
+        default=None,
+        description="of a step, two feet, those of motion.feet if not said; of a leg, its upper "
+        "end and its lower, those of the roles leftUpperLeg and leftFoot if not said",
+    )
+    at: Text | None = Field(
+        default=None,
+        description="moment of a place: 'start', 'end', 'highest', 'lowest', 'farthest' (from the "
+        "root), or the column of clips.landmarks that says when",
+    )
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the measured quantity."""
+        return measures.UNITS.get(self.quantity, "m")
+
+    @property
+    def places(self) -> list[str]:
+        """Return the joints whose mean position is measured."""
+        return [self.joint] if isinstance(self.joint, str) else list(self.joint or ())
+
+    @model_validator(mode="after")
+    def _says_what_it_takes(self) -> "Auto":
+        given = [key for key in ("joint", "joints", "at") if getattr(self, key) is not None]
+        takes, needs = TAKES.get(self.quantity, ()), NEEDS.get(self.quantity, ())
+        if not set(needs) <= set(given) <= set(takes):
+            expected = " and ".join(takes) or "nothing"
+            optional = " or nothing" if takes and not needs else ""
+            found = " and ".join(given) or "nothing"
+            raise ValueError(
+                f"found {found} besides quantity {self.quantity!r}, expected {expected}{optional}"
+            )
+        if (self.quantity, self.at) == (ROOT_HEIGHT, "farthest"):
+            raise ValueError("at: found 'farthest', but the root is never away from itself")
+        return self
+
+
+class _Named(Part):
+    name: Name
+
+    @field_validator("name")
+    @classmethod
+    def _not_reserved(cls, name: str) -> str:
+        if name in RESERVED:
+            raise ValueError(f"{name!r} is the name of a query parameter")
+        return name
+
+
+class ControlColumn(_Named):
+    """One control parameter and the column that holds its value for each clip."""
+
+    column: Text
+    unit: Text
+    description: Text
+
+
+class ControlMeasured(_Named):
+    """One control parameter that is measured from each clip."""
+
+    auto: Auto
+    unit: Text = Field(
+        # The quantity determines the unit.
+        default_factory=lambda read: read["auto"].unit,
+        description="the unit of what is measured, which need not be said",
+    )
+    description: Text
+
+    @model_validator(mode="after")
+    def _unit_is_its_own(self) -> "ControlMeasured":
+        if self.unit != self.auto.unit:
+            raise ValueError(
+                f"unit: found {self.unit!r}, expected {self.auto.unit!r}, in which "
+                f"{self.auto.quantity} is measured, or no unit"
+            )
+        return self
+
+
+COLUMN, MEASURED = "(column)", "(auto)"
+"""Tags of the kinds of control in the path of an error: names that no key can have."""
+
+
+def _kind(control: Any) -> str | None:
+    if isinstance(control, ControlColumn | ControlMeasured):
+        return COLUMN if isinstance(control, ControlColumn) else MEASURED
+    there = {"column", "auto"} & set(control if isinstance(control, dict) else ())
+    return None if len(there) != 1 else COLUMN if "column" in there else MEASURED
+
+
+Control = Annotated[
+    Annotated[ControlColumn, Tag(COLUMN)] | Annotated[ControlMeasured, Tag(MEASURED)],
+    Discriminator(
+        _kind,
+        custom_error_type="column_or_auto",
+        custom_error_message="expected either column, where its values stand, or auto, how they "
+        "are measured",
+    ),
+]

@@ -1,0 +1,441 @@
+"""Recipe of a training: a validated TOML file.
+
+The recipe refers to a CSV table with the data of each clip. Ambiguous recipes are refused: unknown
+keys, missing units, duplicate names.
+"""
+
+import json
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from posefield.common.errors import RecipeError
+from posefield.motion import measures
+from posefield.motion.joint_roles import Role
+from posefield_train.source import data_folder
+from posefield_train.source.control_sources import (
+    COLUMN,
+    MEASURED,
+    MOMENTS,
+    Auto,
+    Control,
+    ControlColumn,
+    ControlMeasured,
+    Part,
+    Text,
+)
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class Source(Part):
+    """Unit and axes of the motion files; a BVH file states neither its unit nor its up axis."""
+
+    metres_per_unit: Positive = Field(description="length of one unit of the files, m")
+    up: Literal["y", "z"] = Field(description="the files' up axis; their frame is right-handed")
+    root_offset: Literal["replace", "add"] | None = Field(
+        default=None,
+        description="whether root position channels replace the root's OFFSET or add to it; "
+        "asked for where the OFFSET is not zero",
+    )
+
+
+class Condition(Part):
+    """Selection of rows of the table, by listed values or by a range of a number."""
+
+    among: list[str] | None = Field(default=None, description="the cell is one of these")
+    without: list[str] | None = Field(default=None, description="the cell is none of these")
+    minimum: float | None = Field(default=None, description="the number is at least this")
+    maximum: float | None = Field(default=None, description="the number is at most this")
+
+
+class Clips(Part):
+    """Location of the table and the meaning of its columns."""
+
+    table: Text = Field(description="CSV file, relative to the data folder")
+    file: Text = Field(description="column: motion file, relative to the table")
+    performer: Text | None = Field(default=None, description="column: who moved")
+    first_frame: Text | None = Field(default=None, description="column: first frame, from 0")
+    last_frame: Text | None = Field(default=None, description="column: last frame, counted in")
+    landmarks: list[Text] = Field(
+        default=[], description="columns: frames, in order, that happen at one time in all clips"
+    )
+    where: dict[str, Condition] = Field(default={}, description="conditions by column")
+
+
+class Motion(Part):
+    """Conversion of clips to a tensor."""
+
+    frames: Annotated[int, Field(ge=8, le=1000)] = Field(description="aligned frames T")
+    cyclic: bool = Field(description="whether the last pose leads into the first")
+    root: Literal["travelling", "in_place"] = Field(
+        description="in_place takes the straight line of the horizontal travel out"
+    )
+    drop_joints: list[Text] = Field(
+        default=[], description="joints left out, with everything that hangs below them"
+    )
+    joint_weights: dict[str, Positive] = Field(
+        default={}, description="importance of a joint's position in the metric; 1 if not said"
+    )
+    feet: list[Text] = Field(
+        default=[], description="joints of the feet, whose sliding on the ground is measured"
+    )
+
+
+class Alignment(Part):
+    """Time warping."""
+
+    knots: Annotated[int, Field(ge=3, le=24)] = Field(
+        default=6, description="free increments of a warp: few, so that it adds no jerk"
+    )
+    rounds: Annotated[int, Field(ge=0, le=8)] = Field(
+        default=2, description="re-alignments after the one to the medoid"
+    )
+    reference: Literal["prediction", "mean"] = Field(
+        default="prediction",
+        description="what a clip is re-aligned to: what the others predict for it, or their mean",
+    )
+    begin: Literal["in_phase", "as_cut"] = Field(
+        default="as_cut",
+        description="where a cyclic clip begins: as_cut where its frames say, or in_phase with "
+        "the family, for cycles that were cut at no moment in particular",
+    )
+
+
+# Degree one extrapolates to targets, degree zero keeps the common part of the clips.
+MIXED = (0, 1, 1)
+
+
+class Kriging(Part):
+    """Kriging model of the control coefficients."""
+
+    covariance: Literal[
+        "matern52", "matern32", "gaussian", "exponential", "spherical", "chosen"
+    ] = Field(
+        default="chosen",
+        description="how alike motions are by their distance; chosen is matern52, or "
+        "gaussian where leave-one-out finds it better by a twentieth",
+    )
+    drift: Literal[0, 1, "mixed", "chosen"] = Field(
+        default="chosen",
+        description="polynomial degree; mixed is one part of what degree zero predicts and two of "
+        "degree one, and chosen is that or degree one, whichever leave-one-out finds better",
+    )
+    nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
+        default=None, description="share of the sill; fitted by leave-one-out if not said"
+    )
+    label: Literal["performer"] | None = Field(
+        default=None,
+        description="what tells clips apart beside their controls: it enters the distance between "
+        "them, never the drift",
+    )
+
+    @property
+    def degree(self) -> int:
+        """Return the highest degree of drift that is tried."""
+        return max(map(max, self.drifts))
+
+    @property
+    def covariances(self) -> tuple[str, ...]:
+        """Return the covariances that are tried."""
+        return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)
+
+    @property
+    def drifts(self) -> tuple[tuple[int, ...], ...]:
+        """Return the sets of drift degrees to try; predictions are averaged within a set."""
+        if self.drift == "chosen":
+            return (1,), MIXED
+        return (MIXED,) if self.drift == "mixed" else ((self.drift,),)
+
+
+class Event(Part):
+    """Event of a motion: a joint and the moment at which its position matters."""
+
+    joint: Text = Field(description="the joint: a hand that reaches, a foot that lands")
+    at: Text = Field(
+        description="'end' for the last frame, or the column of clips.landmarks that says when"
+    )
+
+
+class Detail(Part):
+    """Level of detail below the model's own size."""
+
+    times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
+        description="how many times the budgets, or the errors at the ranks given, it may cost"
+    )
+    drop_joints: list[Text] = Field(
+        default=[],
+        description="joints that do not move, nor what hangs below them; their own error is not "
+        "counted against the budgets",
+    )
+
+
+# An image 1080 pixels high, with a horizontal field of view of 60 degrees, resolves 1 cm at 15 m.
+DETAILS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
+
+
+class Size(Part):
+    """Size of the truncated tensor: ranks, or error budgets.
+
+    Errors are true distances between joints, by forward kinematics; all given budgets apply.
+    """
+
+    levels: list[Detail] | None = Field(
+        default=None,
+        description="coarser levels of detail, each coarser than the one before; three if not "
+        "said, of 2, 4 and 8 times the budgets",
+    )
+
+    ranks: (
+        Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=3, max_length=3)] | None
+    ) = Field(default=None, description="of degrees of freedom, frames and samples")
+    rms_budget_cm: Positive | None = Field(
+        default=None, description="root-mean-square joint distance, cm"
+    )
+    p99_budget_cm: Positive | None = Field(
+        default=None,
+        description="joint distance that one in a hundred exceeds, over joints, frames, clips; cm",
+    )
+    effector_budget_cm: Positive | None = Field(
+        default=None, description="root-mean-square distance of the event's joint at its event, cm"
+    )
+    cost: Literal["numbers", "operations"] = Field(
+        default="numbers",
+        description="what is least within the budgets: numbers stored, or multiply-adds per pose",
+    )
+
+    @property
+    def details(self) -> Sequence[Detail]:
+        """Return the coarser levels of detail."""
+        return DETAILS if self.levels is None else self.levels
+
+    @field_validator("levels")
+    @classmethod
+    def _coarser_and_coarser(cls, levels: list[Detail] | None) -> list[Detail] | None:
+        times = [level.times for level in levels or []]
+        if times != sorted(set(times)):
+            raise ValueError(f"times {times}, expected each larger than the one before")
+        return levels
+
+    @property
+    def budgets(self) -> dict[str, float]:
+        """Return the given budgets, m, by name: rms, p99, effector."""
+        given = {
+            "rms": self.rms_budget_cm,
+            "p99": self.p99_budget_cm,
+            "effector": self.effector_budget_cm,
+        }
+        return {name: 0.01 * budget for name, budget in given.items() if budget is not None}
+
+    @model_validator(mode="after")
+    def _ranks_or_budgets(self) -> "Size":
+        keys = "rms_budget_cm, p99_budget_cm, effector_budget_cm"
+        if self.ranks is None and not self.budgets:
+            raise ValueError(f"found neither, expected either ranks or budgets ({keys})")
+        if self.ranks is not None and (self.budgets or "cost" in self.model_fields_set):
+            found = sorted(self.model_fields_set)
+            raise ValueError(f"found {found}, expected either ranks or budgets ({keys}) and a cost")
+        return self
+
+
+# Quantities that only a whole cycle has.
+OF_CYCLES = (*measures.TRAVELLED, "step_length")
+
+
+class Recipe(Part):
+    """Complete recipe."""
+
+    schema_version: Literal[1] = Field(alias="schema", description="version of this format")
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
+    description: Text
+    licence: Text = Field(description="licence of the motion data, with what it asks to be said")
+    truth: Literal["reaching"] | None = Field(
+        default=None, description="procedural family whose noise-free motions are known everywhere"
+    )
+    source: Source
+    clips: Clips
+    controls: Annotated[list[Control], Field(min_length=1)]
+    motion: Motion
+    alignment: Alignment = Alignment()
+    kriging: Kriging = Kriging()
+    event: Event | None = None
+    roles: dict[Role, Text] = Field(
+        default={},
+        description="joints by the part that each plays, for whoever wants the names of Mixamo, "
+        "Unreal, VRM or HumanIK",
+    )
+    size: Size
+
+    @property
+    def typed(self) -> list[ControlColumn]:
+        """Return the controls with values in the table."""
+        return [control for control in self.controls if isinstance(control, ControlColumn)]
+
+    @property
+    def measured(self) -> list[ControlMeasured]:
+        """Return the controls that are measured from the clips."""
+        return [control for control in self.controls if isinstance(control, ControlMeasured)]
+
+    def ends(self, auto: Auto) -> list[str]:
+        """Return the two feet of a step, or the ends of a leg; empty for other quantities."""
+        if auto.quantity == "step_length":
+            return list(auto.joints or self.motion.feet)
+        if auto.quantity == "leg_length":
+            leg = [self.roles.get("leftUpperLeg"), self.roles.get("leftFoot")]
+            return list(auto.joints or filter(None, leg))
+        return []
+
+    @model_validator(mode="after")
+    def _label_has_a_column(self) -> "Recipe":
+        if self.kriging.label and not self.clips.performer:
+            raise ValueError("kriging.label is 'performer', but clips.performer names no column")
+        return self
+
+    @field_validator("controls")
+    @classmethod
+    def _names_differ(cls, controls: list[Control]) -> list[Control]:
+        names = [control.name for control in controls]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise ValueError(f"controls named twice: {sorted(twice)}")
+        return controls
+
+    @model_validator(mode="after")
+    def _controls_can_be_measured(self) -> "Recipe":
+        for control in self.measured:
+            fault = self._unmeasurable(control.auto)
+            if fault:
+                raise ValueError(f"controls.{control.name}.auto: {fault}")
+        return self
+
+    def _unmeasurable(self, auto: Auto) -> str | None:
+        """Return the reason for which a quantity cannot be measured; None if it can."""
+        quantity, landmarks = auto.quantity, self.clips.landmarks
+        if quantity in OF_CYCLES and not self.motion.cyclic:
+            return (
+                f"found {quantity!r} and motion.cyclic = false, expected a cycle: of a motion that "
+                "ends elsewhere it hangs on where it was cut"
+            )
+        if quantity in ("speed", "stride_length") and self.motion.root == "in_place":
+            return f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
+        if auto.at is not None and auto.at not in (*MOMENTS, *landmarks):
+            known = ", ".join(map(repr, MOMENTS))
+            return f"at: found {auto.at!r}, expected {known} or a column of {landmarks}"
+        if quantity == "step_length" and len(self.ends(auto)) != 2:
+            return f"joints: found none and motion.feet {self.motion.feet}, expected two feet"
+        if quantity == "leg_length" and len(self.ends(auto)) != 2:
+            return (
+                "joints: found none, and not both roles leftUpperLeg and leftFoot; expected the "
+                "upper end of a leg and its lower"
+            )
+        return None
+
+    @field_validator("roles")
+    @classmethod
+    def _one_role_a_joint(cls, roles: dict[Role, str]) -> dict[Role, str]:
+        joints = list(roles.values())
+        twice = sorted({joint for joint in joints if joints.count(joint) > 1})
+        if twice:
+            raise ValueError(f"joints with two roles: {twice}, expected one each")
+        return roles
+
+    @model_validator(mode="after")
+    def _event_is_known(self) -> "Recipe":
+        if self.event is None:
+            if self.size.effector_budget_cm is not None:
+                raise ValueError(
+                    f"size.effector_budget_cm: found {self.size.effector_budget_cm:g} and no "
+                    "[event], expected event.joint and event.at to say where it counts"
+                )
+        elif self.event.at != "end" and self.event.at not in self.clips.landmarks:
+            raise ValueError(
+                f"event.at: found {self.event.at!r}, expected 'end' or a column of "
+                f"clips.landmarks {self.clips.landmarks}"
+            )
+        return self
+
+
+MOST_BYTES = 128_000
+"""Size of a recipe; those of the project take 3 kB."""
+
+MOST_DOTS = 1_000
+"""Dots in one key: far more than MOST_LEVELS, and few enough to parse quickly."""
+
+SHOWN = 200
+"""Characters of a value in a message."""
+
+MOST_LEVELS = 16
+"""Nesting depth of tables and arrays; a recipe needs five."""
+
+
+def read(path: Path) -> Recipe:
+    """Return the recipe of a TOML file; RecipeError names the invalid key."""
+    content = data_folder.read(path, MOST_BYTES, "a recipe")
+    try:
+        text = content.decode()
+    except UnicodeDecodeError as fault:
+        raise RecipeError(path, f"not UTF-8 text: {fault}") from fault
+    # tomllib takes quadratic time in the parts of a key: 40 s for a key of MOST_BYTES.
+    if any(line.partition("=")[0].count(".") > MOST_DOTS for line in text.splitlines()):
+        raise RecipeError(path, TOO_DEEP)
+    try:
+        found = tomllib.loads(text)
+    except RecursionError as fault:
+        raise RecipeError(path, TOO_DEEP) from fault
+    except ValueError as fault:
+        # ValueError covers TOMLDecodeError and int's error for a number of thousands of digits.
+        raise RecipeError(path, f"not TOML: {fault}", _line_of(str(fault))) from fault
+    if _levels(found) > MOST_LEVELS:
+        raise RecipeError(path, TOO_DEEP)
+    try:
+        return Recipe.model_validate(found)
+    except ValidationError as fault:
+        raise RecipeError(path, _explain(fault)) from fault
+
+
+TOO_DEEP = f"tables or arrays nested deeper than {MOST_LEVELS} levels, expected at most that many"
+
+
+def _levels(found: dict[str, Any]) -> int:
+    """Return the nesting depth of tables and arrays, at most MOST_LEVELS + 1."""
+    inside: list[Any] = [found]
+    for level in range(MOST_LEVELS + 1):
+        if not inside:
+            return level
+        parts = (one.values() if isinstance(one, dict) else one for one in inside)
+        inside = [one for part in parts for one in part if isinstance(one, dict | list)]
+    return MOST_LEVELS + 1
+
+
+def _line_of(message: str) -> int | None:
+    found = re.search(r"line (\d+)", message)
+    return int(found.group(1)) if found else None
+
+
+def _explain(fault: ValidationError) -> str:
+    lines = []
+    # The default unit follows from the measured quantity; an error there is reported already.
+    errors = fault.errors(include_url=False)
+    for error in (one for one in errors if one["type"] != "default_factory_not_called"):
+        parts = [str(part) for part in error["loc"] if part not in (COLUMN, MEASURED)]
+        key = ".".join(parts) or "recipe"
+        found = "" if error["type"] in ("missing", "value_error") else _found(error["input"])
+        lines.append(f"{key}: {error['msg']}{found}")
+    return "; ".join(lines)
+
+
+def _found(given: Any) -> str:
+    """Return the given value for a message, cut to SHOWN characters."""
+    shown = repr(given)
+    return f", found {shown if len(shown) <= SHOWN else f'{shown[:SHOWN]}...'}"
+
+
+def json_schema() -> str:
+    """Return the JSON Schema of the recipe, which editors use."""
+    schema: dict[str, Any] = Recipe.model_json_schema(by_alias=True)
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return json.dumps(schema, indent=2, sort_keys=True) + "\n"

@@ -1,0 +1,49 @@
+"""Training of several recipes in parallel, each on one thread."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from posefield.common.errors import InvalidField, TrainingError
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.graph.onnx_export import Exported
+from posefield_train.parallel import single_thread
+from posefield_train.parallel.jobs import Jobs
+from posefield_train.source import ingest, recipe
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
+
+
+@dataclass(frozen=True)
+class Made:
+    """Result of a recipe: an exported model, or the error that prevented it."""
+
+    name: str
+    found: Exported | TrainingError
+
+
+def models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterator[Made]:
+    """Yield the models of recipes, named after their files, in the order in which they finish.
+
+    data: folder of the motion data; None for each recipe's own. Raises InvalidField if two files
+    have the same name, and RecipeError or BvhError if a recipe or its data cannot be read.
+    """
+    names = [path.stem for path in paths]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InvalidField("RECIPE", f"{', '.join(twice)} twice, expected names of their own")
+    read = [(path, recipe.read(path)) for path in paths]
+    # Data are read when jobs are started, so that few recipes' data are in memory.
+    return jobs.run(
+        _model,
+        ((path.stem, own, *ingest.ingest(own, data or path.parent)) for path, own in read),
+    )
+
+
+def _model(name: str, own: Recipe, examples: list[Example], notes: list[str]) -> Made:
+    with single_thread.one():
+        try:
+            trained = train.train(own, examples, lambda _: None)
+            return Made(name, onnx_export.export(own, trained, notes))
+        except TrainingError as error:
+            return Made(name, error)

@@ -1,0 +1,1 @@
+"""Motion tensor, its HOSVD and its decoding to poses."""

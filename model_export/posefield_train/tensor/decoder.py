@@ -1,0 +1,310 @@
+"""Decoder from reduced coefficients and canonical time to rotations, root and bone offsets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices
+from posefield.motion import blend, quat
+from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.level_tables import Numbers
+from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.pose_vectors import Chart
+
+# Added to squared half angles, so that sin(a) / a is defined at zero.
+TINY = 1e-12
+# Numbers of decoded motion per block: 16 MB.
+MOTIONS = 2_000_000
+
+
+@dataclass(frozen=True)
+class Rung:
+    """Size of a level of detail.
+
+    ranks: (r1, r2, r3). joints: indices of the moving joints, in order; all others stay at the
+    family's mean.
+    """
+
+    ranks: tuple[int, int, int]
+    joints: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Decoder:
+    """Reduced motion tensor and the maps from its coefficients to poses.
+
+    reduced: core (r1, r2, r3) and bases of degrees of freedom, frames and samples, in the metric's
+    coordinates. mean: pose vector (D,) on which the tensor is centred. unwhiten: map (D, D') from
+    the metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means:
+    rotations (J, 4) about which the rotation vectors are taken. coarse: ranks and joints of each
+    coarser level.
+    """
+
+    reduced: Multilinear
+    mean: Floats
+    unwhiten: Floats
+    means: Floats
+    coarse: tuple[Rung, ...] = ()
+
+    @property
+    def rungs(self) -> tuple[Rung, ...]:
+        """Return the ranks and joints of all levels, the finest first."""
+        r1, r2, r3 = self.reduced.core.shape
+        return (Rung((r1, r2, r3), tuple(range(len(self.means)))), *self.coarse)
+
+    def at(self, level: int) -> "Decoder":
+        """Return the decoder of one level: truncated core and bases, and fixed joints."""
+        rung = self.rungs[level]
+        moves = np.zeros((1 + len(self.means), 3))
+        moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
+        unwhiten = self.unwhiten * moves.reshape(-1, 1)
+        return replace(
+            self, reduced=self.reduced.truncated(rung.ranks), unwhiten=unwhiten, coarse=()
+        )
+
+    @property
+    def directions(self) -> Floats:
+        """Return the pose vectors (r1, D) that the first mode's coefficients multiply."""
+        return self.reduced.bases[0].T @ self.unwhiten.T
+
+    def numpy(self, coefficients: Floats, place: Floats) -> tuple[Floats, Floats]:
+        """Return rotations (B, S, J, 4) and root positions (B, S, 3) at canonical frames (B, S).
+
+        coefficients: (B, r3). The time basis is interpolated linearly between frames (Mukai &
+        Kuriyama 2006, section 2).
+        """
+        numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
+        return Chart(self.means).poses(numbers)
+
+    def at_frame(self, coefficients: Floats, frame: int) -> tuple[Floats, Floats]:
+        """Return rotations (B, J, 4) and root positions (B, 3) at one canonical frame of all.
+
+        The core is contracted with that frame first, which saves nearly all of the work of `numpy`.
+        """
+        core = np.tensordot(self.reduced.bases[1][frame], self.reduced.core, axes=(0, 1))
+        numbers = self.mean + coefficients @ (core.T @ self.directions)
+        return Chart(self.means).poses(numbers)
+
+    def of_joints(self, joints: Sequence[int]) -> "Decoder":
+        """Return the decoder of some joints alone, including the root, at its finest level."""
+        kept = [0, *(1 + joint for joint in joints)]
+        rows = np.ravel(np.arange(len(self.mean)).reshape(-1, 3)[kept])
+        return replace(
+            self,
+            mean=self.mean[rows],
+            unwhiten=self.unwhiten[rows],
+            means=self.means[list(joints)],
+            coarse=(),
+        )
+
+    def reduced_poses(self, coefficients: Floats, place: Floats) -> Floats:
+        """Return coefficients (B, S, r1) of the first mode."""
+        table, (r1, r2, r3) = self.reduced.bases[1], self.reduced.core.shape
+        time = blend.between(table, place)
+        # Contracting the core first as a matrix product is 17 times as fast as one einsum.
+        core = self.reduced.core.transpose(2, 0, 1).reshape(r3, -1)
+        poses = np.empty((*place.shape, r1))
+        step = max(1, MOTIONS // core.shape[1])
+        for start in range(0, len(place), step):
+            block = slice(start, start + step)
+            motion = (coefficients[block] @ core).reshape(-1, r1, r2)
+            poses[block] = time[block] @ motion.swapaxes(1, 2)
+        return poses
+
+    def entries(self) -> dict[str, list[Numbers]]:
+        """Return the level-dependent slice ends and shapes of the decoder's graph, by name."""
+        ranks, joints = [rung.ranks for rung in self.rungs], [len(r.joints) for r in self.rungs]
+        return {
+            "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
+            "core_rows": [[-1, r3] for _, _, r3 in ranks],
+            "motion": [[r2, r1, -1, 1] for r1, r2, _ in ranks],
+            "flat": [[r1, -1] for r1, _, _ in ranks],
+            "time": [[r2] for _, r2, _ in ranks],
+            "root": [[3, r1] for r1, _, _ in ranks],
+            "turning": [[4 * n, r1] for n, (r1, _, _) in zip(joints, ranks, strict=True)],
+            "joints": [[n] for n in joints],
+            "quaternions": [[4 * n] for n in joints],
+        }
+
+    def onnx(
+        self, net: Net, coefficients: str, place: str, ends: dict[str, str]
+    ) -> tuple[str, str]:
+        """Build `numpy` in a graph, from canonical frames (B, S, 1).
+
+        ends: graph values of the level's slice ends, by the names of `entries`.
+        """
+        flat = self._reduced(net, coefficients, place, ends)
+        directions = self._directions(net)
+        three, end = net.indices(3), net.indices(len(self.mean))
+        of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
+        mean = net.weights("root_mean", self.mean[:3])
+        root = net("Gemm", flat, of_root, mean, transA=1, transB=1)
+        steps = net("Shape", place, start=0, end=2)
+        root_shape = net("Concat", steps, net.indices(3), axis=0)
+        joint_shape = net("Concat", steps, net.indices(len(self.means), 4), axis=0)
+        of_joints = net("Slice", directions, three, end, net.indices(0))
+        return (
+            net("Reshape", self._rotations(net, flat, of_joints, ends), joint_shape),
+            net("Reshape", root, root_shape),
+        )
+
+    def _reduced(self, net: Net, coefficients: str, place: str, ends: dict[str, str]) -> str:
+        """Build the coefficients of the first mode (r1, B S).
+
+        Poses lie innermost: one small matrix product per pose would cost more in calls than in
+        arithmetic.
+        """
+        whole = net.weights("core", self.reduced.core.transpose(1, 0, 2))
+        core = net("Slice", whole, net.indices(0, 0, 0), ends["core"])
+        rows = net("Reshape", core, ends["core_rows"])
+        motion = net("Reshape", net("Gemm", rows, coefficients, transB=1), ends["motion"])
+        time = net("Unsqueeze", self._time(net, place, ends["time"]), net.indices(1))
+        terms = net("Mul", motion, time)
+        poses = net("ReduceSum", terms, net.indices(0), keepdims=0)
+        return net("Reshape", poses, ends["flat"])
+
+    def _time(self, net: Net, place: str, end: str) -> str:
+        """Build time coefficients (r2, B, S), linearly interpolated between frames."""
+        table = net.weights("time_basis", self.reduced.bases[1].T)
+        last = len(self.reduced.bases[1]) - 1
+        zero, one = net.indices(0), net.indices(1)
+        kept = net("Slice", table, zero, end, zero)
+        first = net("Slice", kept, zero, net.indices(last), one)
+        steps = net("Sub", net("Slice", kept, one, net.indices(last + 1), one), first)
+        when = net("Squeeze", place, net.indices(2))
+        before = net("Min", net("Floor", when), net.number(last - 1.0))
+        column = net("Cast", before, to=6)
+        rise = net("Mul", net("Gather", steps, column, axis=1), net("Sub", when, before))
+        return net("Add", net("Gather", first, column, axis=1), rise)
+
+    def _directions(self, net: Net) -> str:
+        """Build directions (D, r1) from stored nonzero rows when the session loads."""
+        varies = np.any(self.unwhiten != 0.0, axis=1)
+        stored = net.weights("directions", self.directions[:, varies].T)
+        nothing = net.weights("no_direction", np.zeros((1, len(self.directions))))
+        # Degrees of freedom that never vary take the row of zeros after the others.
+        row = np.where(varies, np.cumsum(varies) - 1, np.count_nonzero(varies))
+        return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
+
+    def _rotations(self, net: Net, flat: str, directions: str, ends: dict[str, str]) -> str:
+        """Build quaternions (B S, J, 4) from the first mode's coefficients (r1, B S)."""
+        turning = turned_onnx(net, self.means, directions)
+        offset = turned(self.means, self.mean[3:])
+        if any(len(rung.joints) < len(self.means) for rung in self.rungs):
+            return self._some(net, flat, turning, offset, ends)
+        turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+        means = net.weights("mean_rotations", self.means[:, :, None])
+        constant = net.weights("rotation_mean", offset[:, None])
+        return innermost_joints(
+            net,
+            quaternions(net, net("Gemm", turning, flat, constant), means),
+            len(self.means),
+        )
+
+    def _some(self, net: Net, flat: str, turning: str, offset: Floats, ends: dict[str, str]) -> str:
+        """Build quaternions where some level fixes joints.
+
+        Joints are sorted by the number of levels that move them, so that a slice selects a level's
+        joints.
+        """
+        order = self._order()
+        joints, zero = len(order), net.indices(0)
+        rows = np.arange(4 * joints).reshape(joints, 4)[order].ravel()
+        turning = net("Gather", turning, net.weights("turning_order", rows))
+        turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+        constant = net.weights("rotation_mean", offset[rows][:, None])
+        constant = net("Slice", constant, zero, ends["quaternions"], zero)
+        ordered = net.weights("mean_rotations", self.means[:, :, None])
+        ordered = net("Gather", ordered, net.weights("joint_order", order))
+        moving = net("Slice", ordered, zero, ends["joints"], zero)
+        found = quaternions(net, net("Gemm", turning, flat, constant), moving)
+        still = quat.mul(self.means, quat.exp(self.mean[3:].reshape(-1, 3)))[order][:, :, None]
+        still_ones = net(
+            "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
+        )
+        poses = net("Shape", found, start=2, end=3)
+        shape = net("Concat", net.indices(1, 1), poses, axis=0)
+        both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
+        back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
+        return innermost_joints(net, back, joints)
+
+    def _order(self) -> Indices:
+        """Return the joints sorted by the number of coarser levels that keep them, descending."""
+        kept = [[j in rung.joints for j in range(len(self.means))] for rung in self.coarse]
+        return np.argsort(-np.sum(kept, axis=0), kind="stable")
+
+
+def turned(means: Floats, vectors: Floats) -> Floats:
+    """Return mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
+
+    mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The bracket is linear in
+    v and keeps its length, so it is folded into the model's directions and the graph needs no
+    quaternion products.
+    """
+    pure = np.zeros((*vectors.shape[:-1], len(means), 4))
+    pure[..., 1:] = 0.5 * vectors.reshape(*vectors.shape[:-1], -1, 3)
+    return quat.mul(means, pure).reshape(*vectors.shape[:-1], -1)
+
+
+def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
+    """Build `turned` in a graph: columns of rotation vectors (3 J, r) to columns (4 J, r)."""
+    # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
+    axes = quat.mul(np.eye(4)[:, None], 0.5 * np.eye(4)[1:]).swapaxes(1, 2).reshape(4, 12)
+    rotations = net("Squeeze", net.weights("mean_rotations", means[:, :, None]), net.indices(2))
+    products = net("MatMul", rotations, net.weights("half_axes", axes))
+    matrices = net("Reshape", products, net.indices(-1, 4, 3))
+    columns = net("MatMul", matrices, net("Reshape", vectors, net.indices(len(means), 3, -1)))
+    return net("Reshape", columns, net.indices(4 * len(means), -1))
+
+
+def quaternions(net: Net, rows: str, means: str) -> str:
+    """Build quaternions (J, 4, P) from turned rotation vectors (4 J, P) about means (J, 4, 1).
+
+    Poses lie innermost, so that every operation runs over long rows.
+    """
+    joints = net(
+        "Reshape", rows, net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
+    )
+    squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
+    cosine, share = _of_half_angles(net, squares)
+    return net("Add", net("Mul", means, cosine), net("Mul", joints, share))
+
+
+def _of_half_angles(net: Net, squares: str) -> tuple[str, str]:
+    """Build cosines of half angles a and ratios sin(a) / a, from their squares (J, 1, P)."""
+    half = net("Sqrt", net("Add", net.padded(squares), net.number(TINY)))
+    shape = net("Shape", squares)
+    share = net("Div", net("Sin", half), half)
+    return net.unpadded(net("Cos", half), shape), net.unpadded(share, shape)
+
+
+def innermost_joints(net: Net, rotations: str, joints: int) -> str:
+    """Build quaternions (P, J, 4) from quaternions (J, 4, P) with poses innermost."""
+    finished = net("Reshape", rotations, net.indices(4 * joints, -1))
+    return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, joints, 4))
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """Bone offsets as a linear model, m: performers differ in few dimensions.
+
+    mean: (J, 3). directions: (r, J, 3).
+    """
+
+    mean: Floats
+    directions: Floats
+
+    def numpy(self, coefficients: Floats) -> Floats:
+        """Return bone offsets (B, J, 3), m, of coefficients (B, r)."""
+        return self.mean + np.einsum("br,rjk->bjk", coefficients, self.directions)
+
+    def onnx(self, net: Net, coefficients: str) -> str:
+        """Build `numpy` in a graph."""
+        flat = net(
+            "Gemm",
+            coefficients,
+            net.weights("offset_directions", self.directions.reshape(len(self.directions), -1)),
+            net.weights("offset_mean", self.mean.ravel()),
+        )
+        return net("Reshape", flat, net.indices(-1, len(self.mean), 3))

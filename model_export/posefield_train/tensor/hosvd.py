@@ -1,0 +1,127 @@
+"""Higher-order singular value decomposition with deterministic signs.
+
+Symbols follow De Lathauwer, De Moor, Vandewalle, "A multilinear singular value decomposition" (SIAM
+J. Matrix Anal. 2000): a tensor A is its core S times one orthonormal matrix per mode. Mukai &
+Kuriyama 2006, section 2, apply it to the motion tensor.
+"""
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+
+from posefield.common.errors import TrainingError
+from posefield.common.units import Floats
+
+# Directions with less than this share of the first singular value are rounding errors.
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class Multilinear:
+    """Core tensor (r1, r2, …) and one orthonormal basis (size of the mode, r) for each mode."""
+
+    core: Floats
+    bases: tuple[Floats, ...]
+
+    def truncated(self, ranks: tuple[int, ...]) -> "Multilinear":
+        """Return the decomposition cut to the leading columns of every basis.
+
+        The squared error is at most the sum over modes of the squared singular values cut off, and
+        at least the largest of these sums (De Lathauwer et al. 2000, property 10). Raises
+        TrainingError for a rank beyond the decomposition's.
+        """
+        if any(not 1 <= rank <= size for rank, size in zip(ranks, self.core.shape, strict=True)):
+            raise TrainingError(f"ranks {ranks}, expected 1 to {self.core.shape}")
+        prefix = tuple(slice(rank) for rank in ranks)
+        bases = (basis[:, :rank] for basis, rank in zip(self.bases, ranks, strict=True))
+        return Multilinear(self.core[prefix], tuple(bases))
+
+    @property
+    def motions(self) -> Floats:
+        """Return the slices along the last mode as rows (N, r) with equal distances."""
+        return self.bases[-1] * self._lengths
+
+    def slices(self, motions: Floats) -> Floats:
+        """Return the slices (..., B) of the tensor for rows (B, r) of coordinates as `motions`."""
+        # Directions with tiny singular values are rounding errors; do not divide by these.
+        lengths = self._lengths
+        carried = lengths > NOTHING * lengths[0]
+        worth = np.where(carried, 1.0 / np.where(carried, lengths, 1.0), 0.0)
+        rest = Multilinear(self.core * worth, (*self.bases[:-1], motions))
+        return rest.restored()
+
+    @property
+    def _lengths(self) -> Floats:
+        """Return the singular values (r,) of the last mode."""
+        return np.linalg.norm(unfold(self.core, self.core.ndim - 1), axis=1)
+
+    def restored(self) -> Floats:
+        """Return the tensor: the core multiplied by all bases."""
+        return reduce(lambda x, mb: mode_dot(x, mb[1], mb[0]), enumerate(self.bases), self.core)
+
+
+def unfold(tensor: Floats, mode: int) -> Floats:
+    """Return the mode-n unfolding: the mode's fibres as columns (size of the mode, rest)."""
+    return np.moveaxis(tensor, mode, 0).reshape(tensor.shape[mode], -1)
+
+
+def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
+    """Return the mode-n product: matrix (rows, size of the mode) applied to every fibre.
+
+    The tensor is not rearranged in memory, which would take longer than the product.
+    """
+    before, after = tensor.shape[:mode], tensor.shape[mode + 1 :]
+    if not after:
+        return tensor @ matrix.T
+    fibres = tensor.reshape(*before, tensor.shape[mode], -1)
+    return (matrix @ fibres).reshape(*before, len(matrix), *after)
+
+
+def decompose(tensor: Floats) -> Multilinear:
+    """Return the HOSVD at full rank, with an all-orthogonal core and slices ordered by norm.
+
+    Each basis holds the eigenvectors of its unfolding's Gram matrix, largest first; the largest
+    entry of every column is positive, so the result does not depend on LAPACK's choice of sign.
+    """
+    return _projected(tensor, tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim)))
+
+
+def decompose_at(tensor: Floats, ranks: tuple[int, ...]) -> Multilinear:
+    """Return `decompose` truncated to ranks, in half the time.
+
+    Only the required part of the core is computed.
+    """
+    pairs = zip(range(tensor.ndim), ranks, strict=True)
+    bases = tuple(_basis(unfold(tensor, mode))[:, :rank] for mode, rank in pairs)
+    return _projected(tensor, bases)
+
+
+def _projected(tensor: Floats, bases: tuple[Floats, ...]) -> Multilinear:
+    core = reduce(lambda x, mb: mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
+    return Multilinear(core, bases)
+
+
+def _basis(unfolded: Floats) -> Floats:
+    _, vectors = np.linalg.eigh(unfolded @ unfolded.T)
+    return fix_signs(vectors[:, ::-1])
+
+
+def fix_signs(columns: Floats) -> Floats:
+    """Return columns (D, r) with signs such that the largest entry of each is positive."""
+    # Rounded, so that rounding errors do not decide between two entries of equal size.
+    largest = np.argmax(np.round(np.abs(columns), 9), axis=0)
+    return columns * np.sign(columns[largest, np.arange(columns.shape[1])])
+
+
+def squared_errors(core: Floats) -> Floats:
+    """Return the exact squared error of every truncation: entry (i, j, …) for ranks (i+1, j+1, …).
+
+    The bases are orthonormal, so the error is the squared norm of the core outside its prefix: |A|²
+    minus a cumulative sum.
+    """
+    energy: Floats = np.square(core)
+    for axis in range(core.ndim):
+        energy = np.cumsum(energy, axis=axis)
+    total = energy[(-1,) * core.ndim]
+    return np.maximum(total - energy, 0.0)

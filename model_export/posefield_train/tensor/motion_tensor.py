@@ -1,0 +1,106 @@
+"""Motion tensor of degrees of freedom × frames × samples (Mukai & Kuriyama 2006, section 2).
+
+It is expressed in a metric of joint positions, see `metric`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.align.time_alignment import Aligned
+from posefield_train.source import half_turns
+from posefield_train.source.half_turns import Finding
+from posefield_train.tensor import pose_metric
+from posefield_train.tensor import pose_vectors as chart
+from posefield_train.tensor.pose_vectors import Chart
+
+# A degree of freedom with a smaller range over the family is left out, m or rad.
+CONSTANT = 1e-9
+
+
+@dataclass(frozen=True)
+class MotionTensor:
+    """Centred, whitened pose vectors of aligned clips.
+
+    values: (D', T, N), of the D' degrees of freedom that vary. A unit of squared distance between
+    two entries is a square metre, summed over weighted joints and frames. mean: pose vector (D,) on
+    which it is centred. whiten, unwhiten: maps (D', D) and (D, D') to whitened values and back.
+    weight: sum of the joints' weights.
+    """
+
+    values: Floats
+    mean: Floats
+    whiten: Floats
+    unwhiten: Floats
+    chart: Chart
+    weight: float
+
+    def numbers(self, values: Floats) -> Floats:
+        """Return pose vectors (B, T, D) of slices (D', T, B) of the tensor."""
+        return self.mean + values.transpose(2, 1, 0) @ self.unwhiten.T
+
+    def rms(self, squared: Floats) -> Floats:
+        """Return the RMS joint distance, m, of squared distances summed over the tensor."""
+        _, frames, samples = self.values.shape
+        return np.sqrt(squared / (self.weight * frames * samples))
+
+
+def pose_vectors(
+    aligned: Aligned, parents: tuple[int, ...], offsets: Floats
+) -> tuple[Floats, Chart, list[Finding]]:
+    """Return pose vectors (N, T, D) of aligned clips, their chart, and flips and far joints.
+
+    offsets: bone offsets (N, J, 3) of each clip's performer, m.
+    """
+    small = half_turns.small_joints(parents, offsets.mean(axis=0))
+    rotations, flipped = half_turns.without_flips(aligned.rotations, small)
+    own_chart, far = chart.fit(rotations)
+    return own_chart.numbers(rotations, aligned.root_path), own_chart, flipped + far
+
+
+def build(
+    numbers: Floats,
+    own_chart: Chart,
+    parents: tuple[int, ...],
+    offsets: Floats,
+    joint_weights: Floats,
+) -> MotionTensor:
+    """Return the tensor of pose vectors (N, T, D) in the metric of their own poses.
+
+    offsets: bone offsets (N, J, 3) of each clip's performer, m. joint_weights: (J,).
+    """
+    mean = numbers.mean(axis=(0, 1))
+    varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT
+    own_gram = gram(numbers, own_chart, parents, offsets, joint_weights)
+    root, inverse = pose_metric.whitening(own_gram[np.ix_(varies, varies)])
+    whiten, unwhiten = np.zeros((2, len(root), len(mean)))
+    whiten[:, varies], unwhiten[:, varies] = root, inverse
+    values = _whitened(numbers, mean, whiten)
+    return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, float(joint_weights.sum()))
+
+
+def _whitened(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
+    """Return the tensor (D', T, N) of pose vectors (N, T, D), transposed in small blocks."""
+    samples, frames, _ = numbers.shape
+    flat = whiten @ numbers.reshape(samples * frames, -1).T
+    flat -= (whiten @ mean)[:, None]
+    return np.ascontiguousarray(flat.reshape(-1, samples, frames).swapaxes(1, 2))
+
+
+def gram(
+    numbers: Floats,
+    own_chart: Chart,
+    parents: tuple[int, ...],
+    offsets: Floats,
+    joint_weights: Floats,
+) -> Floats:
+    """Return the Gram matrix (D, D) over poses spaced evenly through pose vectors (N, T, D)."""
+    samples, frames, _ = numbers.shape
+    chosen = np.unique(np.linspace(0, samples * frames - 1, pose_metric.POSES).astype(np.int64))
+    some = numbers.reshape(samples * frames, -1)[chosen]
+    rotations, root = own_chart.poses(some)
+    translations = offsets[chosen // frames].copy()
+    translations[:, 0] = root
+    vectors = some[:, 3:].reshape(len(some), -1, 3)
+    return pose_metric.gram(parents, rotations, vectors, translations, joint_weights)

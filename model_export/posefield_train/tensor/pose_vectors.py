@@ -1,0 +1,106 @@
+"""Pose vectors: root translation and rotation vectors about each joint's mean rotation.
+
+Rotation vectors are ambiguous beyond half a turn from the mean, which a raised arm can reach. They
+are unwrapped so that no clip is discontinuous, and every such joint is reported.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import quat, quat_planes
+from posefield.motion.skeleton import BLOCK
+from posefield_train.source.half_turns import Finding
+
+# Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
+FAR = 0.9 * np.pi
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Chart of poses. means: rotations (J, 4) about which rotation vectors are taken."""
+
+    means: Floats
+
+    def numbers(self, rotations: Floats, root_path: Floats) -> Floats:
+        """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3)."""
+        vectors = _unwrapped(quat.log(quat.mul(quat.conj(self.means), rotations)))
+        return np.concatenate([root_path, vectors.reshape(*root_path.shape[:2], -1)], axis=-1)
+
+    def poses(self, numbers: Floats) -> tuple[Floats, Floats]:
+        """Return rotations (..., J, 4), root positions (..., 3) of pose vectors (..., 3 + 3 J)."""
+        *lead, freedoms = numbers.shape
+        rows = numbers.reshape(-1, freedoms)
+        rotations = np.empty((len(rows), 4 * len(self.means)))
+        for start in range(0, len(rows), BLOCK):
+            block = slice(start, start + BLOCK)
+            planes = self.rotation_planes(np.ascontiguousarray(rows[block, 3:].T))
+            rotations[block] = planes.reshape(rotations.shape[1], -1).T
+        return rotations.reshape(*lead, -1, 4), numbers[..., :3]
+
+    def rotation_planes(self, vectors: Floats) -> Floats:
+        """Return rotations (J, 4, ...) of rotation vectors about the means (3 J, ...)."""
+        planes = vectors.reshape(len(self.means), 3, *vectors.shape[1:]).swapaxes(0, 1)
+        rotations = np.empty((len(self.means), 4, *vectors.shape[1:]))
+        means = self.means.T.reshape(4, -1, *(1 for _ in vectors.shape[1:]))
+        quat_planes.product(means, quat_planes.exp(planes), out=rotations.swapaxes(0, 1))
+        return rotations
+
+    def far(self, rotations: Floats) -> list[Finding]:
+        """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
+        return _far(quat.log(quat.mul(quat.conj(self.means), rotations)))
+
+
+def fit(rotations: Floats) -> tuple[Chart, list[Finding]]:
+    """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints."""
+    own_chart = Chart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
+    return own_chart, own_chart.far(rotations)
+
+
+def _jumps(vectors: Floats) -> Floats:
+    """Return a mask (N, J) of rotation vectors with a jump of over half a turn between frames."""
+    steps = np.linalg.norm(np.diff(vectors, axis=1), axis=-1)
+    jumps: Floats = np.any(steps > np.pi, axis=1)
+    return jumps
+
+
+def _far(vectors: Floats) -> list[Finding]:
+    largest = np.linalg.norm(vectors, axis=-1).max(axis=1)
+    jumps = _jumps(vectors)
+    return [
+        Finding("wrap" if jumps[clip, joint] else "far", int(joint), int(clip), float(angle))
+        for (clip, joint), angle in np.ndenumerate(largest)
+        if angle > FAR
+    ]
+
+
+def _unwrapped(vectors: Floats) -> Floats:
+    vectors = vectors.copy()
+    for clip, joint in np.argwhere(_jumps(vectors)):
+        vectors[clip, :, joint] = _followed(vectors[clip, :, joint])
+    return vectors
+
+
+def _followed(path: Floats) -> Floats:
+    """Unwrap rotation vectors (T, 3) in both directions from the frame nearest to the mean.
+
+    Starting at that frame puts all clips on the same branch.
+    """
+    path = path.copy()
+    start = int(np.argmin(np.linalg.norm(path, axis=-1)))
+    for frame in range(start + 1, len(path)):
+        path[frame] = _nearest_turn(path[frame], path[frame - 1])
+    for frame in range(start - 1, -1, -1):
+        path[frame] = _nearest_turn(path[frame], path[frame + 1])
+    return path
+
+
+def _nearest_turn(vector: Floats, neighbour: Floats) -> Floats:
+    """Return the same rotation with whole turns added so that it lies nearest to a neighbour."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-9:
+        return vector
+    axis = vector / angle
+    turns = np.rint((neighbour @ axis - angle) / (2.0 * np.pi))
+    return (angle + 2.0 * np.pi * turns) * axis

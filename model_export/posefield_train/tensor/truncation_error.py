@@ -1,0 +1,185 @@
+"""Joint errors of a truncation, by forward kinematics.
+
+The metric of the tensor is a first-order approximation; forward kinematics gives the true
+distances.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.errors import TrainingError
+from posefield.common.units import Floats
+from posefield.model_file.model_card import Event
+from posefield.motion import skeleton
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
+from posefield_train.tensor import hosvd
+from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.motion_tensor import MotionTensor
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """Distances, m, between joints of the truncated and the full tensor.
+
+    rms: weighted root mean square over clips, frames and joints. p99, max: over the same,
+    unweighted. effector: root mean square over clips of the event's joint at its event; None
+    without event.
+    """
+
+    rms: float
+    p99: float
+    max: float
+    effector: float | None
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A joint and the canonical frame of its event."""
+
+    joint: int
+    frame: int
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Joint positions of the full tensor, for measuring truncations.
+
+    whole: joint positions (N, T, J, 3), m, without a cycle's travel. offsets: (N, J, 3), m.
+    weights: joint weights (J,).
+    """
+
+    own_tensor: MotionTensor
+    parents: tuple[int, ...]
+    offsets: Floats
+    weights: Floats
+    moment: Moment | None
+    whole: Floats
+
+    def of(self, reduced: Multilinear) -> Fidelity:
+        """Return the fidelity of a truncation of this tensor."""
+        found = self._distances(reduced)
+        return Fidelity(found.rms, found.p99, found.max, found.effector)
+
+    def strain(self, reduced: Multilinear, budgets: Mapping[str, float]) -> float:
+        """Return the largest error of a truncation over its budget, m, by name in `Fidelity`."""
+        found = self._distances(reduced)
+        return max(getattr(found, name) / budget for name, budget in budgets.items())
+
+    def _distances(self, reduced: Multilinear) -> "_Distances":
+        first, *others = reduced.bases
+        # Restore pose vectors directly: the whitened tensor would be as large again.
+        unwhitened = Multilinear(reduced.core, (self.own_tensor.unwhiten @ first, *others))
+        gaps = _joints(self.own_tensor, unwhitened.restored(), self.parents, self.offsets)
+        gaps -= self.whole
+        distances = np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
+        return _Distances(distances, self.weights, self.moment)
+
+
+@dataclass(frozen=True)
+class _Distances:
+    """Distances (N, T, J), m, with the statistics of `Fidelity`, each computed on access."""
+
+    gaps: Floats
+    weights: Floats
+    moment: Moment | None
+
+    @property
+    def rms(self) -> float:
+        squares = np.mean(np.square(self.gaps), axis=(0, 1))
+        return float(np.sqrt(np.average(squares, weights=self.weights)))
+
+    @property
+    def p99(self) -> float:
+        return float(np.quantile(self.gaps, 0.99))
+
+    @property
+    def max(self) -> float:
+        return float(self.gaps.max())
+
+    @property
+    def effector(self) -> float | None:
+        if self.moment is None:
+            return None
+        return float(
+            np.sqrt(np.mean(np.square(self.gaps[:, self.moment.frame, self.moment.joint])))
+        )
+
+
+def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> Floats:
+    """Return the weight (J,) of each joint's position from the recipe, by default one."""
+    names = examples[0].clip.skeleton.names
+    return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in names])
+
+
+def judge(recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor) -> Judge:
+    """Return a judge of the truncations of a recipe's tensor.
+
+    Raises TrainingError if the skeleton lacks the event's joint.
+    """
+    parents, weights = examples[0].clip.skeleton.parents, joint_weights(recipe, examples)
+    offsets = np.stack([example.offsets for example in examples])
+    whole = positions(own_tensor, own_tensor.values, parents, offsets)
+    return Judge(own_tensor, parents, offsets, weights, moment(recipe, examples), whole)
+
+
+def positions(
+    own_tensor: MotionTensor, values: Floats, parents: tuple[int, ...], offsets: Floats
+) -> Floats:
+    """Return joint positions (N, T, J, 3), m, of whitened values (D', T, N).
+
+    offsets: bone offsets (N, J, 3), m.
+    """
+    return _joints(own_tensor, hosvd.mode_dot(values, own_tensor.unwhiten, 0), parents, offsets)
+
+
+def _joints(
+    own_tensor: MotionTensor, centred: Floats, parents: tuple[int, ...], offsets: Floats
+) -> Floats:
+    """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean."""
+    _, frames, samples = centred.shape
+    places = np.empty((len(parents), 3, frames, samples))
+    bones = offsets.transpose(1, 2, 0)[1:, :, None]
+    step = max(1, skeleton.BLOCK // samples)
+    for start in range(0, frames, step):
+        block = slice(start, start + step)
+        numbers = own_tensor.mean[:, None, None] + centred[:, block]
+        rotations = own_tensor.chart.rotation_planes(numbers[3:])
+        places[:, :, block] = skeleton.position_planes(parents, rotations, [numbers[:3], *bones])
+    return places.transpose(3, 2, 0, 1)
+
+
+def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
+    """Return the joint and canonical frame of the recipe's event; None without event.
+
+    Raises TrainingError if the skeleton lacks its joint.
+    """
+    event = recipe.event
+    if event is None:
+        return None
+    names = examples[0].clip.skeleton.names
+    if event.joint not in names:
+        raise TrainingError(f"event.joint {event.joint!r}, expected one of {', '.join(names)}")
+    return Moment(names.index(event.joint), _frame(recipe, event.at, examples))
+
+
+def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
+    """Return the recipe's event: its joint and share of canonical time; None without event."""
+    found = moment(recipe, examples)
+    if found is None or recipe.event is None:
+        return None
+    return Event(found.joint, round(_share(recipe, recipe.event.at, examples), 4))
+
+
+def _frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> int:
+    """Return the canonical frame of the event; a landmark lies at the mean of its times."""
+    return round((recipe.motion.frames - 1) * _share(recipe, at, examples))
+
+
+def _share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:
+    if at == "end":
+        return 1.0
+    mark = recipe.clips.landmarks.index(at)
+    return float(np.mean([example.landmarks[mark] for example in examples]))

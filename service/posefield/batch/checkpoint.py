@@ -1,0 +1,221 @@
+"""Checkpoints of an export: finished chunks, recorded in its target until all are finished.
+
+The folder `.posefield/` contains `job.json`, the job of the target, and one part for each finished
+chunk: a line of totals, then its lines of the manifest. The parts become `manifest.jsonl`,
+`skipped.jsonl` if rows were skipped, and last `export.json`, which marks the target as complete;
+then the folder is removed. The bytes are the same for any number of processes and of runs.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import orjson
+
+from posefield.batch import layouts, manifest
+from posefield.batch.job import Job, Work
+from posefield.batch.rows.row_query import Fault
+from posefield.batch.target import STATE, Target, Written, intact, lines, put
+from posefield.common.errors import FileError
+
+JOB, PARTS = f"{STATE}/job.json", f"{STATE}/parts"
+MANIFEST, SKIPPED, EXPORT = "manifest.jsonl", "skipped.jsonl", "export.json"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Result of one chunk, or of several.
+
+    clips, bytes: number of clips and bytes written. warned: clips with a warning. skipped: faults
+    of the rows that were left out. archives: files that contain the clips, in layouts of archives.
+    """
+
+    clips: int = 0
+    bytes: int = 0
+    warned: int = 0
+    skipped: list[Fault] = field(default_factory=list)
+    archives: list[Written] = field(default_factory=list)
+
+
+def begin(target: Target, place: str, job: Job) -> None:
+    """Assign the target to this job.
+
+    Raises FileError, with the target unchanged, if it belongs to another job or is not empty.
+    """
+    if target.read(JOB) is None:
+        if not target.empty(but=STATE):
+            raise FileError(place, "is not empty and has no manifest of an export")
+        _claim(target, job)
+    _expect(place, job, target.read(JOB))
+    target.prepare()
+
+
+def _claim(target: Target, job: Job) -> None:
+    """Record the job of a target that has none."""
+    target.prepare()
+    target.create(JOB, _json({"job": job.digest, **job.facts()}))
+
+
+def complete(target: Target, place: str, job: Job) -> dict[str, Any] | None:
+    """Return the facts of a complete export, else None; FileError if it is another job's."""
+    content = target.read(EXPORT)
+    return None if content is None else _expect(place, job, content)
+
+
+def damaged(target: Target, facts: dict[str, Any], verify: bool) -> str | None:
+    """Return the path of the first missing or changed file of a complete export, or None.
+
+    verify: compare checksums, not only sizes.
+    """
+    try:
+        found = (file.file for file in _files(target, facts) if not intact(target, file, verify))
+        return next(found, None)
+    except (ValueError, LookupError, TypeError):
+        return MANIFEST
+
+
+def _files(target: Target, facts: dict[str, Any]) -> Iterator[Written]:
+    """Yield every file of a complete export.
+
+    Raises ValueError, LookupError or TypeError for a damaged manifest.
+    """
+    yield from (Written(**file) for file in facts["files"])
+    clips = 0
+    for line in lines(target, MANIFEST):
+        clips += 1
+        entry = orjson.loads(line)
+        if "archive" not in entry:
+            yield _clip(entry)
+    if clips != facts["clips"]:
+        raise ValueError
+
+
+def _clip(entry: dict[str, Any]) -> Written:
+    return Written(entry["file"], entry["bytes"], entry["sha256"])
+
+
+def reopen(target: Target, job: Job) -> None:
+    """Reset a complete export to one without finished chunks; its files remain."""
+    _claim(target, job)
+    target.drop(EXPORT)
+
+
+def _expect(place: str, job: Job, content: bytes | None) -> dict[str, Any]:
+    """Return the facts of a job or an export; FileError unless they are this job's."""
+    try:
+        found = orjson.loads(content or b"")
+        if found["job"] == job.digest:
+            return dict(found)
+    except (ValueError, LookupError, TypeError) as fault:
+        raise FileError(place, f"holds an export whose facts cannot be read: {fault}") from fault
+    other = [name for name, fact in job.facts().items() if found.get(name) != fact]
+    raise FileError(
+        place,
+        f"holds another export, whose {', '.join(other)} differ; expected an empty folder or the "
+        "same export",
+    )
+
+
+def record(target: Target, number: int, part: Part, entries: Iterable[dict[str, Any]]) -> None:
+    """Write the part of a finished chunk, with its entries of the manifest."""
+    content = b"".join(map(manifest.line, [asdict(part), *entries]))
+    target.write([(f"{PARTS}/{_name(number)}", content)])
+
+
+def done(target: Target, number: int, names: set[str], verify: bool = False) -> Part | None:
+    """Return the part of a chunk if it is listed in `names` and its files are intact, else None.
+
+    verify: compare checksums, not only sizes.
+    """
+    if _name(number) not in names:
+        return None
+    head, _, entries = (target.read(f"{PARTS}/{_name(number)}") or b"").partition(b"\n")
+    try:
+        part = _part(head)
+        files = part.archives or [_clip(orjson.loads(line)) for line in entries.splitlines()]
+    except (ValueError, LookupError, TypeError):
+        return None
+    return part if all(intact(target, file, verify) for file in files) else None
+
+
+def names(target: Target) -> set[str]:
+    """Return the names of the present parts."""
+    return target.names(PARTS)
+
+
+def finish(target: Target, work: Work, chunks: int) -> dict[str, Any] | None:
+    """Complete an export if all of its chunks are finished, and return its facts; else None.
+
+    If another process completed it meanwhile, the facts are the same.
+    """
+    try:
+        if len(names(target)) == chunks:
+            return _finish(target, work, chunks)
+    except FileError:
+        # Another process may have completed it and removed the parts.
+        if (found := complete(target, work.target, work.job)) is None:
+            raise
+        return found
+    return complete(target, work.target, work.job)
+
+
+def _finish(target: Target, work: Work, chunks: int) -> dict[str, Any]:
+    total, job = _total(target, chunks), work.job
+    entries = (entries for _, entries in _parts(target, chunks))
+    files = [*total.archives, put(target, MANIFEST, entries)]
+    if total.skipped:
+        files.append(put(target, SKIPPED, map(manifest.line, map(asdict, total.skipped))))
+    if total.clips:
+        about = layouts.find(job.layout).complete(work, _entries(target, chunks))
+        files += [put(target, path, (content,)) for path, content in about]
+    counts = {"clips": total.clips, "bytes": total.bytes, "warned": total.warned}
+    facts = {
+        "job": job.digest,
+        **job.facts(),
+        **counts,
+        "skipped": len(total.skipped),
+        "files": list(map(asdict, files)),
+    }
+    target.write([(EXPORT, _json(facts))])
+    target.remove(STATE)
+    return facts
+
+
+def _entries(target: Target, chunks: int) -> Iterator[dict[str, Any]]:
+    for _, entries in _parts(target, chunks):
+        yield from map(orjson.loads, entries.splitlines())
+
+
+def _total(target: Target, chunks: int) -> Part:
+    parts = [part for part, _ in _parts(target, chunks)]
+    return Part(
+        sum(part.clips for part in parts),
+        sum(part.bytes for part in parts),
+        sum(part.warned for part in parts),
+        [fault for part in parts for fault in part.skipped],
+        [archive for part in parts for archive in part.archives],
+    )
+
+
+def _parts(target: Target, chunks: int) -> Iterator[tuple[Part, bytes]]:
+    for number in range(chunks):
+        path = f"{PARTS}/{_name(number)}"
+        if (content := target.read(path)) is None:
+            raise FileError(path, "is gone; expected it to stay until the export is complete")
+        head, _, entries = content.partition(b"\n")
+        yield _part(head), entries
+
+
+def _part(head: bytes) -> Part:
+    plain = orjson.loads(head)
+    skipped = [Fault(**fault) for fault in plain["skipped"]]
+    archives = [Written(**archive) for archive in plain["archives"]]
+    return Part(**{**plain, "skipped": skipped, "archives": archives})
+
+
+def _name(number: int) -> str:
+    return f"{number:06d}.jsonl"
+
+
+def _json(facts: dict[str, Any]) -> bytes:
+    return orjson.dumps(facts, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)

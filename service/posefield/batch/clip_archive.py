@@ -1,0 +1,85 @@
+"""Files of many clips in sequence, as an archive takes them, with the manifest last."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from posefield.batch import manifest
+from posefield.batch.rows.row_query import Query
+from posefield.common import cancellation
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import Encoder
+from posefield.question.results import ClipAnswer
+from posefield.synthesis import clips
+from posefield.synthesis.clips import Prospect
+from posefield.synthesis.synthesizer import Synthesizer
+
+MANIFEST = "manifest.jsonl"
+CLIPS, POSES = 16, 4096
+"""Largest number of clips and poses in memory, except for a single longer clip."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """Validated clips of one format.
+
+    queries: of the clips. prospects: frames and warnings of each, known before synthesis.
+    """
+
+    model: Synthesizer
+    encoder: Encoder
+    convention: Convention
+    queries: Sequence[Query]
+    prospects: Sequence[Prospect]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings with the number of clips that extrapolate and of clips that miss a target.
+
+        The manifest has the warnings of each clip.
+        """
+        counts = {
+            "lie outside what was sampled, or in a gap of it": sum(
+                bool(prospect.warnings) for prospect in self.prospects
+            ),
+            "miss some target": sum(prospect.missed for prospect in self.prospects),
+        }
+        every = len(self.prospects)
+        return [f"{count} of {every} clips {said}" for said, count in counts.items() if count]
+
+
+def members(order: Order) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each clip's file in the order of the queries, then the manifest.
+
+    A batch is made when its first file is requested; of earlier batches only manifest lines remain
+    in memory.
+    """
+    # Not a list: each bytes object of orjson occupies a page of memory, whatever its length.
+    lines = bytearray()
+    for batch in _batches([prospect.frames for prospect in order.prospects]):
+        yield from _files(order, order.queries[batch], lines)
+    yield MANIFEST, bytes(lines)
+
+
+def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator[tuple[str, bytes]]:
+    answers = [_clip(order.model, query) for query in queries]
+    contents = order.encoder.write(answers, order.convention)
+    for query, answer, content in zip(queries, answers, contents, strict=True):
+        file = f"{query.name}.{query.format}"
+        lines += manifest.line(manifest.entry(query.name, file, content, answer))
+        yield file, content
+
+
+def _clip(model: Synthesizer, query: Query) -> ClipAnswer:
+    cancellation.check()
+    return clips.clip(model, query.question)
+
+
+def _batches(frames: Sequence[int]) -> Iterator[slice]:
+    """Yield slices of clips that are made together."""
+    first, poses = 0, 0
+    for index, count in enumerate(frames):
+        if index > first and (index == first + CLIPS or poses + count > POSES):
+            yield slice(first, index)
+            first, poses = index, 0
+        poses += count
+    yield slice(first, len(frames))

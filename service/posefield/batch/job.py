@@ -1,0 +1,74 @@
+"""Job of an export: all parameters that determine its bytes, so that two runs of one job agree."""
+
+import hashlib
+from dataclasses import asdict, dataclass, field
+from functools import cached_property, lru_cache
+from importlib.metadata import version
+from typing import Any
+
+import orjson
+
+from posefield import __version__
+from posefield.common.errors import InvalidField
+from posefield.encode.files.file_convention import Unit, Up
+from posefield.inference import session
+from posefield.motion.joint_roles import Names
+from posefield.synthesis.synthesizer import Synthesizer
+
+MAKERS = ("numpy", "onnxruntime", "usd-core")
+"""Packages whose versions may affect the bytes."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One export, independent of the processes and runs that make it.
+
+    model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
+    layout: name of the layout. chunk: rows per chunk. unit, up: None for the convention of each
+    format. names: default naming convention of the joints.
+    """
+
+    model: str
+    content: str
+    queries: str
+    layout: str
+    chunk: int
+    unit: Unit | None = None
+    up: Up | None = None
+    names: Names = "own"
+
+    def __post_init__(self) -> None:
+        if self.chunk < 1:
+            raise InvalidField("chunk", f"{self.chunk}, expected 1 or more rows")
+
+    def facts(self) -> dict[str, Any]:
+        """Return the fields as plain values, with the versions of the packages used."""
+        versions = {"posefield": __version__, **{maker: version(maker) for maker in MAKERS}}
+        return {**asdict(self), "versions": versions}
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the facts, which identifies the job."""
+        plain = orjson.dumps(self.facts(), option=orjson.OPT_SORT_KEYS)
+        return hashlib.sha256(plain).hexdigest()
+
+
+@dataclass(frozen=True)
+class Work:
+    """Data that a worker needs besides the rows; it can be pickled.
+
+    model: content of the model file, read once; the job has its checksum. target: folder or URL.
+    skip: leave invalid rows out instead of ending the export.
+    """
+
+    job: Job
+    model: bytes = field(compare=False, repr=False)
+    target: str
+    skip: bool = False
+
+
+@lru_cache(maxsize=1)
+def opened(work: Work) -> Synthesizer:
+    """Return the model of a job, cached so that a process opens it once for many chunks."""
+    identity = work.job.model
+    return Synthesizer(identity.partition("@")[0], session.open_bytes(work.model, identity))

@@ -1,0 +1,160 @@
+"""Layouts of the files of an export: loose in folders, packed into archives, or a USD library.
+
+Archives contain the files under the paths that they have in folders, so unpacking all archives of
+an export gives the same folders. A library is a stage of one character, with layers that contain
+only motion.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from posefield.batch import manifest
+from posefield.batch.job import Job, Work, opened
+from posefield.batch.rows.row_query import Query
+from posefield.batch.target import Target, Written, put
+from posefield.common.errors import InvalidField
+from posefield.encode.archives import PACKS, Pack
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import ENCODERS
+from posefield.motion import joint_roles
+from posefield.question.results import ClipAnswer
+
+CROWDED = 1000
+"""Files per folder; many more make file systems and file browsers slow."""
+
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class File:
+    """A clip's file: its path, its content and its entry in the manifest."""
+
+    path: str
+    content: bytes
+    entry: Entry
+
+
+Put = Callable[[Target, int, Iterable[list[File]]], tuple[list[Entry], list[Written]]]
+"""Write the files of the chunk of a number, which come in batches; return their entries and the
+archives that contain them.
+"""
+
+
+Write = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Paths and contents of the files of an export.
+
+    chunk: default number of rows in a chunk. write: writes the files of a chunk. encode: returns
+    the encoder of a format. misfit: returns the reason for which a query does not fit this layout,
+    or None; the field is None if every query fits. describe: returns further values of a clip's
+    entry, from its name, path and answer. complete: returns files about the whole export, from all
+    entries.
+    """
+
+    chunk: int
+    write: Put
+    encode: Callable[[str], Write] = lambda extension: ENCODERS[extension].write
+    misfit: Callable[[Job, Query], str | None] | None = None
+    describe: Callable[[str, str, ClipAnswer], Entry] = lambda name, path, answer: {}
+    complete: Callable[[Work, Iterable[Entry]], Iterable[tuple[str, bytes]]] = (
+        lambda work, entries: ()
+    )
+
+
+def path(row: int, name: str, extension: str) -> str:
+    """Return the path of a row's file, in a folder or inside an archive."""
+    return f"clips/{row // CROWDED:03d}/{name}.{extension}"
+
+
+def loose(
+    target: Target, number: int, batches: Iterable[list[File]]
+) -> tuple[list[Entry], list[Written]]:
+    """Write each file separately."""
+    entries = []
+    for files in batches:
+        target.write([(file.path, file.content) for file in files])
+        entries += [file.entry for file in files]
+    return entries, []
+
+
+def packed(pack: Pack) -> Put:
+    """Return a function that writes one archive per chunk, with its part of the manifest last."""
+
+    def archived(
+        target: Target, number: int, batches: Iterable[list[File]]
+    ) -> tuple[list[Entry], list[Written]]:
+        entries: list[Entry] = []
+        path = f"clips-{number:06d}.{pack.extension}"
+        archive = put(target, path, pack.write(_members(number, batches, entries)))
+        return [{**entry, "archive": path} for entry in entries], [archive]
+
+    return archived
+
+
+def _members(
+    number: int, batches: Iterable[list[File]], entries: list[Entry]
+) -> Iterator[tuple[str, bytes]]:
+    """Yield the files by path, then the manifest of their entries, which are added to `entries`."""
+    for files in batches:
+        for file in files:
+            entries.append(file.entry)
+            yield file.path, file.content
+    yield f"manifest-{number:06d}.jsonl", b"".join(map(manifest.line, entries))
+
+
+STAGE, LIBRARY_FORMAT = "character.usd", "usdc"
+
+
+def _misfit(job: Job, query: Query) -> str | None:
+    """Return the reason for which a query does not fit a library of one character, or None."""
+    if query.format != LIBRARY_FORMAT:
+        return f"format: {query.format!r}, expected {LIBRARY_FORMAT!r} in a library"
+    if query.question.names != job.names:
+        found = query.question.names
+        return f"names: {found!r}, expected {job.names!r} as of the library's character"
+    return None
+
+
+def _animations(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return binary layers of the clips' animations, without a character."""
+    from posefield.encode.usd import usd_animation  # usd-core, which other layouts do not need.
+
+    return usd_animation.usdc(answers, convention)
+
+
+def _box(name: str, file: str, answer: ClipAnswer) -> Entry:
+    """Return the corners, m, of a box that contains the character throughout a clip."""
+    from posefield.encode.usd import usd_library
+
+    entry = usd_library.entry(name, file, answer)
+    return {"low": entry.low, "high": entry.high}
+
+
+def _stage(work: Work, entries: Iterable[Entry]) -> Iterator[tuple[str, bytes]]:
+    """Yield the stage of a library, at the rate of its first clip."""
+    from posefield.encode.usd import usd_library
+
+    job, card = work.job, opened(work).session.card
+    keys = ("name", "file", "frames", "fps", "low", "high")
+    clips = [usd_library.Entry(*(entry[key] for key in keys)) for entry in entries]
+    skeleton = joint_roles.renamed(card.skeleton, card.roles, job.names)
+    convention = ENCODERS[LIBRARY_FORMAT].convention(job.unit, job.up)
+    yield STAGE, usd_library.stage(skeleton, convention, clips[0].rate, clips)
+
+
+LAYOUTS = {
+    "folder": Layout(256, loose),
+    "library": Layout(256, loose, lambda extension: _animations, _misfit, _box, _stage),
+    **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
+}
+
+
+def find(name: str) -> Layout:
+    """Return the layout of a name; InvalidField if there is none."""
+    if name not in LAYOUTS:
+        raise InvalidField("layout", f"{name!r}, expected one of {', '.join(LAYOUTS)}")
+    return LAYOUTS[name]

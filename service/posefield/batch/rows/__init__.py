@@ -1,0 +1,1 @@
+"""Rows of an export: read from tables, grids or samplings, and validated."""

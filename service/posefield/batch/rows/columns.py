@@ -1,0 +1,174 @@
+"""Columns of query tables, and the parsing of their headings.
+
+There is one column for each control of the model, by its name, and those of `OPTIONS`. A heading
+may state the unit of a control, `speed [m/s]` or `speed (m/s)`, which must then be the model's.
+`controls/NAME` is accepted for any control, and required for one with the name of an option.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import partial
+from typing import Any, Literal, get_args, get_origin
+
+from posefield.batch.rows.cells import ExactCell, Flag, Kind, NameCell, Number, Targets, Whole, Word
+from posefield.encode.formats import ENCODERS
+from posefield.model_file.model_card import ModelCard
+from posefield.question import text_decoding
+from posefield.question.motion_question import Exact, Name, NamedClipQuestion, Target
+from posefield.question.text_decoding import Parameter
+
+CONTROL = "controls/"
+LONGEST = 200
+"""Longest value that a message repeats, characters."""
+WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))")
+
+NO_COLUMN = ("joint_sigma",)
+"""Fields of a question without a column."""
+
+
+def _kinds() -> dict[str, Callable[[ModelCard], Kind]]:
+    found: dict[str, Callable[[ModelCard], Kind]] = {"format": lambda _: Word(tuple(ENCODERS))}
+    for parameter in text_decoding.parameters(NamedClipQuestion).values():
+        if parameter.field not in NO_COLUMN:
+            found[parameter.field] = partial(_kind, parameter)
+    return found
+
+
+def _kind(parameter: Parameter, card: ModelCard) -> Kind:
+    """Return the kind of the cells of a field's column."""
+    if parameter.field == "performer":
+        return Word(card.performers)
+    if get_origin(parameter.kind) is Literal:
+        return Word(get_args(parameter.kind))
+    if parameter.kind is float:
+        return Number(parameter.unit)
+    return KINDS[parameter.kind]
+
+
+KINDS: Mapping[Any, Kind] = {
+    int: Whole(),
+    bool: Flag(),
+    Exact: ExactCell(),
+    Target: Targets(),
+    Name: NameCell(),
+}
+"""Kind of cells by the type of a field."""
+
+OPTIONS = _kinds()
+"""All columns except the controls: the format, and the fields of a NamedClipQuestion."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    field: field of the query; a control's begins with `controls/`. kind: kind of its cells. unit:
+    unit that its heading may state.
+    """
+
+    field: str
+    kind: Kind
+    unit: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Name in messages."""
+        return self.field.removeprefix(CONTROL)
+
+    @property
+    def control(self) -> bool:
+        """True for a control, which every row must have."""
+        return self.field.startswith(CONTROL)
+
+    def read(self, reader: Callable[[Sequence[Any]], list[Any]], cells: Sequence[Any]) -> list[Any]:
+        """Return the values of cells by one of the kind's parsers.
+
+        Raises ValueError for an invalid cell; the message describes the first cell, so it is exact
+        for one cell only.
+        """
+        try:
+            values = reader(cells)
+            if self.control and None in values:
+                raise ValueError
+        except ValueError as fault:
+            found = "empty" if cells[0] in ("", None) else shown(cells[0])
+            raise ValueError(f"{self.name}: {found}, expected {self.kind.expected}") from fault
+        return values
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of tables for one model.
+
+    controls: those of the controls, in the card's order. titles: every column by each of its names.
+    """
+
+    controls: tuple[Column, ...]
+    titles: Mapping[str, Column]
+
+    @property
+    def all(self) -> tuple[Column, ...]:
+        """All columns, each once."""
+        return tuple(dict.fromkeys(self.titles.values()))
+
+    def heading(self, titles: Sequence[str]) -> tuple[Column, ...]:
+        """Return the columns of a heading, in its order.
+
+        Raises ValueError for a column that is unknown, repeated, missing or in another unit.
+        """
+        found = tuple(self.find(title) for title in titles)
+        if len(set(found)) < len(found):
+            twin = next(column for i, column in enumerate(found) if column in found[:i])
+            raise ValueError(f"column {twin.name!r} twice, expected once")
+        for control in self.controls:
+            if control not in found:
+                given = shown(list(titles))
+                raise ValueError(
+                    f"no column {control.name!r}, expected one of numbers in {control.unit}; "
+                    f"found {given}"
+                )
+        return found
+
+    def find(self, title: str) -> Column:
+        """Return the column of a title; ValueError if it is unknown or its unit differs."""
+        exact = self.titles.get(title)
+        if exact:
+            return exact
+        stated = WITH_UNIT.fullmatch(title)
+        column = self.titles.get(stated["name"]) if stated else None
+        if not stated or not column:
+            raise ValueError(f"unknown column {shown(title)}, {self._instead(title)}")
+        unit = stated["square"] or stated["round"] or ""
+        if unit.strip() != column.unit:
+            expected = f"{column.unit}" if column.unit else "none"
+            raise ValueError(f"column {column.name!r} in the unit {unit!r}, expected {expected}")
+        return column
+
+    def _instead(self, title: str) -> str:
+        plain = {name.lower(): name for name in self.titles if not name.startswith(CONTROL)}
+        near = get_close_matches(title.lower(), plain, n=1)
+        if near:
+            return f"did you mean {plain[near[0]]!r}?"
+        return f"expected one of {', '.join(plain.values())}"
+
+
+def of(card: ModelCard) -> Columns:
+    """Return the columns of tables for a model."""
+    controls = tuple(Column(CONTROL + c.name, Number(c.unit), c.unit) for c in card.controls)
+    options = {name: _option(name, kind(card)) for name, kind in OPTIONS.items()}
+    return Columns(
+        controls,
+        {c.name: c for c in controls} | options | {c.field: c for c in controls},
+    )
+
+
+def shown(value: object) -> str:
+    """Return a value as text for messages, truncated to LONGEST characters."""
+    whole = repr(value)
+    return whole if len(whole) <= LONGEST else f"{whole[:LONGEST]}..."
+
+
+def _option(name: str, kind: Kind) -> Column:
+    return Column(name, kind, kind.unit if isinstance(kind, Number) else None)

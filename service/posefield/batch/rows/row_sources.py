@@ -1,0 +1,147 @@
+"""Sources of queries: a file, a grid or a sampling.
+
+A file is a table (CSV, Parquet) or objects (JSON Lines), by its ending. It has a column for each
+control of the model, and optionally those of `columns.OPTIONS`; the defaults of missing values come
+from the command line. `rows` yields a Query or a Fault for each row, in the source's order.
+
+    source = queries.source(Asked(path), Defaults("usdc"), model)
+    found = source.survey()
+    for row in source.rows(): ...
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import orjson
+from msgspec import structs, to_builtins
+
+from posefield.batch.rows import (
+    columns,
+    csv_rows,
+    grid_rows,
+    jsonl_rows,
+    parquet_rows,
+    sampled_rows,
+    source_files,
+)
+from posefield.batch.rows.columns import Columns
+from posefield.batch.rows.row_blocks import Block, Broken
+from posefield.batch.rows.row_query import Fault, Source
+from posefield.batch.rows.row_validation import Defaults, Reading
+from posefield.batch.rows.source_files import Original
+from posefield.common.errors import InvalidField, UnknownFormat
+from posefield.encode.formats import ENCODERS
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+
+METHOD, SEED = "latin", 0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Source options of the command line: exactly one of path, grid and sample.
+
+    path: of a file. grid: NAME=VALUES texts. sample: number of points. method, seed: of a sampling
+    only.
+    """
+
+    path: Path | None = None
+    grid: tuple[str, ...] = ()
+    sample: int | None = None
+    method: str | None = None
+    seed: int | None = None
+
+
+class _Blocks(Protocol):
+    """A source of rows that are not yet parsed."""
+
+    def place(self, number: int, /) -> str: ...
+    def blocks(self) -> Iterator[Block | Broken]: ...
+
+
+READERS: Mapping[str, Callable[[Original, Columns], _Blocks]] = {
+    ".csv": csv_rows.read,
+    ".jsonl": jsonl_rows.JsonLines,
+    ".ndjson": jsonl_rows.JsonLines,
+    ".parquet": parquet_rows.read,
+}
+
+
+def source(asked: Asked, usual: Defaults, model: Synthesizer) -> Source:
+    """Return the source of the queries, with defaults for missing values.
+
+    Raises InvalidField, UnknownFormat and OutsideSamples for invalid options, and FileError for a
+    file that cannot be read or has a heading that does not fit the model.
+    """
+    _check_one(asked)
+    _check_usual(usual, model)
+    found, spec = _blocks(asked, model)
+    digest = _digest({**spec, "format": usual.format, "usual": to_builtins(usual.question)})
+    return Reading(found.blocks, found.place, model, usual, digest)
+
+
+def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
+    """Return the controls of each row of a file.
+
+    Raises as `source` does, and InvalidField for an invalid row.
+    """
+    rows = source(Asked(path), Defaults("usdc"), model).rows()
+    found = []
+    for row in rows:
+        if isinstance(row, Fault):
+            raise InvalidField("candidates", f"{row.place}: {row.message}")
+        found.append(dict(row.question.controls))
+    return found
+
+
+def _check_one(asked: Asked) -> None:
+    given = {
+        "a file": asked.path is not None,
+        "--grid": bool(asked.grid),
+        "--sample": asked.sample is not None,
+    }
+    if sum(given.values()) != 1:
+        found = " and ".join(name for name, there in given.items() if there) or "none"
+        raise InvalidField("queries", f"{found}, expected one of {', '.join(given)}")
+    for option in ("method", "seed"):
+        if getattr(asked, option) is not None and asked.sample is None:
+            raise InvalidField(option, "without --sample, expected with it")
+
+
+def _check_usual(usual: Defaults, model: Synthesizer) -> None:
+    """Validate the defaults alone; rows are validated only in the values that they have."""
+    if usual.format not in ENCODERS:
+        raise UnknownFormat("format", f"{usual.format!r}, expected one of {', '.join(ENCODERS)}")
+    middle = {control.name: control.default for control in model.session.card.controls}
+    clips.check(model, structs.replace(usual.question, controls=middle))
+
+
+def _blocks(asked: Asked, model: Synthesizer) -> tuple[_Blocks, dict[str, Any]]:
+    """Return the unparsed rows of a source, and their parameters as plain values."""
+    card = model.session.card
+    known = columns.of(card)
+    if asked.path:
+        return _file(asked.path, known)
+    if asked.grid:
+        points = grid_rows.parse(asked.grid, known, card)
+        return points, points.spec()
+    method, seed = asked.method or METHOD, SEED if asked.seed is None else asked.seed
+    count = asked.sample or 0
+    sampled_rows.check(method, count, seed)
+    drawn = sampled_rows.Drawn(known.controls, card, method, count, seed)
+    return drawn, drawn.spec()
+
+
+def _file(path: Path, known: Columns) -> tuple[_Blocks, dict[str, Any]]:
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise UnknownFormat("queries", f"{path.name!r} ends in none of {', '.join(READERS)}")
+    original = source_files.meet(path)
+    return reader(original, known), {"file": path.suffix.lower(), "sha256": original.digest}
+
+
+def _digest(spec: Mapping[str, Any]) -> str:
+    return hashlib.sha256(orjson.dumps(spec, option=orjson.OPT_SORT_KEYS)).hexdigest()

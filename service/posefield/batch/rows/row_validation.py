@@ -1,0 +1,168 @@
+"""Parsing and validation of a source's rows to queries."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from msgspec import structs
+
+from posefield.batch.rows import row_bounds
+from posefield.batch.rows.clip_names import Seen, generated
+from posefield.batch.rows.columns import CONTROL
+from posefield.batch.rows.row_blocks import Block, Broken
+from posefield.batch.rows.row_query import KEPT, Fault, Query, Survey
+from posefield.common.errors import QueryError
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+
+OWN_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """Defaults of missing values; the question's controls are not used."""
+
+    format: str
+    question: ClipQuestion = field(default_factory=lambda: ClipQuestion(controls={}))
+
+
+@dataclass(frozen=True)
+class Table:
+    """Parsed rows of a block, valid so far: values by field."""
+
+    block: Block
+    values: dict[str, list[Any]]
+
+    def part(self, start: int, stop: int) -> "Table":
+        """Return the rows from `start` to before `stop`."""
+        values = {field: column[start:stop] for field, column in self.values.items()}
+        return Table(self.block.part(start, stop), values)
+
+    def names(self) -> list[str]:
+        """Return the name of each row, given or generated."""
+        first, size = self.block.first, len(self.block)
+        given = self.values.get("name", [None] * size)
+        return [name or generated(first + i) for i, name in enumerate(given)]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Queries of the rows of a source, for one model.
+
+    blocks: yields all blocks anew at each call. place: returns the name of a line or row for
+    messages. usual: defaults of missing values. digest: of the source.
+    """
+
+    blocks: Callable[[], Iterator[Block | Broken]]
+    place: Callable[[int], str]
+    model: Synthesizer
+    usual: Defaults
+    digest: str
+
+    def rows(self) -> Iterator[Query | Fault]:
+        """Yield a query or a fault for every row."""
+        for part in self._parts():
+            if isinstance(part, Fault):
+                yield part
+            else:
+                yield from self._queries(part)
+
+    def survey(self) -> Survey:
+        """Validate every row without keeping any."""
+        total, faulty, faults = 0, 0, []
+        for part in self._parts():
+            if isinstance(part, Fault):
+                faulty += 1
+                faults += [part] if faulty <= KEPT else []
+            total += 1 if isinstance(part, Fault) else len(part.block)
+        return Survey(total, faulty, tuple(faults))
+
+    def _parts(self) -> Iterator[Table | Fault]:
+        """Yield tables of valid rows, and faults in their place between them."""
+        seen = Seen()
+        for block in self.blocks():
+            if isinstance(block, Broken):
+                yield Fault(self.place(block.number), block.message)
+                continue
+            for part in self._sound(block):
+                if isinstance(part, Fault) or not _named(block):
+                    yield part
+                else:
+                    yield from self._apart(part, seen)
+
+    def _sound(self, block: Block) -> Iterator[Table | Fault]:
+        """Yield tables of rows with valid values, and faults.
+
+        A block with an invalid row is halved until that row is alone.
+        """
+        if len(block) == 1:
+            yield self._alone(block)
+            return
+        table = self._together(block)
+        if table:
+            yield table
+            return
+        for half in block.halves():
+            yield from self._sound(half)
+
+    def _together(self, block: Block) -> Table | None:
+        """Return the parsed rows of a block; None if one of them needs validation by itself."""
+        try:
+            table = Table(block, block.values())
+        except ValueError:
+            return None
+        card, support = self.model.session.card, self.model.door.support
+        sound = row_bounds.pass_all(card, support, table.values, self.usual.question)
+        return table if sound else None
+
+    def _alone(self, block: Block) -> Table | Fault:
+        try:
+            table = Table(block, block.values())
+            clips.check(self.model, next(self._queries(table)).question)
+        except (ValueError, QueryError) as fault:
+            return Fault(self.place(block.numbers[0]), str(fault))
+        return table
+
+    def _apart(self, table: Table, seen: Seen) -> Iterator[Table | Fault]:
+        """Yield the rows with new names, and faults for repeated names."""
+        names, start = table.names(), 0
+        for place in seen.repeated(names):
+            if start < place:
+                yield table.part(start, place)
+            number = table.block.numbers[place]
+            yield Fault(self.place(number), f"name: {names[place]!r}, {OWN_NAME}")
+            start = place + 1
+        if start < len(names):
+            yield table.part(start, len(names)) if start else table
+
+    def _queries(self, table: Table) -> Iterator[Query]:
+        for name, number, said in zip(
+            table.names(), table.block.numbers, _said(table), strict=True
+        ):
+            form = said.pop("format", self.usual.format)
+            said.pop("name", None)
+            controls = self._controls(said)
+            question = structs.replace(self.usual.question, controls=controls, **said)
+            yield Query(name, form, question, self.place(number))
+
+    def _controls(self, said: dict[str, Any]) -> dict[str, float]:
+        """Return the controls of a row in the card's order, removed from `said`."""
+        return {name: said.pop(CONTROL + name) for name in self._names}
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(control.name for control in self.model.session.card.controls)
+
+
+def _named(block: Block) -> bool:
+    """Return whether rows may give names; generated names are unique."""
+    return any(column.field == "name" for column in block.columns)
+
+
+def _said(table: Table) -> Iterator[dict[str, Any]]:
+    """Yield the given values of each row, by field."""
+    fields = list(table.values)
+    for row in zip(*table.values.values(), strict=True):
+        yield {field: value for field, value in zip(fields, row, strict=True) if value is not None}

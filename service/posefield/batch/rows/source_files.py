@@ -1,0 +1,71 @@
+"""Source files that are read more than once and must not change in between."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import AnyStr, TypeVar
+
+from posefield.common.errors import FileError
+
+Read = TypeVar("Read")
+
+LONGEST_LINE = 1 << 20
+"""Longest line, characters: a file without line ends is not a table and might not fit into
+memory.
+"""
+
+
+@dataclass(frozen=True)
+class Original:
+    """A file at its first reading.
+
+    path: its path. digest: SHA-256 of its bytes. stamp: size in bytes and modification time, ns.
+    """
+
+    path: Path
+    digest: str
+    stamp: tuple[int, int]
+
+    def unchanged(self, read: Iterable[Read]) -> Iterator[Read]:
+        """Yield the items read from the file; FileError before the first one after a change."""
+        self._compare()
+        for each in read:
+            self._compare()
+            yield each
+        self._compare()
+
+    def _compare(self) -> None:
+        if _stamp(self.path) != self.stamp:
+            raise FileError(self.path, "changed while it was used, expected what was first read")
+
+
+def meet(path: Path) -> Original:
+    """Return a file's path, digest and stamp; FileError if it cannot be read."""
+    if path.exists() and not path.is_file():
+        raise FileError(path, "not a file, expected one: it is read more than once")
+    stamp = _stamp(path)
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as fault:
+        raise FileError(path, f"cannot be read: {fault.strerror}") from fault
+    return Original(path, digest, stamp)
+
+
+def lines(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
+    """Yield the lines of an open file; FileError for a line that is too long."""
+    for number, line in enumerate(iter(partial(readline, LONGEST_LINE), readline(0)), start=1):
+        if len(line) == LONGEST_LINE:
+            found = f"a line of {LONGEST_LINE} characters or more"
+            raise FileError(path, f"{found}, expected one row a line", number)
+        yield line
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    try:
+        found = path.stat()
+    except OSError as fault:
+        raise FileError(path, f"cannot be read: {fault.strerror}") from fault
+    return found.st_size, found.st_mtime_ns

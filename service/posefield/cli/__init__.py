@@ -1,0 +1,88 @@
+"""The `posefield` command of the service; the training job adds its own commands.
+
+Exit codes: 0 success; 1 `check` found defects; 2 a question or an argument that cannot be answered;
+3 a file that cannot be used; 4 samples from which no model can be made; 5 a process of an export
+that died; 128 and a signal's number where that ended an export.
+"""
+
+import sys
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from typing import Annotated
+
+import typer
+
+from posefield import __version__
+from posefield.cli import (
+    command_check,
+    command_clip,
+    command_crowd,
+    command_export,
+    command_inspect,
+    command_page,
+    command_serve,
+    command_why,
+)
+from posefield.common.errors import FileError, MotionError, TrainingError, WorkerDied
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+INTERRUPTED = 130
+"""Exit code that shells expect after SIGINT."""
+
+# Extra that provides a missing module; the default is the training extra.
+EXTRAS = {
+    **dict.fromkeys(("joblib", "sklearn"), "evaluate"),
+    "distributed": "dask",
+    "obstore": "store",
+    **dict.fromkeys(("jwt", "cryptography"), "jwt"),
+}
+
+
+def main() -> None:
+    """Run the command line; MotionErrors and missing modules end as one line and an exit code."""
+    for plugin in entry_points(group="posefield.commands"):
+        # The container image contains only the service.
+        if find_spec(plugin.module.partition(".")[0]):
+            plugin.load()(app)
+    try:
+        app()
+    except ModuleNotFoundError as fault:
+        extra = EXTRAS.get(fault.name or "", "train")
+        typer.echo(f"posefield: needs {fault.name}: install posefield[{extra}]", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    except MotionError as fault:
+        typer.echo(f"posefield: {fault}", err=True)
+        sys.exit(_code(fault))
+
+
+def _code(fault: MotionError) -> int:
+    if isinstance(fault, FileError):
+        return 3
+    if isinstance(fault, TrainingError):
+        return 4
+    return 5 if isinstance(fault, WorkerDied) else 2
+
+
+@app.callback(invoke_without_command=True)
+def _version(
+    version: Annotated[bool, typer.Option("--version", help="say the version")] = False,
+) -> None:
+    if version:
+        typer.echo(f"posefield {__version__}")
+        raise typer.Exit
+
+
+app.command()(command_inspect.inspect)
+app.command()(command_clip.pose)
+app.command()(command_clip.clip)
+app.command()(command_crowd.crowd)
+app.command()(command_why.why)
+app.command()(command_why.suggest)
+app.command()(command_export.export)
+app.command()(command_page.page)
+app.command()(command_serve.serve)
+app.command()(command_serve.key)
+app.command()(command_check.check)

@@ -1,0 +1,38 @@
+"""The `posefield pose` and `posefield clip` commands: one motion of a model."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.console.arguments import Json, ModelPath, encoder, open_model
+from posefield.console.output import tell, wrote
+from posefield.console.question_options import asks
+from posefield.encode.formats import POSE_ENCODERS
+from posefield.question.motion_question import FileQuestion, PoseQuestion
+from posefield.synthesis import clips, poses
+
+
+@asks(PoseQuestion, usual={"times": [0.0]})
+def pose(model: ModelPath, question: PoseQuestion) -> None:
+    """Print the pose at one or more times, as JSON."""
+    answer = poses.pose(open_model(model), question)
+    tell(answer.trust)
+    typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
+
+
+@asks(FileQuestion)
+def clip(
+    model: ModelPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="file; its ending is the format")],
+    question: FileQuestion,
+    json: Json = False,
+) -> None:
+    """Write a clip as usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack."""
+    found = encoder(output)
+    convention = found.convention(question.unit, question.up)
+    answer = clips.clip(open_model(model), question)
+    atomic_files.write(found.encode(answer, convention), output)
+    tell(answer.trust)
+    typer.echo(wrote(output, answer, json))

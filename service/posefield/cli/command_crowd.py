@@ -1,0 +1,46 @@
+"""The `posefield crowd` command: crowds of walking characters."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from msgspec import structs
+
+from posefield.common.errors import InvalidField
+from posefield.console.arguments import Json, ModelPath, open_model
+from posefield.console.output import as_json
+from posefield.console.question_options import asks
+from posefield.question.walk_question import WalkQuestion
+
+COUNT = 500
+
+
+@asks(WalkQuestion, usual={"seconds": 10.0}, without={"count"})
+def crowd(
+    model: ModelPath,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="usd, usda, usdc, usdz or npz, by its ending")
+    ],
+    question: WalkQuestion,
+    count: Annotated[
+        int | None,
+        typer.Option(help=f"characters, each on a way of its own; {COUNT} if not said"),
+    ] = None,
+    paths: Annotated[
+        Path | None,
+        typer.Option(
+            help="JSON list of routes instead: waypoints (pairs of x and z, m) and speed (m/s)"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a crowd that walks, each character on its own path at its own changing speed."""
+    from posefield.cli import crowd_files
+    from posefield.locomotion import crowd_order
+
+    if paths and count is not None:
+        raise InvalidField("count", f"{count}, expected none: every path has one character")
+    question = structs.replace(question, count=COUNT if count is None else count)
+    asked = crowd_order.of(question, crowd_files.routes(paths) if paths else ())
+    facts = crowd_files.write(open_model(model), asked, question.instancing, output)
+    typer.echo(as_json(facts) if json else crowd_files.said(facts))

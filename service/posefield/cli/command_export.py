@@ -1,0 +1,223 @@
+"""The `posefield export` command: many clips at once, to a folder or an object store."""
+
+import hashlib
+import signal
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Self
+
+import typer
+
+from posefield.batch import layouts, process_pool, run, target
+from posefield.batch.checkpoint import Part
+from posefield.batch.job import Job, Work
+from posefield.batch.layouts import LAYOUTS
+from posefield.batch.process_pool import Runner
+from posefield.batch.rows import row_sources
+from posefield.batch.rows.row_query import KEPT
+from posefield.batch.rows.row_sources import Asked
+from posefield.batch.rows.row_validation import Defaults
+from posefield.batch.run import Outcome, Shard
+from posefield.common.errors import InvalidField
+from posefield.console.arguments import Json, ModelPath
+from posefield.console.output import as_json
+from posefield.console.question_options import asks
+from posefield.model_file import checked_file
+from posefield.question.motion_question import FileQuestion
+from posefield.registry import model_loading
+
+
+@asks(FileQuestion, without={"controls", "targets", "joint_sigma"})
+def export(
+    model: ModelPath,
+    output: Annotated[str, typer.Option("--output", "-o", help="folder, or an object store's URL")],
+    question: FileQuestion,
+    table: Annotated[
+        Path | None,
+        typer.Argument(help="CSV, Parquet or JSON Lines, a row a clip", metavar="[QUERIES]"),
+    ] = None,
+    grid: Annotated[
+        list[str] | None,
+        typer.Option(help="instead: values of a control; every combination", metavar="NAME=VALUES"),
+    ] = None,
+    sample: Annotated[int | None, typer.Option(help="instead: number of random points")] = None,
+    method: Annotated[str | None, typer.Option(help="of sampling, latin or hull")] = None,
+    seed: Annotated[int | None, typer.Option(help="of sampling")] = None,
+    form: Annotated[str, typer.Option("--format", help="file format")] = "usdc",
+    layout: Annotated[str, typer.Option(help=f"one of {', '.join(LAYOUTS)}")] = "folder",
+    chunk: Annotated[
+        int | None, typer.Option(help="rows done together, and clips of an archive")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="processes; default: one for each core")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="instead of processes here: workers of a Dask scheduler, posefield on each",
+            metavar="tcp://HOST:PORT",
+        ),
+    ] = None,
+    shard: Annotated[
+        str, typer.Option(help="part I of N alone, from 0/N to N-1/N", metavar="I/N")
+    ] = "0/1",
+    skip_errors: Annotated[
+        bool, typer.Option("--skip-errors", help="leave rows at fault out, and list them")
+    ] = False,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="compare the SHA-256 of files that earlier runs wrote; default: their sizes",
+        ),
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Write a clip for each row of a table, or for each point of a grid or a sampling.
+
+    A column of the table takes precedence over the option of the same name. The same command
+    resumes an interrupted export and gives the same files; missing or damaged files are made again.
+    """
+    content = checked_file.read(model)
+    opened = model_loading.opened(model.stem, model, content)
+    asked = Asked(table, tuple(grid or ()), sample, method, seed)
+    source = row_sources.source(asked, Defaults(form, question), opened)
+    rows = layouts.find(layout).chunk if chunk is None else chunk
+    digest = hashlib.sha256(content).hexdigest()
+    job = Job(
+        opened.identity,
+        digest,
+        source.digest,
+        layout,
+        rows,
+        question.unit,
+        question.up,
+        question.names,
+    )
+    part = Shard.of(shard)
+    with _runner(workers, scheduler) as runner, Monitor() as monitor:
+        work = Work(job, content, _absolute(output) if scheduler else output, skip_errors)
+        outcome = run.run(work, source, monitor, runner, part, verify)
+    _end(output, outcome, monitor, verify, json)
+
+
+def _runner(workers: int | None, scheduler: str | None) -> AbstractContextManager[Runner]:
+    if workers is not None and scheduler is not None:
+        raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
+    if workers is not None and workers < 1:
+        raise InvalidField("workers", f"{workers}, expected 1 or more")
+    if scheduler is None:
+        return nullcontext(process_pool.runner(workers or process_pool.usable_cores()))
+    # Imported here because distributed is an optional extra.
+    from posefield.batch import dask_export
+
+    return dask_export.runner(scheduler)
+
+
+def _absolute(output: str) -> str:
+    """Return the target with an absolute path, valid in any folder; URLs unchanged."""
+    return output if target.URL.match(output) else str(Path(output).absolute())
+
+
+class Monitor:
+    """Progress display of a run, which also records SIGINT or SIGTERM after the run has begun.
+
+    signal: the number of the first such signal, else None. A second signal raises KeyboardInterrupt
+    at once.
+    """
+
+    def __init__(self) -> None:
+        self.signal: int | None = None
+        self._done = self._skipped = 0
+        self._began = time.monotonic()
+        self._print: Callable[[str], None] = lambda line: typer.echo(line, err=True)
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def begin(self, total: int, done: int) -> None:
+        """Start the progress display and the signal handlers."""
+        # Importing rich takes 0.1 s, which other commands must not spend.
+        from posefield.console.progress import Bar
+
+        self._began = time.monotonic()
+        self._bar = self._stack.enter_context(Bar("clips", total, done))
+        self._print = self._bar.print
+        if done:
+            self.note(f"resumed: {done} of {total} clips were finished")
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._stack.callback(signal.signal, number, signal.signal(number, self._receive))
+
+    def advance(self, part: Part) -> None:
+        """Show that a chunk is finished, and the first of the rows that were skipped."""
+        for fault in part.skipped[: max(KEPT - self._skipped, 0)]:
+            self.note(f"skipped: {fault.place}: {fault.message}")
+        self._skipped += len(part.skipped)
+        self._done += part.clips + len(part.skipped)
+        self._bar.advance(part.clips + len(part.skipped))
+
+    def note(self, message: str) -> None:
+        """Print a line on standard error."""
+        self._print(message)
+
+    def stopped(self) -> bool:
+        """Return whether a signal was received."""
+        return self.signal is not None
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the run began."""
+        return time.monotonic() - self._began
+
+    @property
+    def rate(self) -> float:
+        """Rows a second in this run."""
+        return self._done / max(self.seconds, 1e-9)
+
+    def _receive(self, number: int, frame: FrameType | None) -> None:
+        if self.stopped():
+            raise KeyboardInterrupt
+        self.signal = number
+
+
+def _end(place: str, outcome: Outcome, monitor: Monitor, verify: bool, json: bool) -> None:
+    """Print the outcome; exit with the code that shells expect after a signal."""
+    if json:
+        facts = {
+            "target": place,
+            "rows": outcome.rows,
+            "done": outcome.done,
+            "seconds": monitor.seconds,
+            "export": outcome.facts,
+        }
+        typer.echo(as_json(facts))
+    typer.echo(_summary(place, outcome, monitor, verify), err=json)
+    if monitor.signal and outcome.done < outcome.rows:
+        raise typer.Exit(128 + monitor.signal)
+
+
+def _summary(place: str, outcome: Outcome, monitor: Monitor, verify: bool) -> str:
+    if outcome.done < outcome.rows:
+        return (
+            f"{place}: stopped when {outcome.done} of {outcome.rows} clips were finished; the same "
+            "command resumes the export"
+        )
+    if outcome.facts is None:
+        return f"{place}: clips of this part: {outcome.rows}, all finished; other parts are not"
+    facts = outcome.facts
+    text = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
+    if facts["warned"]:
+        text += f", with a warning in the manifest: {facts['warned']}"
+    if facts["skipped"]:
+        text += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
+    if outcome.before:
+        checked = ", and all checksums agree" if verify else ""
+        return f"{text}; it was complete before{checked}"
+    return f"{text}, in {monitor.seconds:.1f} s, {monitor.rate:,.0f} a second"

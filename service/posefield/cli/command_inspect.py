@@ -1,0 +1,61 @@
+"""The `posefield inspect` command: summary of a model file."""
+
+from typing import Any
+
+import typer
+
+from posefield.console.arguments import Json, ModelPath
+from posefield.console.output import as_json
+from posefield.inference import cost_model, session
+from posefield.model_file import model_card as cards
+from posefield.motion import measures
+
+
+def inspect(model: ModelPath, json: Json = False) -> None:
+    """Print a model file's controls, skeleton, errors, provenance and cost of a pose here."""
+    opened = session.load(model)
+    plain = {
+        "identity": f"{model.stem}@{opened.digest}",
+        **cards.plain_values(opened.card),
+        "seconds_per_pose": cost_model.seconds_per_pose(opened),
+    }
+    typer.echo(as_json(plain) if json else _summary(plain))
+
+
+def _summary(plain: dict[str, Any]) -> str:
+    """Return a summary of a model card, within one screen."""
+    diagnostics = plain["diagnostics"]
+    levels = zip(plain["levels"], plain["seconds_per_pose"], strict=True)
+    lines = [
+        f"{plain['identity']}: {plain['description']}",
+        f"{plain['samples']} clips of {len(plain['skeleton']['names'])} joints, "
+        f"{plain['durations'][0]:.2f} to {plain['durations'][1]:.2f} s, {plain['root']}"
+        f"{', cyclic' if plain['cyclic'] else ''}",
+        f"ranks {plain['levels'][0]['ranks']} of {diagnostics['tensor']}: truncation costs "
+        f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
+        f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+        f"levels of detail, times in batches of {cost_model.BATCH}:",
+        *(_level(number, *level) for number, level in enumerate(levels)),
+        "controls:",
+        *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
+        *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
+        f"licence: {plain['provenance']['licence']}",
+        *(f"note: {note}" for note in diagnostics["notes"]),
+    ]
+    return "\n".join(lines)
+
+
+def _level(number: int, level: dict[str, Any], seconds: float) -> str:
+    return (
+        f"  {number}: ranks {level['ranks']} of {level['samples']} clips, {level['numbers']} "
+        f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
+        f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
+    )
+
+
+def _control(plain: dict[str, Any], joints: list[str]) -> str:
+    """Return one line on a control: its sampled range, its description and its measure."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
+    own = plain.get("measure")
+    how = f" (measured: {measures.words(measures.parse(own), joints)})" if own else ""
+    return f"  {plain['name']}: {span}, {plain['description']}{how}"

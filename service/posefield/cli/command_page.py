@@ -1,0 +1,91 @@
+"""The `page` command: the web page and a model as a folder for static hosting.
+
+Poses are then computed in the browser, by onnxruntime-web, which the container image leaves out.
+"""
+
+import gzip
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import quote
+
+import orjson
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import FileError
+from posefield.inference import session
+from posefield.model_file import checked_file
+
+PAGES = Path(__file__).parents[1] / "http/pages"
+PARTS = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
+_HEAD, _PRESSED = b"<head>", ".gz"
+
+
+def page(
+    model: Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder")],
+    json: Annotated[bool, typer.Option("--json", help="answer as JSON")] = False,
+) -> None:
+    """Write the page with a model in it, for any host of static files."""
+    content = checked_file.read(model)
+    opened = session.load_bytes(content, str(model))
+    identity = f"{model.stem}@{opened.digest}"
+    written = write(files_of(model.name, content, identity), output)
+    if json:
+        plain = {"folder": str(output), "model": identity, "files": written}
+        typer.echo(orjson.dumps(plain, option=orjson.OPT_INDENT_2).decode())
+        return
+    size = sum(written.values()) / 1e6
+    typer.echo(
+        f"{output}: {identity}, {len(written)} files, {size:.1f} MB; any web server shows it:"
+    )
+    typer.echo(f"  python3 -m http.server --directory {output}")
+
+
+def write(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]:
+    """Write files by name, each atomically, and return their sizes in bytes.
+
+    Raises FileError if a file cannot be written.
+    """
+    sizes = {}
+    for name, content in contents:
+        atomic_files.write(content, folder / name)
+        sizes[name] = len(content)
+    return sizes
+
+
+def files_of(
+    name: str, model: bytes, identity: str, web: Path = PAGES
+) -> Iterator[tuple[str, bytes]]:
+    """Yield names and contents of the folder's files; the page itself is last.
+
+    The page refers to the other files. web: folder of the built page and its parts. Raises
+    FileError if one of them is missing.
+    """
+    page = web / "viewer/index.html"
+    shown = _marked(_read(page), name, identity)
+    for part in PARTS:
+        content = _read(web / "offline" / part)
+        plain = gzip.decompress(content) if part.endswith(_PRESSED) else content
+        yield part.removesuffix(_PRESSED), plain
+    yield name, model
+    yield page.name, shown
+
+
+def _marked(content: bytes, model: str, identity: str) -> bytes:
+    """Return the page with the mark that makes it use the model instead of a service."""
+    # Imported here, since other commands need no Jinja.
+    from posefield.http.pages import templates
+
+    mark = templates.render("model.html", model=quote(model), identity=identity)
+    before, head, after = content.partition(_HEAD)
+    return before + head + mark.encode() + after
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as fault:
+        said = f"cannot be read: {fault.strerror}; in a copy of the sources `make page` builds it"
+        raise FileError(path, said) from fault

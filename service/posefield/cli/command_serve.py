@@ -1,0 +1,48 @@
+"""The `posefield serve` and `posefield key` commands: the service, and keys to it."""
+
+from typing import Annotated
+
+import typer
+
+from posefield.console.arguments import Json
+from posefield.console.output import as_json
+
+
+def serve(
+    places: Annotated[
+        list[str],
+        typer.Argument(help="model files, folders of them, or URLs of object stores"),
+    ],
+    host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
+    port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
+) -> None:
+    """Serve the given models over HTTP until interrupted."""
+    from posefield.http import server
+    from posefield.http.api import settings
+
+    server.serve(places, settings.read(host=host, port=port))
+
+
+def key(
+    name: Annotated[str, typer.Argument(help="whose key it is, as the log will name it")],
+    model: Annotated[
+        list[str] | None, typer.Option(help="a model that it may read; all if none is named")
+    ] = None,
+    metrics: Annotated[bool, typer.Option("--metrics", help="let it read /metrics too")] = False,
+    json: Json = False,
+) -> None:
+    """Create an API key.
+
+    Prints the line for POSEFIELD_KEYS_FILE on standard output, and the key itself, once, on
+    standard error.
+    """
+    from posefield.http.access import api_keys
+
+    scopes = [f"read:{one}" for one in model or ["*"]] + ["metrics"] * metrics
+    secret = api_keys.make()
+    line = api_keys.line(name, scopes, secret)
+    if json:
+        typer.echo(as_json({"key": secret, "line": line}))
+        return
+    typer.echo(line)
+    typer.echo(f"the key of {name}, which is kept nowhere: {secret}", err=True)

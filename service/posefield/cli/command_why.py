@@ -1,0 +1,44 @@
+"""The `posefield why` and `posefield suggest` commands: captured clips, and those to add."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posefield.batch.rows import row_sources
+from posefield.console.arguments import Json, ModelPath, open_model
+from posefield.console.output import as_json, tell
+from posefield.console.question_options import asks
+from posefield.encode.tables import model_tables
+from posefield.question.model_question import SuggestQuestion, WhyQuestion
+from posefield.synthesis.capture_suggestions import suggest as find_suggestions
+from posefield.synthesis.explanation import why as find_reasons
+
+
+@asks(WhyQuestion)
+def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
+    """Explain an answer: the captured clips near it, and the weight of each."""
+    found = find_reasons(open_model(model), question)
+    tell(found)
+    as_text = model_tables.explanation_text
+    typer.echo(as_json(model_tables.explanation(found)) if json else as_text(found))
+
+
+@asks(SuggestQuestion)
+def suggest(
+    model: ModelPath,
+    question: SuggestQuestion,
+    candidates: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV, Parquet or JSON Lines of points that can be captured", metavar="FILE"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the clips to capture next, the most useful first."""
+    synthesizer = open_model(model)
+    given = row_sources.points(candidates, synthesizer) if candidates else None
+    found = find_suggestions(synthesizer, question, given)
+    as_text = model_tables.suggestions_text
+    typer.echo(as_json(model_tables.suggestions(found)) if json else as_text(found))

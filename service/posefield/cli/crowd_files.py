@@ -1,0 +1,135 @@
+"""The `crowd` command: writes a walking crowd of a model to a file and reports on it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from posefield.common.errors import FileError, InvalidField
+from posefield.common.units import Floats
+from posefield.console.progress import Bar
+from posefield.encode import usd_crowd
+from posefield.encode.tables import crowd_tables
+from posefield.encode.usd_crowd import crowd_writer
+from posefield.locomotion import (
+    crowd_order,
+    gait,
+    walking_crowd,
+)
+from posefield.locomotion import routes as given
+from posefield.locomotion.crowd_order import Order
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.routes import Route
+from posefield.motion.crowd_clip import CrowdClip, Motions
+from posefield.synthesis.synthesizer import Synthesizer
+
+ENDINGS = (*usd_crowd.FILES, "npz")
+
+
+def write(model: Synthesizer, asked: Order, instancing: str, output: Path) -> dict[str, Any]:
+    """Write a crowd to a file, and return its report as plain values.
+
+    Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
+    written.
+    """
+    ending = output.suffix.removeprefix(".")
+    if ending not in ENDINGS:
+        raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(ENDINGS)}")
+    opened = gait.of(model.session)
+    made = crowd_order.crowd(model, opened, asked)
+    feet = _Feet(opened, asked.fps)
+    watched = _watched(made, asked.motions or len(made.motion), feet)
+    if ending == "npz":
+        crowd_tables.write(watched, output)
+    else:
+        crowd_writer.write(watched, output, instancing)
+    return {
+        "file": str(output),
+        "model": made.facts["model"],
+        "characters": len(made.motion),
+        "motions": asked.motions or len(made.motion),
+        "frames": made.frames,
+        "rate": made.rate,
+        "seed": asked.seed,
+        "level_shares": made.facts["level_shares"],
+        "outside_share": made.facts["outside_share"],
+        **feet.facts(),
+    }
+
+
+def routes(path: Path) -> Sequence[Route]:
+    """Return the routes of a JSON file.
+
+    Raises FileError for a file that is not JSON, and InvalidField for invalid routes.
+    """
+    return given.parse(_json(path))
+
+
+def _json(path: Path) -> Any:
+    try:
+        return orjson.loads(path.read_bytes())
+    except OSError as fault:
+        raise FileError(path, f"cannot be read: {fault.strerror}") from fault
+    except orjson.JSONDecodeError as fault:
+        raise FileError(path, f"not JSON: {fault}") from fault
+
+
+@dataclass(frozen=True)
+class _Feet:
+    """Foot skate of motions as they are written; empty if the model's card names no feet."""
+
+    gait: Gait
+    rate: float
+    seen: list[Floats] = field(default_factory=list)
+
+    def look(self, motions: Motions) -> None:
+        card = self.gait.session.card
+        if card.feet:
+            self.seen.append(walking_crowd.foot_skate_of(card, motions, self.rate).ravel())
+
+    def facts(self) -> dict[str, float]:
+        if not self.seen:
+            return {}
+        return {
+            "skate_cm_per_s": round(100.0 * float(np.concatenate(self.seen).mean()), 2),
+            "skate_strides_cm_per_s": round(
+                100.0 * walking_crowd.usual_skate(self.gait, self.rate), 2
+            ),
+        }
+
+
+def _watched(made: CrowdClip, motions: int, feet: _Feet) -> CrowdClip:
+    """Return the crowd with a progress bar on standard error while its motions are computed."""
+
+    def batches() -> Iterator[Motions]:
+        with Bar("motions", motions) as bar:
+            for batch in made.batches:
+                feet.look(batch)
+                yield batch
+                bar.advance(len(batch))
+
+    return replace(made, batches=batches())
+
+
+def said(facts: dict[str, Any]) -> str:
+    """Return the report of a crowd as text."""
+    shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
+    lines = [
+        f"{facts['file']}: {facts['characters']} characters, {facts['frames']} frames at "
+        f"{facts['rate']:g} a second, seed {facts['seed']}",
+        f"poses at each level of detail, the finest first: {', '.join(shares)}",
+    ]
+    if "skate_cm_per_s" in facts:
+        lines.append(
+            f"feet on the ground slide at {facts['skate_cm_per_s']:.1f} cm/s, those of the model's "
+            f"own strides at the captured controls at {facts['skate_strides_cm_per_s']:.1f} cm/s"
+        )
+    if facts["outside_share"]:
+        lines.append(
+            f"{100 * facts['outside_share']:.1f} % of the poses have some control outside what was "
+            "sampled"
+        )
+    return "\n".join(lines)

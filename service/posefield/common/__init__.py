@@ -1,0 +1,1 @@
+"""Errors, units, files, cancellation: used by every other package."""

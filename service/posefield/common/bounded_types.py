@@ -1,0 +1,34 @@
+"""Types of numbers and texts with bounds.
+
+Python ignores the bounds; msgspec checks them where a field is decoded. The card of a model is
+decoded by service/posefield/model_file/card_reader.py.
+"""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+# Larger numbers would overflow when they are squared in float32.
+_LARGEST = 1e15
+_MOST = 2**53
+
+Text = Annotated[str, Meta(max_length=100_000)]
+Name = Annotated[str, Meta(min_length=1, max_length=1_000)]
+Slug = Annotated[str, Meta(pattern="^[a-z0-9][a-z0-9_-]{0,63}$")]
+"""Name of a model, as written in recipes."""
+Key = Annotated[str, Meta(pattern="^[a-z][a-z0-9_]{0,39}$")]
+"""Name of a control, as written in recipes."""
+
+Number = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
+Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST)]
+NonNegative = Annotated[float, Meta(ge=0.0, le=_LARGEST)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Rate = Annotated[float, Meta(ge=1.0, le=10_000.0)]
+"""Frames a second."""
+
+Count = Annotated[int, Meta(ge=1, le=_MOST)]
+Index = Annotated[int, Meta(ge=0, le=_MOST)]
+Parent = Annotated[int, Meta(ge=-1, le=_MOST)]
+"""Index of a parent, -1 for none."""
+Degree = Annotated[int, Meta(ge=0, le=1)]
+"""Degree of a polynomial drift."""

@@ -1,0 +1,107 @@
+"""Command-line options generated from the fields of a command's question."""
+
+import functools
+import inspect
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Annotated, Any, Literal, get_origin
+
+import typer
+from msgspec import Struct
+
+from posefield.common.errors import InvalidField
+from posefield.question import text_decoding
+from posefield.question.text_decoding import CONTROLS, Parameter
+
+Command = Callable[..., None]
+Controls = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--control",
+        "-c",
+        help="value of a control, once for each; a model chooses those left out",
+        metavar="NAME=VALUE",
+    ),
+]
+CONTROL = inspect.Parameter(
+    "control", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Controls
+)
+TYPED = (float, int, bool)
+"""Types that typer parses itself, in addition to literals."""
+
+
+def asks(
+    form: type[Struct], usual: Mapping[str, Any] | None = None, without: Collection[str] = ()
+) -> Callable[[Command], Command]:
+    """Return a decorator that builds the parameter `question` of a command from its options.
+
+    usual: defaults of fields that differ from the form's. without: fields without an option.
+    """
+    known = [p for p in text_decoding.parameters(form).values() if p.field not in without]
+    defaults = {p.field: p.default for p in known} | dict(usual or {})
+
+    def decorate(command: Command) -> Command:
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        first = [p for p in own if p.name != "question" and p.default is p.empty]
+        last = [p for p in own if p.default is not p.empty]
+        options = [_option(p, defaults[p.field]) for p in known]
+        if CONTROLS in form.__struct_fields__ and CONTROLS not in without:
+            options.insert(0, CONTROL)
+
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            said = {p.field: _value(p, given.pop(p.field), defaults[p.field]) for p in known}
+            if CONTROLS in form.__struct_fields__:
+                said[CONTROLS] = numbers(given.pop("control", None) or [])
+            command(question=form(**said), **given)
+
+        every = [p.replace(kind=p.KEYWORD_ONLY) for p in (*first, *options, *last)]
+        run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in every}
+        return run
+
+    return decorate
+
+
+def _option(parameter: Parameter, default: Any) -> inspect.Parameter:
+    kind = parameter.kind
+    typed = kind in TYPED or get_origin(kind) is Literal
+    shown = kind if typed else str
+    if parameter.repeated:
+        shown = list[shown]  # type: ignore[valid-type]
+    if default is None or parameter.repeated or not typed:
+        shown = shown | None
+    unit = f", {parameter.unit}" if parameter.unit and parameter.unit not in parameter.help else ""
+    flag = "--" + parameter.word.replace("_", "-")
+    info = typer.Option(flag, help=parameter.help + unit, metavar=parameter.metavar)
+    plain = default if typed and not parameter.repeated else None
+    return inspect.Parameter(
+        parameter.field,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=plain,
+        annotation=Annotated[shown, info],
+    )
+
+
+def _value(parameter: Parameter, given: Any, default: Any) -> Any:
+    """Return the value of a field; `given` is text where typer does not parse the field's type."""
+    if given is None or given == []:
+        return default
+    if parameter.repeated and parameter.kind not in TYPED:
+        return tuple(text_decoding.value(parameter, word) for word in given)
+    if isinstance(given, str) and get_origin(parameter.kind) is not Literal:
+        return text_decoding.value(parameter, given)
+    return given
+
+
+def numbers(pairs: Sequence[str]) -> dict[str, float]:
+    """Return the controls of NAME=VALUE words; InvalidField for a malformed or repeated one."""
+    controls: dict[str, float] = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or name in controls:
+            raise InvalidField("control", f"{pair!r}, expected NAME=VALUE, each name once")
+        try:
+            controls[name] = float(value)
+        except ValueError as fault:
+            raise InvalidField(f"controls/{name}", f"{value!r}, expected a number") from fault
+    return controls

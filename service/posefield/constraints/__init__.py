@@ -1,0 +1,1 @@
+"""Constraints: the smallest correction of a predicted motion that meets its targets."""

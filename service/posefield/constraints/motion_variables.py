@@ -1,0 +1,90 @@
+"""A motion as a vector of variables for the correction, and its forward kinematics."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.constraints import limb_kinematics
+from posefield.constraints.limb_kinematics import Limb
+from posefield.inference.reduced_motion import Reduced
+
+BESIDE = 4
+"""Variables of a cycle in addition to the reduced motion: logarithm of the duration; travel to the
+left and ahead, m; change of heading, rad.
+"""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Skeleton and model level of a motion.
+
+    reduced: reduced tensor. parents: of the joints. bones: (J, 3), m. cyclic: true for cycles,
+    which have a travel.
+    """
+
+    reduced: Reduced
+    parents: tuple[int, ...]
+    bones: Floats
+    cyclic: bool
+
+    @cached_property
+    def _limbs(self) -> dict[int, Limb]:
+        return {}
+
+    def limb(self, joint: int) -> Limb:
+        """Return the chain from the root to a joint, cached."""
+        if joint not in self._limbs:
+            self._limbs[joint] = limb_kinematics.to(joint, self.parents, self.bones, self.reduced)
+        return self._limbs[joint]
+
+    @property
+    def numbers(self) -> int:
+        """Number of variables of a motion."""
+        r2, r1, _ = self.reduced.core.shape
+        return r2 * r1 + BESIDE * self.cyclic
+
+    def motion(self, numbers: Floats) -> Floats:
+        """Return the reduced motion (r2, r1) among the variables."""
+        r2, r1, _ = self.reduced.core.shape
+        return numbers[: r2 * r1].reshape(r2, r1)
+
+    def beside(self, numbers: Floats) -> tuple[float, Floats]:
+        """Return the logarithm of the duration and the travel (3,); zeros without a cycle."""
+        if not self.cyclic:
+            return 0.0, np.zeros(3)
+        return float(numbers[-BESIDE]), numbers[-BESIDE + 1 :]
+
+    def positions(self, numbers: Floats, joint: int, places: Floats) -> Floats:
+        """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
+        moves = self.reduced.rows(places) @ self.motion(numbers)
+        return self.limb(joint).posed(moves, self._gone(numbers, places)).positions[:, -1]
+
+    def among(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
+        """Return a joint's positions (n, 3), m, at a canonical frame of motions (n, r2 r1).
+
+        All other variables, such as the travel, are those of this motion.
+        """
+        row, gone = self.reduced.row(at), self._gone(numbers, np.full(len(motions), at))
+        moves = row @ motions.reshape(len(motions), len(row), -1)
+        return self.limb(joint).posed(moves, gone).positions[:, -1]
+
+    def place(self, numbers: Floats, joint: int, at: float) -> tuple[Floats, Floats]:
+        """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
+        places = np.array([at])
+        row, own = self.reduced.row(at), self.limb(joint)
+        pose = own.posed(row[None] @ self.motion(numbers), self._gone(numbers, places))
+        by_freedoms, by_turn = own.gradient(pose, 0)
+        inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
+        if self.cyclic:
+            share = at / (self.reduced.frames - 1)
+            way = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+            outer = share * np.column_stack([np.zeros(3), way[:, 0], way[:, 1], by_turn])
+            inner = np.hstack([inner, outer])
+        return pose.positions[0, -1], inner
+
+    def _gone(self, numbers: Floats, places: Floats) -> Floats:
+        """Return the travel so far (S, 3) at canonical frames (S,)."""
+        share = places / (self.reduced.frames - 1)
+        return share[:, None] * self.beside(numbers)[1]

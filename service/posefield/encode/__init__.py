@@ -1,0 +1,1 @@
+"""Encoders of results: USD, glTF, BVH and tables."""

@@ -1,0 +1,114 @@
+"""Motions in USD's form: float32, real part last, neighbouring quaternions of one sign."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices, Singles
+from posefield.motion.clip import Clip
+from posefield.motion.crowd_clip import Motions
+
+
+@dataclass(frozen=True)
+class Moves:
+    """M motions of one skeleton, concatenated: motion m has the frames starts[m] to starts[m + 1].
+
+    rotations (N, J, 4): of all frames, real part last. path (N, 3): root positions, m. offsets (M,
+    J, 3): of the bones, m; the root's is not used. starts: (M + 1,). No number is -0.
+    """
+
+    rotations: Singles
+    path: Singles
+    offsets: Singles
+    starts: Indices
+
+    def __len__(self) -> int:
+        return len(self.offsets)
+
+    @cached_property
+    def translations(self) -> Singles:
+        """Return the local translations (N, J, 3), m."""
+        local = np.repeat(self.offsets, np.diff(self.starts), axis=0)
+        local[:, 0] = self.path
+        return local
+
+    def parts(self, frames: int) -> Iterator["Moves"]:
+        """Yield the motions in parts of at most `frames` frames, longer motions one by one."""
+        first = 0
+        while first < len(self):
+            last = int(np.searchsorted(self.starts, self.starts[first] + frames, "right")) - 1
+            last = max(last, first + 1)
+            yield self._between(first, last)
+            first = last
+
+    def _between(self, first: int, last: int) -> "Moves":
+        frames = slice(self.starts[first], self.starts[last])
+        starts = self.starts[first : last + 1] - self.starts[first]
+        offsets = self.offsets[first:last]
+        return Moves(self.rotations[frames], self.path[frames], offsets, starts)
+
+
+def of_clips(clips: Sequence[Clip]) -> Moves:
+    """Return the moves of clips of one skeleton, with the bone offsets of their first frames."""
+    starts = _starts([len(clip) for clip in clips])
+    made = _empty(starts, len(clips[0].skeleton))
+    for index, clip in enumerate(clips):
+        frames = slice(starts[index], starts[index + 1])
+        _last(clip.rotations, made.rotations[frames])
+        made.path[frames] = clip.translations[:, 0]
+        made.offsets[index] = clip.translations[0]
+    return _tidy(made)
+
+
+def of_motions(batch: Motions) -> Moves:
+    """Return the moves of a crowd's motions."""
+    count, frames, joints = batch.rotations.shape[:3]
+    made = _empty(_starts([frames] * count), joints)
+    _last(batch.rotations.reshape(-1, joints, 4), made.rotations)
+    made.path[:] = batch.root_position.reshape(-1, 3)
+    made.offsets[:] = batch.bone_offsets
+    return _tidy(made)
+
+
+def _starts(frames: Sequence[int]) -> Indices:
+    return np.concatenate([[0], np.cumsum(frames)])
+
+
+def _empty(starts: Indices, joints: int) -> Moves:
+    motions, frames = len(starts) - 1, int(starts[-1])
+    rotations = np.empty((frames, joints, 4), np.float32)
+    path, offsets = np.empty((frames, 3), np.float32), np.empty((motions, joints, 3), np.float32)
+    return Moves(rotations, path, offsets, starts)
+
+
+def _last(wxyz: Floats | Singles, xyzw: Singles) -> None:
+    """Write quaternions with the real part last.
+
+    All numbers move by one in a single copy, then the real parts are set.
+    """
+    given, made = np.ascontiguousarray(wxyz).reshape(-1), xyzw.reshape(-1)
+    made[:-1] = given[1:]
+    made[3::4] = given[::4]
+
+
+def _tidy(made: Moves) -> Moves:
+    _unroll(made)
+    for values in (made.rotations, made.path, made.offsets):
+        # USD's deduplication does not distinguish -0 from 0.
+        values += np.float32(0.0)
+    return made
+
+
+def _unroll(made: Moves) -> None:
+    """Choose signs so that neighbours lie close: some readers interpolate by component."""
+    products = made.rotations[1:] * made.rotations[:-1]
+    dots = products[..., 0] + products[..., 1] + products[..., 2] + products[..., 3]
+    dots[made.starts[1:-1] - 1] = 1.0
+    if not len(dots) or dots.min() >= 0:
+        return
+    signs = np.where(dots < 0, np.float32(-1.0), np.float32(1.0))
+    for first, last in zip(made.starts, made.starts[1:], strict=False):
+        turned = np.cumprod(signs[first : last - 1], axis=0, dtype=np.float32)
+        made.rotations[first + 1 : last] *= turned[..., None]

@@ -1,0 +1,1 @@
+"""Properties of files: media types, unit and axes, archives."""

@@ -1,0 +1,81 @@
+"""Conversion of positions, lengths and rotations to the unit and axes of a file.
+
+For Z up the whole character is rotated with the axes, including the joints' own axes, so that the
+rotations of the rest pose remain the identity: (x, y, z) becomes (x, -z, y), which is exact.
+Numbers other than -0 never become -0.
+"""
+
+import math
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from posefield.common.units import Floats, Singles
+from posefield.encode.files.file_convention import METRES, Convention
+from posefield.motion.clip import Clip
+
+Either = TypeVar("Either", Floats, Singles)
+
+TURNED = [0, 2, 1]
+
+
+def places(convention: Convention, metres: Either) -> Either:
+    """Return positions or displacements (..., 3) in the unit and axes of a file.
+
+    metres: with Y up.
+    """
+    unit = convention.metres_per_unit
+    return directions(convention, metres if unit == 1.0 else metres / unit)
+
+
+def directions(convention: Convention, along: Either) -> Either:
+    """Return directions (..., 3) in the axes of a file.
+
+    along: with Y up.
+    """
+    if convention.up == "y":
+        return along
+    return along[..., TURNED] * np.array([1, -1, 1], along.dtype) + along.dtype.type(0.0)
+
+
+def rotations(convention: Convention, turns: Singles) -> Singles:
+    """Return quaternions (..., 4), real part last, in the axes of a file.
+
+    turns: with Y up.
+    """
+    if convention.up == "y":
+        return turns
+    return turns[..., [*TURNED, 3]] * np.array([1, -1, 1, 1], turns.dtype) + turns.dtype.type(0.0)
+
+
+def moved(convention: Convention, clip: Clip) -> Clip:
+    """Return the clip, with its skeleton, in the unit and axes of a file."""
+    if convention == METRES:
+        return clip
+    joints, turns = clip.skeleton, clip.rotations
+    offsets, tips = (places(convention, o) for o in (joints.offsets, joints.tip_offsets))
+    turned = np.concatenate([turns[..., :1], directions(convention, turns[..., 1:])], axis=-1)
+    return Clip(
+        replace(joints, offsets=offsets, tip_offsets=tips),
+        turned,
+        places(convention, clip.translations),
+        clip.rate,
+    )
+
+
+def box(convention: Convention, corners: Floats) -> Floats:
+    """Return the lowest and highest corner (..., 2, 3) of boxes in the unit and axes of a file.
+
+    corners: m, with Y up.
+    """
+    return np.sort(places(convention, corners), axis=-2)
+
+
+def rounded(convention: Convention, lengths: Floats) -> Floats:
+    """Return lengths in the unit of a file, rounded to a tenth of a micrometre.
+
+    As decimals they are then short, and still near their float32 values.
+    """
+    decimals = 7 + math.floor(math.log10(convention.metres_per_unit))
+    return np.round(lengths, decimals) + 0.0

@@ -1,0 +1,43 @@
+"""Conventions of files: unit of length and up axis."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from posefield.common.errors import InvalidField
+
+Up = Literal["y", "z"]
+Unit = Literal["m", "cm"]
+
+METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01}
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Unit of length, as metres per unit, and up axis of a file.
+
+    A character whose up axis is Z still faces its front: Y up, +Z ahead becomes Z up, -Y ahead.
+    """
+
+    metres_per_unit: float
+    up: Up
+
+
+METRES = Convention(1.0, "y")
+CENTIMETRES = Convention(0.01, "y")
+
+
+def of(unit: Unit | None, up: Up | None, usual: Convention) -> Convention:
+    """Return the requested convention; None is the default of the format."""
+    length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
+    return Convention(length, usual.up if up is None else up)
+
+
+def refuse_other(found: Convention, law: Convention, name: str) -> None:
+    """Raise InvalidField for a convention that a format does not allow."""
+    if found.metres_per_unit != law.metres_per_unit:
+        raise InvalidField(
+            "unit",
+            f"{found.metres_per_unit:g} m, expected {law.metres_per_unit:g} m: the law of {name}",
+        )
+    if found.up != law.up:
+        raise InvalidField("up", f"{found.up!r}, expected {law.up!r}: the law of {name}")

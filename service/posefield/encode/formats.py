@@ -1,0 +1,187 @@
+"""Tables of formats: encoders of clips, poses, crowds and grids by extension.
+
+The table of archives is `packs.PACKS`.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from posefield.common import cancellation
+from posefield.encode import glb
+from posefield.encode.files import axis_conversion
+from posefield.encode.files import file_convention as conventions
+from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention, Unit, Up
+from posefield.encode.files.media_types import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
+from posefield.encode.tables import clip_tables, crowd_tables, model_tables
+from posefield.encode.tables import table as tables
+from posefield.encode.tables.arrow import arrow
+from posefield.encode.tables.table import Table
+from posefield.encode.usd_crowd import STREAMS
+from posefield.motion import bvh_writer
+from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
+from posefield.question.results import ClipAnswer, PoseAnswer, SigmaGrid
+
+
+def bvh(answer: ClipAnswer, convention: Convention) -> bytes:
+    """Return a BVH file; the format cannot store provenance, unit or up axis."""
+    clip = axis_conversion.moved(Convention(1.0, convention.up), answer.clip)
+    return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
+
+
+A = TypeVar("A", contravariant=True)
+
+
+@dataclass(frozen=True)
+class Encoder(Format):
+    """Encoder of clips in one format; equal results give equal bytes.
+
+    write: returns the files of several results, in their order; those of one model and length are
+    computed together. usual: the format's default convention, which its readers expect. law:
+    whether the format allows no other convention. at_once: number of frames up to which a file is
+    written in a millisecond or two, so that other requests may wait for it. per_joint: largest
+    number of bytes of a joint in a frame, without the parts that all frames share.
+    """
+
+    write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+    per_joint: int
+    usual: Convention = METRES
+    law: bool = False
+    at_once: int = 200
+
+    def convention(self, unit: Unit | None, up: Up | None) -> Convention:
+        """Return the requested convention; None is the format's default.
+
+        Raises InvalidField for a convention that the format does not allow.
+        """
+        found = conventions.of(unit, up, self.usual)
+        if self.law:
+            conventions.refuse_other(found, self.usual, self.extension)
+        return found
+
+    def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
+        """Return the file of one result, in the format's default convention unless one is given."""
+        return self.write([answer], convention or self.usual)[0]
+
+
+def poses_within(size: int, joints: int, per_joint: int) -> int:
+    """Return how many poses fit in `size` bytes; the root position counts as a joint."""
+    return size // ((joints + 1) * per_joint)
+
+
+def one_by_one(
+    encode: Callable[[ClipAnswer, Convention], bytes],
+) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+    """Return a function that encodes several results one after the other."""
+
+    def write(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+        files = []
+        for answer in answers:
+            cancellation.check()
+            files.append(encode(answer, convention))
+        return files
+
+    return write
+
+
+def numbers(
+    write: Callable[[Table], bytes],
+) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+    """Return a function that encodes several results as tables."""
+    return one_by_one(lambda answer, convention: write(clip_tables.table(answer, convention)))
+
+
+def _usd(name: str) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+    """Return the USD writer of that name, which imports usd-core when it is first called.
+
+    The import takes 0.12 CPU seconds, a seventh of the service's start.
+    """
+
+    def write(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+        from posefield.encode.usd import usd_clip
+
+        writers = {"usda": usd_clip.usda, "usdc": usd_clip.usdc, "usdz": usd_clip.usdz}
+        return writers[name](answers, convention)
+
+    return write
+
+
+ENCODERS = by_extension(
+    # A template takes 30 ms to make, and each number of frames needs another one.
+    Encoder("usda", "model/vnd.usda", _usd("usda"), 120, at_once=0),
+    # Unlike those of usda and usdz, not registered with IANA, but in common use.
+    Encoder("usdc", "model/vnd.usdc", _usd("usdc"), 48, at_once=0),
+    Encoder("usdz", "model/vnd.usdz+zip", _usd("usdz"), 48, at_once=0),
+    Encoder("json", JSON, one_by_one(clip_tables.json), 96),
+    Encoder("bvh", "application/x-bvh", one_by_one(bvh), 72, CENTIMETRES),
+    Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), 24, law=True),
+    Encoder("npz", NPZ, numbers(tables.npz), 24),
+    Encoder("arrow", ARROW, numbers(arrow), 24),
+    Encoder("msgpack", MSGPACK, numbers(tables.msgpack), 24),
+)
+
+
+@dataclass(frozen=True)
+class TableEncoder(Format, Generic[A]):
+    """Encoder of poses, crowd poses or grids as tables in one format.
+
+    table: returns the table of a result. write: returns its bytes. at_once: number of poses or grid
+    points up to which a result is computed and written in about a millisecond, so that other
+    requests may wait for it. per_joint: largest number of bytes of a joint of a character. most:
+    largest number of characters.
+    """
+
+    table: Callable[[A], Table]
+    write: Callable[[Table], bytes]
+    at_once: int = 0
+    per_joint: int = 40
+    most: float = math.inf
+
+    def encode(self, answer: A) -> bytes:
+        """Return the bytes of a result."""
+        return self.write(self.table(answer))
+
+
+POSE_ENCODERS: dict[str, TableEncoder[PoseAnswer[Any]]] = by_extension(
+    TableEncoder("json", JSON, clip_tables.pose_table, tables.json, at_once=200),
+    TableEncoder("msgpack", MSGPACK, clip_tables.pose_table, tables.msgpack, at_once=2000),
+    TableEncoder("npz", NPZ, clip_tables.pose_table, tables.npz, at_once=2000),
+    TableEncoder("arrow", ARROW, clip_tables.pose_table, arrow, at_once=2000),
+)
+
+CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
+    TableEncoder("arrow", ARROW, crowd_tables.table, arrow),
+    TableEncoder("npz", NPZ, crowd_tables.table, tables.npz),
+    TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack),
+    TableEncoder(
+        "json", JSON, crowd_tables.table, tables.json, per_joint=150, most=crowd_tables.JSON_LIMIT
+    ),
+)
+
+GRID_ENCODERS: dict[str, TableEncoder[SigmaGrid]] = by_extension(
+    TableEncoder("json", JSON, model_tables.table, tables.json, at_once=1024),
+    TableEncoder("msgpack", MSGPACK, model_tables.table, tables.msgpack, at_once=1024),
+    TableEncoder("npz", NPZ, model_tables.table, tables.npz, at_once=1024),
+    # A stream of rows, one for each point of the grid.
+    TableEncoder("arrow", ARROW, model_tables.points, arrow, at_once=1024),
+)
+
+
+@dataclass(frozen=True)
+class CrowdWriter(Format):
+    """Writer of walking crowds as streams of USD in one format."""
+
+    def stream(self, crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
+        """Return an iterator over the bytes of a crowd.
+
+        Raises InvalidField as `crowd.writer.stream` does.
+        """
+        from posefield.encode.usd_crowd import (
+            crowd_writer,  # usd-core: 0.12 CPU seconds of the start
+        )
+
+        return crowd_writer.stream(crowd, self.extension, instancing)
+
+
+CROWD_WRITERS = by_extension(*(CrowdWriter(name, ENCODERS[name].media_type) for name in STREAMS))

@@ -1,0 +1,250 @@
+"""Clips as binary glTF 2.0: joint nodes, a body mesh skinned to them, and an animation.
+
+glTF is always in metres, seconds and quaternions x y z w, with Y up. Joints keep their names, which
+may be any text in glTF.
+"""
+
+import struct
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import orjson
+
+from posefield.common.units import Floats, Singles
+from posefield.encode.character import body_mesh, character
+from posefield.encode.character.body_mesh import Integers
+from posefield.encode.character.character import Rest, Rig
+from posefield.encode.files import file_convention
+from posefield.encode.files.file_convention import METRES, Convention
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.question.results import ClipAnswer
+
+Bytes = npt.NDArray[np.uint8]
+
+MAGIC, VERSION, TEXT, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
+VERTICES, CORNERS = 34962, 34963
+"""Targets of buffer views, by their OpenGL constants."""
+COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}
+# The byte 255 stands for a weight of one.
+WHOLE = np.array([255, 0, 0, 0], np.uint8)
+COLORS = np.round(255 * np.pad(body_mesh.TINTS, ((0, 0), (0, 1)), constant_values=1.0)).astype(
+    np.uint8
+)
+STILL = 1e-9
+"""Largest variation, m, of a joint's translation that is taken as constant."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """Binary buffer under construction, with its views and accessors."""
+
+    views: list[dict[str, Any]] = field(default_factory=list)
+    accessors: list[dict[str, Any]] = field(default_factory=list)
+    parts: list[bytes] = field(default_factory=list)
+
+    def view(self, content: bytes, **said: Any) -> int:
+        """Return the index of a new view of bytes, padded to a multiple of four.
+
+        said: further properties of the view.
+        """
+        last = self.views[-1] if self.views else {"byteOffset": 0, "byteLength": 0}
+        start = last["byteOffset"] + _filled(last["byteLength"])
+        length = len(content)
+        self.views.append({"buffer": 0, "byteOffset": start, "byteLength": length, **said})
+        self.parts.append(content.ljust(_filled(length), b"\0"))
+        return len(self.views) - 1
+
+    def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **said: Any) -> int:
+        """Return the index of a new accessor with one element per row of the array.
+
+        kind: glTF type such as "VEC3". said: further properties of the accessor.
+        """
+        component = COMPONENTS[array.dtype.str[1:]]
+        found = {"bufferView": view, "componentType": component, "count": len(array), "type": kind}
+        self.accessors.append(found | said)
+        return len(self.accessors) - 1
+
+    def add(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
+        """Return the index of an accessor of a whole array; said: properties of its view."""
+        return self.accessor(array, kind, self.view(array.tobytes(), **said))
+
+    def bounded(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
+        """Return the index of an accessor of a whole array, with minimum and maximum.
+
+        glTF requires them for positions and times. said: properties of its view.
+        """
+        flat = array.reshape(len(array), -1)
+        ends = {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}
+        return self.accessor(array, kind, self.view(array.tobytes(), **said), **ends)
+
+
+def glb(answer: ClipAnswer, said: Convention) -> bytes:
+    """Return the glTF file of one clip, with the provenance in `asset.extras.posefield`.
+
+    Raises InvalidField for a convention other than metres with Y up.
+    """
+    file_convention.refuse_other(said, METRES, "glb")
+    clip, store = answer.clip, Store()
+    rig = character.rig(clip.skeleton)
+    resting = character.resting(rig, clip.translations[:1])
+    offsets = resting.offsets[0]
+    joints = len(offsets)
+    document = {
+        "asset": _asset(answer),
+        "scene": 0,
+        "scenes": [{"nodes": [0, joints]}],
+        "nodes": [*_joints(clip, offsets), {"name": "Body", "mesh": 0, "skin": 0}],
+        "meshes": [{"name": "Body", "primitives": [_primitive(store, resting)]}],
+        "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.8}}],
+        "skins": [_skin(store, clip.skeleton.at_rest(offsets))],
+        "animations": [_animation(store, clip)],
+        "bufferViews": store.views,
+        "accessors": store.accessors,
+    }
+    binary = b"".join(store.parts)
+    return _container(document | {"buffers": [{"byteLength": len(binary)}]}, binary)
+
+
+def _asset(answer: ClipAnswer) -> dict[str, Any]:
+    return {
+        "version": "2.0",
+        "generator": "posefield",
+        "extras": {"posefield": answer.trust.facts()},
+    }
+
+
+def _joints(clip: Clip, offsets: Floats) -> list[dict[str, Any]]:
+    """Return the nodes of the joints in the rest pose."""
+    nodes: list[dict[str, Any]] = [
+        {"name": name, "translation": offset}
+        for name, offset in zip(clip.skeleton.names, offsets.tolist(), strict=True)
+    ]
+    for joint, parent in enumerate(clip.skeleton.parents[1:], start=1):
+        nodes[parent].setdefault("children", []).append(joint)
+    return nodes
+
+
+def _primitive(store: Store, resting: Rest) -> dict[str, Any]:
+    points, normals = (_single(values[0]) for values in body_mesh.mesh(resting.boxes))
+    fixed = _fixed(resting.rig)
+    return {
+        "attributes": {
+            "POSITION": store.bounded(points, "VEC3", target=VERTICES),
+            "NORMAL": store.add(normals, "VEC3", target=VERTICES),
+            "COLOR_0": _shares(store, fixed.colors),
+            "JOINTS_0": store.add(fixed.joints, "VEC4", target=VERTICES),
+            "WEIGHTS_0": _shares(store, fixed.weights),
+        },
+        "indices": store.add(fixed.corners, "SCALAR", target=CORNERS),
+        "material": 0,
+    }
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Arrays of a body mesh that are equal for all bone offsets of a rig.
+
+    colors, joints, weights: of the points (P, 4). corners: of the triangles (3 T,).
+    """
+
+    colors: Bytes
+    joints: npt.NDArray[Any]
+    weights: Bytes
+    corners: npt.NDArray[Any]
+
+
+@lru_cache(maxsize=64)
+def _fixed(rig: Rig) -> Fixed:
+    owners = np.repeat(rig.bones.joints, body_mesh.POINTS)
+    joints = np.zeros((len(owners), 4), _smallest(len(rig.skeleton)))
+    joints[:, 0] = owners
+    weights = np.tile(WHOLE, (len(owners), 1))
+    corners = _triangles(*body_mesh.faces(rig.bones)).astype(_smallest(len(owners)))
+    return Fixed(
+        np.repeat(COLORS[rig.bones.tints], body_mesh.POINTS, axis=0), joints, weights, corners
+    )
+
+
+def _shares(store: Store, values: Bytes) -> int:
+    view = store.view(values.tobytes(), target=VERTICES)
+    return store.accessor(values, "VEC4", view, normalized=True)
+
+
+def _skin(store: Store, rest: Floats) -> dict[str, Any]:
+    # Column-major matrices: the last column translates.
+    inverse = np.tile(np.eye(4, dtype=np.float32), (len(rest), 1, 1))
+    inverse[:, 3, :3] = -rest
+    bound = store.add(inverse, "MAT4")
+    return {"inverseBindMatrices": bound, "joints": list(range(len(rest))), "skeleton": 0}
+
+
+def _animation(store: Store, clip: Clip) -> dict[str, Any]:
+    """Return channels of all rotations, and of the translations that are not constant."""
+    when = store.bounded(_single(np.arange(len(clip)) / clip.rate), "SCALAR")
+    # Readers interpolate between neighbours, which must lie in one hemisphere.
+    turns = _single(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
+    spread = np.ptp(clip.translations[:, 1:], axis=0).max(axis=-1, initial=0.0)
+    moved = [0, *(np.flatnonzero(spread > STILL) + 1).tolist()]
+    paths = _single(np.moveaxis(clip.translations[:, moved], 1, 0))
+    outputs = [
+        *((joint, "rotation", o) for joint, o in enumerate(_tracks(store, turns, "VEC4"))),
+        *zip(moved, ["translation"] * len(moved), _tracks(store, paths, "VEC3"), strict=True),
+    ]
+    return {
+        "name": "clip",
+        "samplers": [{"input": when, "output": output} for _, _, output in outputs],
+        "channels": [
+            {"sampler": index, "target": {"node": joint, "path": path}}
+            for index, (joint, path, _) in enumerate(outputs)
+        ],
+    }
+
+
+def _tracks(store: Store, tracks: Singles, kind: str) -> list[int]:
+    """Return one accessor for the frames of each joint, (J, F, ...), all in one view."""
+    view, size = store.view(tracks.tobytes()), tracks[0].nbytes
+    return [
+        store.accessor(own, kind, view, byteOffset=joint * size) for joint, own in enumerate(tracks)
+    ]
+
+
+def _single(values: Floats | Singles) -> Singles:
+    return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def _triangles(counts: Integers, points: Integers) -> Integers:
+    """Return the corners (3 T,) of faces cut into triangle fans."""
+    cut = counts - 2
+    owner = np.repeat(np.arange(len(cut)), cut)
+    first = (np.cumsum(counts) - counts)[owner]
+    turn = np.arange(len(owner)) - (np.cumsum(cut) - cut)[owner]
+    return points[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)].reshape(-1)
+
+
+def _smallest(count: int) -> type[np.unsignedinteger[Any]]:
+    """Return the smallest unsigned type for `count` values; glTF reserves the largest one."""
+    kinds = (np.uint8, np.uint16, np.uint32)
+    return next(kind for kind in kinds if count <= np.iinfo(kind).max)
+
+
+def _container(document: dict[str, Any], binary: bytes) -> bytes:
+    text = orjson.dumps(document)
+    text = text.ljust(_filled(len(text)))
+    total = 12 + 8 + len(text) + 8 + len(binary)
+    return b"".join(
+        (
+            struct.pack("<3L", MAGIC, VERSION, total),
+            struct.pack("<2L", len(text), TEXT),
+            text,
+            struct.pack("<2L", len(binary), BINARY),
+            binary,
+        )
+    )
+
+
+def _filled(length: int) -> int:
+    return length + -length % 4

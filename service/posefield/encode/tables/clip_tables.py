@@ -1,0 +1,100 @@
+"""Clips and poses as plain arrays: JSON and tables."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from posefield.common.units import Floats
+from posefield.encode.files import axis_conversion
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.tables import table as tables
+from posefield.encode.tables.table import Table
+from posefield.motion.clip import Clip
+from posefield.question.results import ClipAnswer, PoseAnswer
+
+UNITS = {
+    "length": "metre",
+    "time": "second",
+    "rate": "frames a second",
+    "rotation": "unit quaternion w x y z, local to the parent",
+    "up": "Y",
+    "handedness": "right",
+}
+LENGTHS = {1.0: "metre", 0.01: "centimetre"}
+DECIMALS = 6
+"""Decimals of lengths in JSON: a micrometre, near float32's precision a few metres away."""
+
+
+def json(answer: ClipAnswer, convention: Convention) -> bytes:
+    """Return one JSON object: the skeleton, all rotations and root positions, and provenance.
+
+    Numbers are rounded, unlike those of `table`, since the time to write JSON grows with its
+    digits.
+    """
+    clip = axis_conversion.moved(convention, answer.clip)
+    content = {
+        "units": units(convention),
+        "names": clip.skeleton.names,
+        "parents": clip.skeleton.parents,
+        "rate": clip.rate,
+        "frames": len(clip),
+        "times": np.round(times(clip), DECIMALS),
+        **{name: _short(values) for name, values in tracks(clip).items()},
+        "trust": answer.trust.facts(),
+    }
+    return tables.document(content)
+
+
+def table(answer: ClipAnswer, convention: Convention) -> Table:
+    """Return the clip as a table of one row per frame; bone offsets are one array for all."""
+    clip = axis_conversion.moved(convention, answer.clip)
+    numbers = {name: tables.single(values) for name, values in tracks(clip).items()}
+    fixed = {"bone_offsets": numbers.pop("bone_offsets")}
+    facts = {
+        "names": list(clip.skeleton.names),
+        "parents": list(clip.skeleton.parents),
+        "rate": clip.rate,
+        "units": units(convention),
+        "trust": answer.trust.facts(),
+    }
+    return Table({"times": times(clip), **numbers}, facts, fixed)
+
+
+def units(convention: Convention) -> dict[str, str]:
+    """Return the units of a file in a convention."""
+    metres = convention.metres_per_unit
+    length = LENGTHS.get(metres, f"{metres:g} metres")
+    return UNITS | {"length": length, "up": convention.up.upper()}
+
+
+def times(clip: Clip) -> Floats:
+    """Return the time of each frame (F,), s."""
+    return np.arange(len(clip)) / clip.rate
+
+
+def tracks(clip: Clip) -> dict[str, Floats]:
+    """Return rotations (F, J, 4), root positions (F, 3) and bone offsets (J, 3).
+
+    In the unit of the clip; the root's offset is zero.
+    """
+    # The root has a path and no bone.
+    offsets = np.concatenate([np.zeros((1, 3)), clip.translations[0, 1:]])
+    return {"rotations": clip.rotations, "root_position": clip.root_path, "bone_offsets": offsets}
+
+
+def _short(values: Floats) -> npt.NDArray[np.float32]:
+    return np.ascontiguousarray(np.round(values, DECIMALS), dtype=np.float32)
+
+
+def pose_table(answer: PoseAnswer[Any]) -> Table:
+    """Return a table of S rows; bone offsets are one array for all times."""
+    return Table(
+        {
+            "times": answer.times,
+            "rotations": tables.single(answer.rotations),
+            "root_position": tables.single(answer.root_position),
+        },
+        {"trust": answer.trust.facts()},
+        {"bone_offsets": tables.single(answer.bone_offsets)},
+    )

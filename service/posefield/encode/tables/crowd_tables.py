@@ -1,0 +1,83 @@
+"""Crowd poses as tables of one row per character."""
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefield.common import atomic_files
+from posefield.common.units import Singles
+from posefield.encode.tables.clip_tables import UNITS
+from posefield.encode.tables.table import Column, Table, single
+from posefield.motion import quat
+from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
+
+JSON_LIMIT = 1000
+"""Largest number of characters in JSON, 2.6 MB at 31 joints; larger crowds need a binary format."""
+
+
+def table(poses: CrowdPoses) -> Table:
+    """Return a table of N rows, with the facts of the whole block."""
+    return Table(_columns(poses), _facts(poses))
+
+
+def _columns(poses: CrowdPoses) -> dict[str, Column]:
+    found = {name: single(getattr(poses, name)) for name in _SINGLES}
+    found["supported"] = poses.supported
+    # A question names levels up to 127.
+    found["levels"] = poses.levels.astype(np.int8)
+    if poses.error_px is not None:
+        found["error_px"] = single(poses.error_px)
+    return found
+
+
+_UNITS = ("length", "time", "rotation", "up", "handedness")
+_SINGLES = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
+
+
+def _facts(poses: CrowdPoses) -> dict[str, Any]:
+    return {
+        "model": poses.model,
+        "names": list(poses.skeleton.names),
+        "parents": list(poses.skeleton.parents),
+        "units": {name: UNITS[name] for name in _UNITS} | {"error_px": "pixel", "frame": "world"},
+        "warnings": list(poses.warnings),
+    }
+
+
+def write(crowd: CrowdClip, path: Path) -> None:
+    """Write a crowd to an .npz file.
+
+    rotations: (N, F, J, 4). root_position: (N, F, 3), m. bone_offsets: (N, J, 3), m. rate: frames a
+    second. joints: names. Raises FileError if the file cannot be written.
+    """
+    made = list(crowd.batches)
+    rotations, roots, bones = (
+        np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
+        for part in _PARTS
+    )
+    turned, moved = _placed(crowd, rotations, roots)
+    content = BytesIO()
+    np.savez(
+        content,
+        rotations=turned,
+        root_position=moved,
+        bone_offsets=bones,
+        rate=crowd.rate,
+        joints=np.array(crowd.skeleton.names),
+    )
+    atomic_files.write(content.getvalue(), path)
+
+
+_PARTS = ("rotations", "root_position", "bone_offsets")
+
+
+def _placed(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:
+    """Return rotations and root positions of all characters in the world."""
+    turns = crowd.placement.turns[:, None]
+    own = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
+    moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
+    placed = rotations.copy()
+    placed[:, :, 0] = own
+    return placed, moved.astype(np.float32)

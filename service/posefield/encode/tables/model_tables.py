@@ -1,0 +1,152 @@
+"""Answers about a model: sigma grids as tables; reasons and suggestions as JSON and as text."""
+
+from typing import Any
+
+import numpy as np
+
+from posefield.encode.tables import table as tables
+from posefield.encode.tables.table import Table
+from posefield.question.results import (
+    Backing,
+    Captured,
+    Reasons,
+    SigmaGrid,
+    Suggestion,
+    Suggestions,
+)
+
+DECIMALS = 9
+"""Decimals that do not depend on the machine that solved the kriging system."""
+HEADING = ("gain", "variance", "lacks", "nearest clip", "controls")
+
+
+def table(grid: SigmaGrid) -> Table:
+    """Return the values of both axes, with sigma, inside and supported (R, C) as arrays."""
+    arrays = {
+        "across_values": grid.across.values,
+        "along_values": grid.along.values,
+        "sigma": tables.single(grid.sigma),
+        "inside": grid.inside,
+        "supported": grid.supported,
+    }
+    return Table({}, _facts(grid), arrays)
+
+
+def points(grid: SigmaGrid) -> Table:
+    """Return the grid as a table of R C rows, ordered by `along`, then `across`."""
+    across, along = np.meshgrid(grid.across.values, grid.along.values)
+    columns = {
+        "across_values": across.ravel(),
+        "along_values": along.ravel(),
+        "sigma": tables.single(grid.sigma).ravel(),
+        "inside": grid.inside.ravel(),
+        "supported": grid.supported.ravel(),
+    }
+    return Table(columns, _facts(grid))
+
+
+def _facts(grid: SigmaGrid) -> dict[str, Any]:
+    across, along = grid.across.control, grid.along.control
+    return {
+        "model": grid.model,
+        "across": across.name,
+        "along": along.name,
+        "controls": grid.controls,
+        "performer": grid.performer,
+        "units": {"across": across.unit, "along": along.unit, "sigma": "metre"},
+    }
+
+
+def explanation(found: Reasons) -> dict[str, Any]:
+    """Return the reasons in the schema Reasons of the API."""
+    return {
+        "model": found.model,
+        "controls": found.controls,
+        "performer": found.performer,
+        "warnings": list(found.warnings),
+        "support": _backing(found.backing),
+        "nearest": [_clip(clip) for clip in found.nearest],
+        "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
+        **({"inferred": list(found.inferred)} if found.inferred else {}),
+    }
+
+
+def _clip(clip: Captured) -> dict[str, Any]:
+    rounded = {name: round(getattr(clip, name), DECIMALS) for name in ("distance", "weight")}
+    return {**vars(clip), **rounded}
+
+
+def _backing(found: Backing) -> dict[str, Any]:
+    return {
+        "supported": found.supported,
+        "beyond": {name: round(share, DECIMALS) for name, share in found.beyond.items()},
+        "most_beyond": found.most,
+        "variance": round(found.variance, DECIMALS),
+        "most_variance": round(found.limit, DECIMALS),
+    }
+
+
+def explanation_text(found: Reasons) -> str:
+    """Return one line for each clip, the nearest first, one for all others, and the support."""
+    wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
+    lines = [f"{'clip':{wide}}  distance   weight  "]
+    lines += [
+        f"{clip.source:{wide}}  {clip.distance:8.3f}  {100 * clip.weight:6.1f} %  {_said(clip)}"
+        for clip in found.nearest
+    ]
+    others = f"{found.others} others"
+    lines.append(f"{others:{wide}}  {'':8}  {100 * found.others_weight:6.1f} %")
+    lines.append(_supported(found.backing))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _supported(found: Backing) -> str:
+    said = "was captured" if found.supported else "was not captured"
+    beyond = ", ".join(
+        f"{name} {100 * share:.0f} % of its range beyond it"
+        for name, share in found.beyond.items()
+        if share
+    )
+    return (
+        f"something like it {said}: variance {found.variance:.2g} of at most {found.limit:.2g}, "
+        f"{beyond or 'no control beyond its range'} (at most {100 * found.most:.0f} %)"
+    )
+
+
+def _said(clip: Captured) -> str:
+    values = ", ".join(f"{name} {value:g}" for name, value in clip.controls.items())
+    return f"{clip.performer}, {values}" if clip.performer else values
+
+
+def suggestions(found: Suggestions) -> dict[str, Any]:
+    """Return the suggestions in the schema Suggestions of the API."""
+    return {
+        "model": found.model,
+        "performer": found.performer,
+        "candidates": found.candidates,
+        "suggestions": [_suggestion(each) for each in found.suggestions],
+    }
+
+
+def _suggestion(found: Suggestion) -> dict[str, Any]:
+    rounded = {n: round(getattr(found, n), DECIMALS) for n in ("gain", "variance", "gap")}
+    return {**vars(found), **rounded}
+
+
+def suggestions_text(found: Suggestions) -> str:
+    """Return one line for each point, the largest gain first."""
+    rows = [HEADING, *map(_suggestion_cells, found.suggestions)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADING))]
+    lines = ("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _suggestion_cells(found: Suggestion) -> tuple[str, ...]:
+    controls = ", ".join(f"{name} {value:.4g}" for name, value in found.controls.items())
+    return (
+        f"{100 * found.gain:.1f} %",
+        f"{found.variance:.2f}",
+        f"{found.lacking} ({100 * found.gap:.0f} % of its range)",
+        found.nearest or "",
+        controls,
+    )

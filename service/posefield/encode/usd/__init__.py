@@ -1,0 +1,1 @@
+"""USD clips: layers written from cached templates."""

@@ -1,0 +1,65 @@
+"""Helpers that write prims, attributes and relationships directly into a layer."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Vt
+
+from posefield.common.units import Floats
+from posefield.encode.usd.layer_content import Samples
+
+Type = Sdf.ValueTypeNames
+
+
+def prim(parent: Any, name: str, kind: str, apis: Sequence[str] = ()) -> Any:
+    """Return a new prim of a schema with applied API schemas."""
+    spec = Sdf.PrimSpec(parent, name, Sdf.SpecifierDef, kind)
+    if apis:
+        spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=list(apis)))
+    return spec
+
+
+def attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
+    """Return a new varying attribute, with a default value unless it is None."""
+    spec = Sdf.AttributeSpec(owner, name, kind)
+    if value is not None:
+        spec.default = value
+    return spec
+
+
+def uniform(owner: Any, name: str, kind: Any, value: Any = None) -> None:
+    """Create an attribute that does not vary over time, with a value unless it is None."""
+    spec = Sdf.AttributeSpec(owner, name, kind, Sdf.VariabilityUniform)
+    if value is not None:
+        spec.default = value
+
+
+def per_point(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
+    """Return a new attribute with one element per point of a mesh."""
+    spec = attribute(owner, name, kind, value)
+    spec.SetInfo("interpolation", "vertex")
+    return spec
+
+
+def relation(owner: Any, name: str, target: Any) -> None:
+    """Create a relationship to the prim at a path."""
+    spec = Sdf.RelationshipSpec(owner, name, custom=False)
+    spec.targetPathList.explicitItems = [target]
+
+
+def vectors(values: Floats) -> Any:
+    """Return a float3[] of an array (N, 3)."""
+    return Vt.Vec3fArray.FromNumpy(values.astype(np.float32))
+
+
+def samples(prim: Any, values: Samples) -> None:
+    """Set the time samples of translations and rotations of a SkelAnimation."""
+    _samples(prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"]))
+    _samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
+
+
+def _samples(prim: Any, name: str, values: Iterable[Any]) -> None:
+    layer, path = prim.layer, prim.path.AppendProperty(name)
+    for frame, value in enumerate(values):
+        layer.SetTimeSample(path, frame, value)

@@ -1,0 +1,49 @@
+"""USD layers of a SkelAnimation alone, for stages in which many clips animate one character."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pxr import Sdf
+
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.usd import character_prims, clip_arrays, prim_specs
+from posefield.encode.usd.layer_content import Array, Content
+from posefield.encode.usd.layer_metadata import Kind
+from posefield.encode.usd.template_cache import CRATES
+from posefield.question.results import ClipAnswer
+
+PRIM = "Anim"
+
+
+@dataclass(frozen=True)
+class Animations(Kind):
+    """Layers of an animation of joints with given paths."""
+
+    paths: tuple[str, ...]
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """Return the arrays that every layer holds."""
+        return ()
+
+    def head(self, content: Content) -> Any:
+        """Return the layer without its prims."""
+        made = Sdf.Layer.CreateAnonymous("animation.usda")
+        self.state(made, PRIM, content)
+        return made
+
+    def layer(self, content: Content) -> Any:
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
+        made = self.head(content)
+        with Sdf.ChangeBlock():
+            prim_specs.samples(character_prims.animation(made, PRIM, self.paths), content.samples)
+        return made
+
+
+def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return binary layers of the clips' animations, with the facts and without a character."""
+    return [
+        CRATES.write(Animations(take.rate, convention, take.rig.paths), take.content)
+        for take in clip_arrays.bare(answers, convention)
+    ]

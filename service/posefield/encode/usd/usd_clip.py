@@ -1,0 +1,95 @@
+"""Clips as USD layers: a bound skeleton, its baked animation and a skinned body mesh.
+
+The layers are written without a stage, which is faster; every opened stage also leaks memory. The
+names of prims are constant, because USD never frees a name.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from pxr import Sdf
+
+from posefield.encode.character import body_mesh
+from posefield.encode.character.character import Rig
+from posefield.encode.files import zip_archive
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.usd import character_prims, clip_arrays, prim_specs
+from posefield.encode.usd.layer_content import Array, Content
+from posefield.encode.usd.layer_metadata import Kind
+from posefield.encode.usd.template_cache import CRATES, TEXTS
+from posefield.question.results import ClipAnswer
+
+ROOT = Sdf.Path("/Character")
+ANIMATION = ROOT.AppendChild("Anim")
+TINTS = body_mesh.TINTS.astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Clips(Kind):
+    """Layers of clips of one skeleton."""
+
+    rig: Rig
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """Return the arrays that every layer holds."""
+        return (TINTS,)
+
+    def head(self, content: Content) -> Any:
+        """Return the layer without its prims."""
+        made = Sdf.Layer.CreateAnonymous("clip.usda")
+        self.state(made, ROOT.name, content)
+        return made
+
+    def layer(self, content: Content) -> Any:
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
+        made = Sdf.Layer.CreateAnonymous("clip.usda")
+        made.TransferContent(_prims(self.rig))
+        with Sdf.ChangeBlock():
+            self.state(made, ROOT.name, content)
+            character_prims.fill(made.GetPrimAtPath(ROOT), character_prims.values(content.values))
+            prim_specs.samples(made.GetPrimAtPath(ANIMATION), content.samples)
+        return made
+
+
+@lru_cache(maxsize=16)
+def _prims(rig: Rig) -> Any:
+    """Return a layer of a character and its animation without numbers.
+
+    Cached, since building it takes as long as exporting it.
+    """
+    made = Sdf.Layer.CreateAnonymous("prims.usda")
+    root = character_prims.root(made, ROOT.name, rig)
+    character_prims.bind(root, character_prims.animation(root, ANIMATION.name, rig.paths).path)
+    return made
+
+
+def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return USD layers as text."""
+    return [TEXTS.write(*each) for each in authored(answers, convention)]
+
+
+def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return USD layers in binary form."""
+    return [CRATES.write(*each) for each in authored(answers, convention)]
+
+
+def usdz(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    """Return USDZ files of one binary layer each."""
+    return list(map(package, usdc(answers, convention)))
+
+
+def package(layer: bytes) -> bytes:
+    """Return a USDZ file that holds one binary layer."""
+    return b"".join(zip_archive.archive([zip_archive.whole("clip.usdc", layer)]))
+
+
+def authored(
+    answers: Sequence[ClipAnswer], convention: Convention
+) -> Iterator[tuple[Clips, Content]]:
+    """Yield the author and the content of the layer of each answer."""
+    for take in clip_arrays.whole(answers, convention):
+        yield Clips(take.rate, convention, take.rig), take.content

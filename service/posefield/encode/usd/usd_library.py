@@ -1,0 +1,113 @@
+"""USD stage of one character and many clips, each clip in a layer of its own.
+
+    /Character                  SkelRoot, the default prim: in the model's rest pose
+      Skel                      bound to the first of the clips
+      Body
+      Clips
+        NAME                    SkelAnimation, by a payload in NAME's layer
+
+Readers load payloads on demand: pxr opens a stage of 100,000 clips without them in seconds. The
+prims of the clips are written as text, because usd-core takes ten times as long and 250 MB more to
+create as many prims, and as long to read them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Sdf
+
+from posefield.common.units import Floats
+from posefield.encode.character import character, joint_names
+from posefield.encode.character import extent as reach
+from posefield.encode.files import axis_conversion
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.usd import character_prims, layer_metadata, prim_specs
+from posefield.motion.skeleton import Skeleton
+from posefield.question.results import ClipAnswer
+
+ROOT = Sdf.Path("/Character")
+CLIPS = ROOT.AppendChild("Clips")
+OPENING = f'def Scope "{CLIPS.name}"\n    {{\n'
+
+Corner = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Clip of a library: its name, and the path of its layer relative to the stage.
+
+    low, high: corners of a box that contains the character in all frames, m.
+    """
+
+    name: str
+    file: str
+    frames: int
+    rate: float
+    low: Corner
+    high: Corner
+
+
+def entry(name: str, file: str, answer: ClipAnswer) -> Entry:
+    """Return the entry of a result; its box holds for any rotations of the joints."""
+    clip = answer.clip
+    low, high = reach.anywhere(clip.skeleton, clip.translations[0], clip.root_path).tolist()
+    return Entry(name, file, len(clip), clip.rate, tuple(low), tuple(high))
+
+
+def stage(
+    skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[Entry]
+) -> bytes:
+    """Return the USD text of the stage; names of clips are made legal names of prims.
+
+    rate: of the stage, frames a second. The stage is as long as the longest clip.
+    """
+    prims = joint_names.legal(each.name for each in entries)
+    text = _character(skeleton, convention, rate, entries, prims[:1])
+    head, opening, tail = text.rpartition(OPENING)
+    clips = "\n".join(_clips(prims, entries))
+    return "".join((head, opening, clips, tail)).encode()
+
+
+def _character(
+    skeleton: Skeleton,
+    convention: Convention,
+    rate: float,
+    entries: Sequence[Entry],
+    bound: tuple[str, ...],
+) -> str:
+    """Return the text of the stage without its clips."""
+    rig, made = character.rig(skeleton), Sdf.Layer.CreateAnonymous("library.usda")
+    lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
+    layer_metadata.head(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
+    root = character_prims.root(made, ROOT.name, rig)
+    numbers = character.at_rest(rig, convention)
+    extent = _box(numbers["extent"], entries, convention)
+    character_prims.fill(root, character_prims.values({**numbers, "extent": extent}))
+    prim_specs.prim(root, CLIPS.name, "Scope")
+    for name in bound:
+        character_prims.bind(root, CLIPS.AppendChild(name))
+    text: str = made.ExportToString()
+    return text
+
+
+def _clips(prims: Sequence[str], entries: Sequence[Entry]) -> Iterator[str]:
+    for name, each in zip(prims, entries, strict=True):
+        yield (
+            f'        def SkelAnimation "{name}" (\n'
+            f"            prepend payload = {_asset(each.file)}\n"
+            "        )\n        {\n        }\n"
+        )
+
+
+def _asset(file: str) -> str:
+    """Return the path of a layer beside the stage as USD text."""
+    path = f"./{file}"
+    return f"@@@{path}@@@" if "@" in path else f"@{path}@"
+
+
+def _box(rest: Floats, entries: Sequence[Entry], convention: Convention) -> Floats:
+    """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
+    boxes = np.array([(each.low, each.high) for each in entries]).reshape(-1, 2, 3)
+    every = np.concatenate([rest[None], axis_conversion.box(convention, boxes)])
+    return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]).astype(np.float32)

@@ -1,0 +1,131 @@
+"""Writers of crowds as USD, to a file or to a stream."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from posefield.common import atomic_files
+from posefield.common.errors import FileError, InvalidField
+from posefield.encode.files import zip_archive
+from posefield.encode.usd import layer_metadata
+from posefield.encode.usd_crowd import (
+    FILES,
+    INSTANCING,
+    STREAMS,
+    crowd_motions,
+    crowd_package,
+    crowd_size,
+    encoding_process,
+    single_layer,
+)
+from posefield.encode.usd_crowd.crowd_size import Counts
+from posefield.motion.crowd_clip import CrowdClip
+
+APART = 32_000_000
+"""Bytes of a layer that usd-core writes in about 0.2 s, in which no other thread runs."""
+
+
+def write(crowd: CrowdClip, path: Path, instancing: str = "references") -> None:
+    """Write a crowd atomically, in the form of the path's extension.
+
+    .usda and .usdc: one layer. .usd: an entry with a folder `<stem>_clips` beside it, with a layer
+    for each motion. .usdz: the same in one archive. With "flatten" it is always one layer. The
+    batches are iterated once. Raises InvalidField for an unknown extension or instancing and for a
+    crowd too large for a usdz, and FileError if the file cannot be written.
+    """
+    ending = path.suffix.removeprefix(".")
+    _door(crowd, ending, FILES, instancing)
+    if ending == "usdz":
+        atomic_files.stream(_usdz(crowd, instancing), path)
+    elif ending == "usd" and instancing != "flatten":
+        _write_folder(crowd, path, instancing == "scenegraph")
+    else:
+        with atomic_files.replacing(path) as made:
+            layer_metadata.export(_layer(crowd, _form(ending), instancing), made)
+
+
+def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Iterator[bytes]:
+    """Return an iterator over the bytes of a crowd as usda, usdc or usdz.
+
+    A usdz is sent while its motions are computed; a single layer is first exported to a file on
+    disk, which is removed when the stream is closed. Large layers are written by a child process.
+    Raises InvalidField at once, as `write` does.
+    """
+    _door(crowd, ending, STREAMS, instancing)
+    counts = Counts(
+        len(crowd.skeleton), len(crowd.motion), crowd_motions.count(crowd), crowd.frames
+    )
+    apart = crowd_size.layer(counts, ending, instancing == "flatten") > APART
+    return (encoding_process.stream if apart else encoded)(crowd, ending, instancing)
+
+
+def encoded(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+    """Return the bytes of a crowd as `stream` does, encoded by this process whatever its size."""
+    return _usdz(crowd, instancing) if ending == "usdz" else _single(crowd, ending, instancing)
+
+
+def _door(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancing: str) -> None:
+    _known("format", ending, endings)
+    _known("instancing", instancing, INSTANCING)
+    if ending == "usdz":
+        crowd_package.fits(crowd)
+
+
+def _known(field: str, found: str, expected: tuple[str, ...]) -> None:
+    if found not in expected:
+        raise InvalidField(field, f"{found!r}, expected one of {', '.join(expected)}")
+
+
+def _form(ending: str) -> str:
+    return "usda" if ending == "usda" else "usdc"
+
+
+def _layer(crowd: CrowdClip, form: str, instancing: str) -> Any:
+    if instancing == "flatten":
+        return single_layer.flat(crowd, form)
+    return single_layer.referring(crowd, form, instancing == "scenegraph")
+
+
+def _single(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+    with TemporaryDirectory() as name:
+        path = Path(name, f"crowd.{ending}")
+        layer_metadata.export(_layer(crowd, _form(ending), instancing), path)
+        yield from atomic_files.pieces(path)
+
+
+def _usdz(crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
+    if instancing != "flatten":
+        return zip_archive.archive(crowd_package.members(crowd, instancing == "scenegraph"))
+    return _flat_usdz(crowd)
+
+
+def _flat_usdz(crowd: CrowdClip) -> Iterator[bytes]:
+    with TemporaryDirectory() as name:
+        path = Path(name, "crowd.usdc")
+        layer_metadata.export(single_layer.flat(crowd, "usdc"), path)
+        yield from zip_archive.archive([zip_archive.lying(path.name, path)])
+
+
+OURS = re.compile(r"(m\d{5,}|character|summary)\.usdc")
+
+
+def _write_folder(crowd: CrowdClip, path: Path, instanced: bool) -> None:
+    """Write a crowd's file and folder atomically, replacing an earlier crowd.
+
+    Raises FileError if the folder contains other files than a crowd's layers, which would be lost.
+    """
+    folder = path.with_name(f"{path.stem}_clips")
+    _ours(folder)
+    with atomic_files.replacing_pair(path, folder) as (entry, inside):
+        entry.write_bytes(crowd_package.entry(crowd, instanced, folder.name))
+        for name, content in crowd_package.parts(crowd):
+            (inside / name).write_bytes(content)
+
+
+def _ours(folder: Path) -> None:
+    found = [folder] if folder.is_file() else sorted(folder.glob("*"))
+    for path in found:
+        if not OURS.fullmatch(path.name):
+            raise FileError(path, "in the way; expected nothing here but an earlier crowd's layers")

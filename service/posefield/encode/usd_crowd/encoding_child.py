@@ -1,0 +1,37 @@
+"""Process that encodes one crowd.
+
+`python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING` reads pickles from standard
+input: the crowd without motions, batches of them, and None. It writes the file PATH.
+`encoding_process.stream` starts it.
+"""
+
+import pickle
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import IO
+
+from posefield.encode.usd_crowd import crowd_writer
+from posefield.motion.crowd_clip import Motions
+
+
+def main() -> None:
+    """Encode the crowd of standard input.
+
+    Raises EOFError if the input ends early.
+    """
+    path, instancing = Path(sys.argv[1]), sys.argv[2]
+    given = sys.stdin.buffer
+    crowd = replace(pickle.load(given), batches=_batches(given))
+    with path.open("wb") as file:
+        file.writelines(crowd_writer.encoded(crowd, path.suffix[1:], instancing))
+
+
+def _batches(given: IO[bytes]) -> Iterator[Motions]:
+    while (batch := pickle.load(given)) is not None:
+        yield batch
+
+
+if __name__ == "__main__":
+    main()

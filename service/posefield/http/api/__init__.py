@@ -1,0 +1,1 @@
+"""The API contract, its problems and the settings of the service."""

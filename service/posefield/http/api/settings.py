@@ -1,0 +1,173 @@
+"""Settings of the service, read once from environment variables."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+from posefield.common.errors import InvalidField
+
+PREFIX = "POSEFIELD_"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the service; each is read from POSEFIELD_ and its name in capitals.
+
+    Limits are maxima; times are in seconds, sizes in bytes.
+
+    host, port: address to listen on; port 0 takes a free one. workers: processes that share the
+    port; 0 for the number of processors. log: "on" for one line per request on standard error.
+    concurrency: open requests of a process. deadline: time until a response begins. drain: time
+    after SIGTERM in which the service still listens and reports not ready. grace: time for open
+    requests to finish after that. unresponsive: time without an iteration of the event loop until a
+    process logs its stacks and ends, to be replaced; 0 for never.
+
+    body_limit: size of a request body. crowd_body_limit: of a crowd request. clips_body_limit: of a
+    request for many clips. bodies_memory: memory of the bodies of all open requests. url_limit,
+    head_limit: size of a URL and of all headers. idle_time: time until an idle connection is
+    closed. output_limit: size of a clip, of a crowd's poses and of a walking crowd.
+
+    crowd_limit: characters of a crowd. crowd_poses: poses of all motions of a walking crowd.
+    crowd_frames: frames of each of these motions. clips_limit: clips of a request. clips_poses:
+    frames of all its clips. clips_targets: cost of all its targets. grid_limit: points of a grid
+    of sigma.
+
+    reload: time between two checks for new models; 0 for never. versions: older versions of a model
+    that stay available by hash. versions_memory: memory of all of these. alias_seconds: time for
+    which caches may use a response for a model's plain name without revalidation.
+
+    hosts: accepted host names, comma-separated; IP addresses are always accepted. origins: origins
+    that CORS allows, comma-separated.
+
+    keys, keys_file: API keys as lines of name, hash and scopes. open: allow a service
+    without credentials on addresses other than loopback. metrics_open: /metrics needs no
+    credentials. jwt_keys: file or URL of the token issuer's public keys. jwt_refresh: time between
+    two reads of it. jwt_issuer, jwt_audience, jwt_algorithm: required of tokens. jwt_leeway:
+    tolerance for clock differences. jwt_scopes: name of the claim with the scopes.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8000
+    body_limit: int = 64 * 1024
+    # A character with six controls, none rounded, takes 250 bytes.
+    crowd_body_limit: int = 32 * 1024 * 1024
+    crowd_limit: int = 100_000
+    # USD takes 900 bytes for a pose of 31 joints.
+    crowd_poses: int = 500_000
+    # Twenty minutes at 30 frames a second; a whole motion is in memory while its layer is written.
+    crowd_frames: int = 36_000
+    # A clip with six controls, none rounded, a name and a performer takes 400 bytes.
+    clips_body_limit: int = 8 * 1024 * 1024
+    clips_limit: int = 10_000
+    clips_poses: int = 1_000_000
+    # A target takes 3 to 12 ms of CPU time: at most 25 s in all, within the default deadline.
+    clips_targets: int = 2000
+    # 50 ms of CPU time.
+    grid_limit: int = 65_536
+    output_limit: int = 256 * 1024 * 1024
+    grace: int = 10
+    # A pose takes 0.1 ms, so a thousand open requests delay one by 0.1 s.
+    concurrency: int = 1000
+    deadline: int = 30
+    alias_seconds: int = 0
+    log: str = "on"
+    # Clients with open connections learn in this time to open new ones.
+    drain: int = 1
+    workers: int = 1
+    reload: int = 10
+    versions: int = 2
+    versions_memory: int = 64 * 1024 * 1024
+    url_limit: int = 8 * 1024
+    head_limit: int = 16 * 1024
+    # Longer than the default of common proxies: the proxy should close idle connections.
+    idle_time: int = 75
+    bodies_memory: int = 128 * 1024 * 1024
+    hosts: str = ""
+    # Long work runs in threads, so half a minute is a fault of the event loop, not load.
+    unresponsive: int = 30
+    origins: str = ""
+    keys: str = ""
+    keys_file: str = ""
+    open: bool = False
+    metrics_open: bool = False
+    jwt_keys: str = ""
+    jwt_issuer: str = ""
+    jwt_audience: str = ""
+    jwt_algorithm: str = "RS256"
+    jwt_scopes: str = "scope"
+    jwt_leeway: int = 30
+    jwt_refresh: int = 300
+
+    def __post_init__(self) -> None:
+        _within("port", self.port, 0, 65535)
+        _within("body_limit", self.body_limit, 1, 64 * 1024 * 1024)
+        _within("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
+        _within("crowd_limit", self.crowd_limit, 1, 10_000_000)
+        _within("crowd_poses", self.crowd_poses, 1, 50_000_000)
+        _within("crowd_frames", self.crowd_frames, 1, 50_000_000)
+        _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
+        _within("clips_limit", self.clips_limit, 1, 1_000_000)
+        _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _within("clips_targets", self.clips_targets, 1, 1_000_000)
+        _within("output_limit", self.output_limit, 64 * 1024, 1 << 34)
+        _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
+        _within("grace", self.grace, 0, 600)
+        _within("concurrency", self.concurrency, 1, 1_000_000)
+        _within("deadline", self.deadline, 1, 3600)
+        _within("alias_seconds", self.alias_seconds, 0, 31_536_000)
+        if self.log not in ("on", "off"):
+            raise InvalidField(PREFIX + "LOG", f"{self.log!r}, expected on or off")
+        _within("drain", self.drain, 0, 600)
+        _within("workers", self.workers, 0, 256)
+        _within("reload", self.reload, 0, 86_400)
+        _within("versions", self.versions, 0, 1000)
+        _within("versions_memory", self.versions_memory, 0, 1 << 40)
+        _within("url_limit", self.url_limit, 256, 64 * 1024)
+        _within("head_limit", self.head_limit, 1024, 256 * 1024)
+        _within("idle_time", self.idle_time, 1, 3600)
+        _within("bodies_memory", self.bodies_memory, 1024 * 1024, 1 << 40)
+        _within("unresponsive", self.unresponsive, 0, 3600)
+        _within("jwt_leeway", self.jwt_leeway, 0, 600)
+        _within("jwt_refresh", self.jwt_refresh, 10, 86_400)
+
+
+def read(
+    host: str | None = None, port: int | None = None, environ: Mapping[str, str] = os.environ
+) -> Settings:
+    """Return the settings of the environment; host and port of the command line override them.
+
+    Raises InvalidField for an invalid value.
+    """
+    found = {f.name: (f.default, environ.get(PREFIX + f.name.upper())) for f in fields(Settings)}
+    values = {
+        name: _parse(name, default, text)
+        for name, (default, text) in found.items()
+        if text is not None
+    }
+    settings = Settings(**values)  # type: ignore[arg-type]  # each name has its own type
+    return replace(
+        settings,
+        host=settings.host if host is None else host,
+        port=settings.port if port is None else port,
+    )
+
+
+def _parse(name: str, default: object, text: str) -> str | int:
+    """Return the value of a variable, of the type of the setting's default.
+
+    Raises InvalidField for invalid text.
+    """
+    if isinstance(default, str):
+        return text
+    if isinstance(default, bool):
+        if text not in ("0", "1"):
+            raise InvalidField(PREFIX + name.upper(), f"{text!r}, expected 0 or 1")
+        return text == "1"
+    if not (text.isascii() and text.isdigit()):
+        raise InvalidField(PREFIX + name.upper(), f"{text!r}, expected a whole number")
+    return int(text)
+
+
+def _within(name: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise InvalidField(PREFIX + name.upper(), f"{value}, expected {low} to {high}")

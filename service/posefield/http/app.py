@@ -1,0 +1,131 @@
+"""ASGI application of the contract's operations."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, nullcontext
+from functools import partial
+
+from starlette.types import Receive, Scope, Send
+
+from posefield.common.errors import UnknownFormat
+from posefield.http import pages
+from posefield.http.access import access_policy
+from posefield.http.api import contract, problems
+from posefield.http.api.contract import Contract, Operation
+from posefield.http.api.problems import RequestFault
+from posefield.http.api.settings import PREFIX, Settings
+from posefield.http.middleware import cors, request_head
+from posefield.http.middleware.request_head import HeadLimits
+from posefield.http.operations import OPERATIONS
+from posefield.http.readiness import Readiness
+from posefield.http.request_cycle import Exchange, Site
+from posefield.http.routing import Map, Route
+from posefield.http.service import Formatted, Handler, Service
+from posefield.http.telemetry.telemetry import SILENT, Telling
+from posefield.registry.model_registry import Library
+from posefield.registry.model_reload import Fixed
+
+Lifespan = Callable[[Site], AbstractAsyncContextManager[None]]
+
+
+def alone(site: Site) -> AbstractAsyncContextManager[None]:
+    """Return a lifespan without background tasks."""
+    return nullcontext()
+
+
+def create_app(
+    models: Library | Readiness,
+    settings: Settings,
+    telling: Telling = SILENT,
+    lifespan: Lifespan = alone,
+) -> "App":
+    """Return the application of the contract for some models.
+
+    telling: log and traces of requests. lifespan: context of the background tasks of the server.
+    """
+    return build(contract.load(), OPERATIONS, models, settings, telling, lifespan)
+
+
+def build(
+    agreed: Contract,
+    handlers: Mapping[str, Handler],
+    models: Library | Readiness,
+    settings: Settings,
+    telling: Telling = SILENT,
+    lifespan: Lifespan = alone,
+) -> "App":
+    """Return the application of a contract and the handlers of its operations.
+
+    handlers: by operationId. Raises ValueError for an operation without a handler, a handler
+    without an operation and formats that differ from the handler's, and InvalidField or FileError
+    for invalid settings of access, origins or hosts.
+    """
+    _check_complete({operation.id for operation in agreed.operations}, set(handlers))
+    readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
+    rules = access_policy.of(settings)
+    access_policy.check_exposure(settings, rules)
+    origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
+    service = Service(
+        readiness, settings, agreed.version, pages.made(agreed), rules, origins, telling
+    )
+    places = Map(
+        route
+        for operation in agreed.operations
+        for route in _routes(operation, handlers[operation.id], service)
+    )
+    hosts = request_head.names(settings.hosts, f"{PREFIX}HOSTS")
+    limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
+    return App(Site(places, service, partial(_missing, places), limits), lifespan)
+
+
+def _routes(operation: Operation, handler: Handler, service: Service) -> Iterator[Route]:
+    """Yield the routes of an operation: one per format if its path ends in `{format}`, else one."""
+    endpoint = partial(handler, service)
+    formats = handler.formats if isinstance(handler, Formatted) else {}
+    offers = tuple((name, each.media_type) for name, each in formats.items())
+    _check_formats(operation, dict(offers))
+    if not operation.formats:
+        yield Route(operation, endpoint, offers=offers)
+    for name in operation.formats:
+        yield Route(operation, endpoint, name)
+
+
+def _check_formats(operation: Operation, encoders: Mapping[str, str]) -> None:
+    """Raise ValueError unless the contract lists the handler's formats and media types."""
+    agreed = dict(operation.formats), {*operation.media_types}
+    made = dict(encoders if operation.formats else {}), {*encoders.values()}
+    if (operation.formats or encoders) and agreed != made:
+        raise ValueError(f"{operation.id}: the contract has {agreed}, its handler {made}")
+
+
+class App:
+    """ASGI application; runs an Exchange for each request."""
+
+    def __init__(self, site: Site, lifespan: Lifespan) -> None:
+        self.site = site
+        self._lifespan = lifespan
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            await Exchange(self.site, scope, receive, send).run()
+        elif scope["type"] == "lifespan":
+            await receive()
+            async with self._lifespan(self.site):
+                await send({"type": "lifespan.startup.complete"})
+                await receive()
+            await send({"type": "lifespan.shutdown.complete"})
+
+
+def _check_complete(agreed: set[str], handled: set[str]) -> None:
+    if agreed != handled:
+        raise ValueError(
+            f"operations without a handler {sorted(agreed - handled)}, "
+            f"handlers without an operation {sorted(handled - agreed)}"
+        )
+
+
+def _missing(places: Map, path: str) -> Exception:
+    """Return the error of a path that is not in the contract."""
+    if found := places.other_formats(path):
+        asked, known = found
+        return UnknownFormat("format", f"no format {asked!r}; there are {', '.join(known)}")
+    return RequestFault(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")

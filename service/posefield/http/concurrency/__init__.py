@@ -1,0 +1,1 @@
+"""Threads of a worker, and batching of concurrent requests."""

@@ -1,0 +1,91 @@
+"""Requests for many clips: decoding and validation of the JSON body."""
+
+from collections.abc import Mapping, Sequence
+
+from posefield.batch.clip_archive import Order
+from posefield.batch.rows import clip_names
+from posefield.batch.rows.row_query import Query
+from posefield.common import cancellation
+from posefield.common.errors import FormError, InvalidField, QueryError
+from posefield.encode.formats import Encoder, poses_within
+from posefield.http.api import problems
+from posefield.http.api.settings import Settings
+from posefield.question import json_decoding as bodies
+from posefield.question.json_decoding import pointer
+from posefield.question.motion_question import ClipsQuestion, NamedClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.clips import Prospect
+from posefield.synthesis.frame_times import MOST_POSES
+from posefield.synthesis.synthesizer import Synthesizer
+
+OWN_NAME = "expected a name of its own: an earlier clip has it, capitals count for nothing"
+
+
+def order(
+    model: Synthesizer, encoders: Mapping[str, Encoder], content: bytes, settings: Settings
+) -> Order:
+    """Return the validated order of a JSON body, which later steps do not refuse.
+
+    Raises FormError for a malformed body, RequestFault for an invalid clip and InvalidField for a
+    request beyond the limits.
+    """
+    body = bodies.question(ClipsQuestion, content)
+    if body.format not in encoders:
+        detail = f"{body.format!r}, expected one of {', '.join(encoders)}"
+        raise FormError("format", detail)
+    if not 1 <= len(body.clips) <= settings.clips_limit:
+        expected = f"expected 1 to {settings.clips_limit}"
+        raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
+    encoder = encoders[body.format]
+    convention = encoder.convention(body.unit, body.up)
+    queries = [_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
+    _check_names(queries)
+    _check_targets(model, queries, settings.clips_targets)
+    within = poses_within(
+        settings.output_limit, len(model.session.card.skeleton), encoder.per_joint
+    )
+    prospects = _prospects(model, queries, min(within, MOST_POSES), settings.clips_poses)
+    return Order(model, encoder, convention, queries, prospects)
+
+
+def _query(index: int, asked: NamedClipQuestion, extension: str) -> Query:
+    cancellation.check()
+    name = clip_names.generated(index) if asked.name is None else asked.name
+    return Query(name, extension, asked, pointer("clips", str(index)))
+
+
+def _check_names(queries: Sequence[Query]) -> None:
+    called = [each.name for each in queries]
+    for index in clip_names.Seen().repeated(called):
+        error = InvalidField("name", f"{called[index]!r}, {OWN_NAME}")
+        raise problems.within(error, queries[index].place)
+
+
+def _check_targets(model: Synthesizer, queries: Sequence[Query], most: int) -> None:
+    cost = sum(clips.solver_cost(model, each.question) for each in queries)
+    if cost > most:
+        raise InvalidField(
+            "clips",
+            f"targets of all clips cost {cost}, expected at most {most}; a target counts as one, "
+            f"as {clips.OPEN_COST} where controls are left open, pinned feet as {clips.PIN_COST}",
+        )
+
+
+def _prospects(
+    model: Synthesizer, queries: Sequence[Query], longest: int, most: int
+) -> list[Prospect]:
+    """Return the prospect of each clip.
+
+    longest: maximum frames of one clip. most: maximum frames of all clips.
+    """
+    found, poses = [], 0
+    for each in queries:
+        cancellation.check()
+        try:
+            found.append(clips.prospect(model, each.question, longest))
+        except QueryError as error:
+            raise problems.within(error, each.place) from None
+        poses += found[-1].frames
+    if poses > most:
+        raise InvalidField("clips", f"{poses} frames in all, expected at most {most}")
+    return found

@@ -1,0 +1,1 @@
+"""HTTP features of every request: caching, compression, CORS, negotiation, deadlines."""

@@ -1,0 +1,69 @@
+"""Deadlines: maximum time until a response begins."""
+
+import asyncio
+import re
+from asyncio import Task
+from collections.abc import Awaitable
+from typing import Any, TypeVar
+
+from posefield.http.api.problems import LATE, RequestFault
+from posefield.http.telemetry import metrics
+
+Answer = TypeVar("Answer")
+
+LOOK = 0.1
+"""Seconds between two checks: a timer per request would take a tenth of a pose request's time."""
+
+# RFC 7240, 4.3: time after which the client needs no response, s.
+_WAIT = re.compile(rb"(?:^|[,;\s])wait\s*=\s*([0-9]{1,6})(?![0-9])", re.IGNORECASE)
+
+
+def seconds(prefer: bytes | None, most: float) -> float:
+    """Return the deadline of a request, s: `wait` of its Prefer header, at most `most`."""
+    found = _WAIT.search(prefer) if prefer else None
+    return min(most, float(found[1])) if found else most
+
+
+class Watch:
+    """Requests of an event loop with their deadlines."""
+
+    def __init__(self) -> None:
+        self._until: dict[Task[Any], float] = {}
+        self._late: set[Task[Any]] = set()
+        self._looks = False
+
+    async def within(self, limit: float, answer: Awaitable[Answer]) -> Answer:
+        """Await a response; raises RequestFault 503 if it takes longer than `limit` seconds.
+
+        The awaiting task is cancelled then, and `threads.run` asks the thread's work to stop.
+        """
+        task, loop = asyncio.current_task(), asyncio.get_running_loop()
+        assert task is not None
+        self._until[task] = loop.time() + limit
+        if not self._looks:
+            self._looks = True
+            loop.call_later(LOOK, self._look)
+        try:
+            return await answer
+        except asyncio.CancelledError:
+            if task not in self._late:
+                raise
+            task.uncancel()
+            detail = f"no answer within {limit:g} s"
+            raise RequestFault(LATE, detail, headers={"Retry-After": "1"}) from None
+        finally:
+            del self._until[task]
+            self._late.discard(task)
+
+    def _look(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._looks = bool(self._until)
+        if self._looks:
+            loop.call_later(LOOK, self._look)
+        now = loop.time()
+        metrics.open_now(len(self._until))
+        late = [task for task, until in self._until.items() if until < now]
+        for task in late:
+            if task not in self._late:
+                self._late.add(task)
+                task.cancel()

@@ -1,0 +1,142 @@
+"""Routing: a tree of path segments, with one look-up per segment.
+
+A path that ends in `{format}` has one entry per format, so that its look-up is as fast.
+"""
+
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from posefield.http.api.contract import Operation
+from posefield.http.middleware import compression
+from posefield.http.middleware.negotiation import Offers
+
+Endpoint = Callable[[Request], Awaitable[Response]]
+
+
+@dataclass(frozen=True)
+class Route:
+    """An operation at one path, and its endpoint.
+
+    format: format at the end of the path, None for a path without. offers: formats for the
+    negotiation by Accept; empty without negotiation.
+    """
+
+    operation: Operation
+    endpoint: Endpoint
+    format: str | None = None
+    offers: Offers = ()
+
+    @cached_property
+    def path(self) -> str:
+        """Path template of the contract, with the format filled in."""
+        return self.operation.path.replace("{format}", self.format or "")
+
+    @cached_property
+    def name(self) -> bytes:
+        """The operationId, a part of entity tags."""
+        return self.operation.id.encode()
+
+    @cached_property
+    def compresses(self) -> bool:
+        """True if a response may have a content coding."""
+        operation = self.operation
+        types = [operation.formats[self.format]] if self.format else operation.media_types
+        return any(map(compression.pays, types))
+
+    @cached_property
+    def vary(self) -> bytes:
+        """Value of the Vary header: request headers that the response depends on."""
+        named = ("Accept", bool(self.offers)), ("Accept-Encoding", self.compresses)
+        return ", ".join(name for name, heeded in named if heeded).encode()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Routes of one path.
+
+    template: path template. routes: by method, with HEAD. allow: value of the header Allow.
+    """
+
+    template: str
+    routes: Mapping[str, Route]
+    allow: str
+
+
+@dataclass
+class _Branch:
+    """Node of the tree.
+
+    fixed: children by segment. any: child of a path parameter, and `name` the parameter's name.
+    place: routes of the path that ends here.
+    """
+
+    fixed: dict[str, "_Branch"] = field(default_factory=dict)
+    any: "_Branch | None" = None
+    name: str = ""
+    place: Place | None = None
+
+
+class Map:
+    """Routing table: places by path."""
+
+    def __init__(self, routes: Iterable[Route]) -> None:
+        self._root = _Branch()
+        self.places: list[Place] = []
+        by_path: dict[str, dict[str, Route]] = {}
+        self._formats: dict[str, dict[str, None]] = {}
+        for route in routes:
+            by_path.setdefault(route.path, {})[route.operation.method] = route
+            if route.format:
+                stem = route.path.removesuffix(f".{route.format}")
+                self._formats.setdefault(stem, {})[route.format] = None
+        for path, own in by_path.items():
+            self._add(_place(path, own))
+
+    def _add(self, place: Place) -> None:
+        branch = self._root
+        for part in place.template.split("/"):
+            branch = _grown(branch, part)
+        branch.place = place
+        self.places.append(place)
+
+    def find(self, path: str) -> tuple[Place, dict[str, str]] | None:
+        """Return the place of a path and its non-empty path parameters; None if unknown."""
+        branch, values = self._root, {}
+        for part in path.split("/"):
+            known = branch.fixed.get(part)
+            if known is None and part and branch.any is not None:
+                values[branch.name] = part
+                known = branch.any
+            if known is None:
+                return None
+            branch = known
+        return (branch.place, values) if branch.place else None
+
+    def other_formats(self, path: str) -> tuple[str, Iterable[str]] | None:
+        """Return the unknown format that a path ends in and the known formats of that path."""
+        asked = path.rpartition("/")[2].partition(".")[2]
+        found = self.find(path.removesuffix(f".{asked}"))
+        known = self._formats.get(found[0].template) if found else None
+        return (asked, known) if asked and known else None
+
+
+def _grown(branch: _Branch, part: str) -> _Branch:
+    if not part.startswith("{"):
+        return branch.fixed.setdefault(part, _Branch())
+    if branch.any is None:
+        branch.any, branch.name = _Branch(), part.strip("{}")
+    if branch.name != part.strip("{}"):
+        raise ValueError(f"{part} and {{{branch.name}}} at one place of the contract's paths")
+    return branch.any
+
+
+def _place(path: str, routes: dict[str, Route]) -> Place:
+    own: dict[str, Any] = dict(routes)
+    if "GET" in own:
+        own["HEAD"] = own["GET"]
+    return Place(path, own, ", ".join(sorted({*own, "OPTIONS"})))

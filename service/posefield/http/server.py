@@ -1,0 +1,255 @@
+"""Server process and worker processes, run by uvicorn through its public interface.
+
+See docs/decisions/0001-http-server.md.
+"""
+
+import logging
+import math
+import multiprocessing
+import os
+import resource
+import signal
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from threading import Semaphore
+from types import FrameType
+from typing import NoReturn
+
+import uvicorn
+from threadpoolctl import threadpool_limits
+from uvicorn.supervisors import Multiprocess
+from uvicorn.supervisors.multiprocess import Process
+
+from posefield.common.cpu_cores import ALONE
+from posefield.common.errors import InvalidField, WorkerDied
+from posefield.http.api.settings import Settings
+from posefield.http.app import App, create_app
+from posefield.http.lifespan import Announcement, lifespan
+from posefield.http.middleware.coalescing import CoalescingProtocol
+from posefield.http.readiness import Readiness
+from posefield.http.telemetry import log, metrics, tracing
+from posefield.http.telemetry.telemetry import Telling
+from posefield.inference.trial_process import LIMITS, Limits
+from posefield.registry.model_registry import Bounds
+from posefield.registry.model_reload import Shelf
+
+faults = logging.getLogger(__name__)
+
+QUOTA = Path("/sys/fs/cgroup/cpu.max")
+BACKLOG = 2048
+"""Maximum length of the queue of connections to accept."""
+NEVER = 86_400
+"""Timeout of a disabled health check, s."""
+
+
+def serve(places: Sequence[str | Path], settings: Settings) -> None:
+    """Serve the models of files, folders and URLs until SIGTERM or SIGINT.
+
+    Raises ModelError, before listening, for a file that cannot be served, InvalidField for an
+    unavailable address and WorkerDied if worker processes cannot start.
+    """
+    # Also needed after uvicorn has returned: it raises the signal that ended it again.
+    signal.signal(signal.SIGTERM, _exit)
+    _raise_open_files()
+    named = tuple(map(str, places))
+    shelf = open_models(named, settings)
+    shelf.check()
+    names = ", ".join(shelf.library.models)
+    count = settings.workers or processors(QUOTA)
+    with ExitStack() as stack, suppress(KeyboardInterrupt):
+        sockets = _listening(stack, settings.host, settings.port)
+        first = multiprocessing.get_context("spawn").Semaphore(1) if count > 1 else Semaphore(1)
+        announcement = Announcement(f"posefield: {names} at {_url(sockets[0])}", first)
+        if count > 1:
+            stack.enter_context(metrics.shared())
+            _set_threads()
+            tried = frozenset(name.partition("@")[2] for name in shelf.library.identities)
+            app = partial(worker_application, named, settings, announcement, Limits(tried=tried))
+            Workers(_config(app, settings, count), sockets).run_until_told()
+        else:
+            limit_threads()
+            app = partial(_application, shelf, settings, announcement)
+            uvicorn.Server(_config(app, settings, 1)).run(sockets)
+
+
+def worker_application(
+    places: tuple[str, ...], settings: Settings, announcement: Announcement, limits: Limits
+) -> App:
+    """Return the application of a worker process.
+
+    The parent has checked the files at the start. A file that cannot be opened since then is
+    reported by `/readyz` and the log, and the other models are served.
+    """
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    return _application(open_models(places, settings, limits), settings, announcement)
+
+
+def open_models(places: tuple[str, ...], settings: Settings, limits: Limits = LIMITS) -> Shelf:
+    """Open the models of files, folders and URLs; `Shelf.check` raises their errors."""
+    return Shelf(places, Bounds(settings.versions, settings.versions_memory), limits)
+
+
+def _application(shelf: Shelf, settings: Settings, announcement: Announcement) -> App:
+    lines = log.to_standard_error() if settings.log == "on" else None
+    beside = partial(lifespan, shelf=shelf, announcement=announcement)
+    return create_app(Readiness(shelf), settings, Telling(lines, tracing.of()), beside)
+
+
+def _config(app: partial[App], settings: Settings, count: int) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        factory=True,
+        # Not "auto", which would silently fall back to the much slower asyncio loop.
+        loop="uvloop",
+        http=CoalescingProtocol,
+        ws="none",
+        lifespan="on",
+        # The addresses of trusted proxies are not known here.
+        proxy_headers=False,
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        backlog=BACKLOG,
+        workers=count,
+        timeout_keep_alive=settings.idle_time,
+        timeout_graceful_shutdown=settings.grace,
+        timeout_worker_healthcheck=settings.unresponsive or NEVER,
+    )
+
+
+class Workers(Multiprocess):
+    """uvicorn's supervisor of workers, with logging and early closing of its sockets.
+
+    told: a signal has requested the shutdown.
+    """
+
+    told = False
+
+    def run_until_told(self) -> None:
+        """Run the workers until a signal; raises WorkerDied if the supervisor ends without one."""
+        self.run()
+        if not self.told:
+            raise WorkerDied("a worker process could not be started; see the log")
+
+    def handle_term(self) -> None:
+        """Shut the workers down; they stop listening after draining.
+
+        This process closes its sockets first: an open one would accept connections that no worker
+        serves.
+        """
+        self.told = True
+        for own in self.sockets:
+            own.close()
+        super().handle_term()
+
+    def handle_int(self) -> None:
+        """Shut the workers down at once; a terminal sends SIGINT to them as well."""
+        self.told = True
+        super().handle_int()
+
+    def init_processes(self) -> None:
+        """Start the workers."""
+        with _interrupt_pending():
+            super().init_processes()
+
+    def keep_subprocess_alive(self) -> None:
+        """Replace and log workers that have ended or do not respond."""
+        before = [*self.processes]
+        for process in before:
+            # The worker has a copy. While this one is open, a worker that ends before it answers a
+            # health check is replaced only after POSEFIELD_UNRESPONSIVE seconds.
+            process.child_conn.close()
+        with _interrupt_pending():
+            super().keep_subprocess_alive()
+            interrupted = signal.SIGINT in (*self.signal_queue, *signal.sigpending())
+        for old, new in zip(before, self.processes, strict=True):
+            if old is not new:
+                metrics.gone(old.pid or 0)
+                # Workers that SIGINT has ended are replaced until this process handles it, too.
+                if not interrupted:
+                    faults.warning("%s; process %d takes its place", _ending(old), new.pid)
+
+
+@contextmanager
+def _interrupt_pending() -> Iterator[None]:
+    """Block SIGINT here, and in processes started meanwhile until `worker_application` unblocks it.
+
+    A terminal also sends SIGINT to workers, and one that is still importing would end with a
+    traceback.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _ending(process: Process) -> str:
+    code = process.exitcode or 0
+    how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+    return f"worker process {process.pid} ended {how}"
+
+
+def processors(quota: Path) -> int:
+    """Return the number of processors for this process, by affinity and cgroup CPU quota.
+
+    quota: path of the file cpu.max.
+    """
+    allowed = len(os.sched_getaffinity(0))
+    try:
+        most, period = quota.read_text().split()
+        return max(1, min(allowed, math.ceil(int(most) / int(period))))
+    except (OSError, ValueError):
+        # The file is missing or has the quota "max".
+        return allowed
+
+
+def _listening(stack: ExitStack, host: str, port: int) -> list[socket.socket]:
+    """Return sockets that listen on each address of a host; port 0 takes a free port for all."""
+    sockets: list[socket.socket] = []
+    kind, passive = socket.SOCK_STREAM, socket.AI_PASSIVE
+    try:
+        for family, *_, where in socket.getaddrinfo(host or None, port, type=kind, flags=passive):
+            address = (where[0], port, *where[2:])
+            own = socket.create_server(address, family=family, backlog=BACKLOG)
+            sockets.append(stack.enter_context(own))
+            port = own.getsockname()[1]
+    except OSError as fault:
+        said = (fault.strerror or str(fault)).lower()
+        raise InvalidField("address", f"{host}:{port}: {said}") from fault
+    return sockets
+
+
+def _url(listener: socket.socket) -> str:
+    host, port = listener.getsockname()[:2]
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def _set_threads() -> None:
+    """Set one BLAS thread per worker, unless the environment sets a number of threads."""
+    if not ALONE.keys() & os.environ.keys():
+        os.environ.update(ALONE)
+
+
+def _raise_open_files() -> None:
+    """Raise the limit on open files, and so on connections, to the hard limit."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
+def _exit(number: int, frame: FrameType | None) -> NoReturn:
+    raise SystemExit(0)
+
+
+def limit_threads() -> None:
+    """Limit BLAS to one thread, unless the environment sets its number of threads.
+
+    Idle BLAS threads spin: with two threads a grid of sigma takes 1.5 to 8 times the CPU time
+    (decision 0027). The last bits of results depend on the number of threads, and worker processes
+    and exports have one.
+    """
+    if not ALONE.keys() & os.environ.keys():
+        threadpool_limits(1, user_api="blas")

@@ -1,0 +1,1 @@
+"""Models opened in onnxruntime, their levels of detail and their cost."""

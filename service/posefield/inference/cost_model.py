@@ -1,0 +1,59 @@
+"""Benchmark of the levels of detail: seconds per pose on this machine."""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.session import Session
+
+BATCH = 512
+"""Characters of a call, each at one time, as in a crowd."""
+ROUNDS = 7
+"""Rounds of the benchmark: few, as it runs whenever a model is opened."""
+
+
+def seconds_per_pose(session: Session) -> tuple[float, ...]:
+    """Return the seconds per pose of each level, in batches on one thread.
+
+    Each is the median of the rounds. The costs never increase from a level to the next coarser one,
+    since a finer level that is cheaper can be used instead.
+    """
+    return falling(in_turn([(session, level) for level in range(len(session.runtimes))], ROUNDS))
+
+
+def in_turn(asked: Sequence[tuple[Session, int]], rounds: int) -> Floats:
+    """Return the seconds per pose (N,) of levels of sessions: the median of the rounds.
+
+    rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
+    affects all of them.
+    """
+    calls = [(session, _question(session), level) for session, level in asked]
+    for call in calls:
+        _ask(*call)
+    taken = [[_ask(*call) for call in calls] for _ in range(rounds)]
+    # np.median imports masked arrays on first use, which takes longer than this measurement.
+    return np.sort(taken, axis=0)[rounds // 2] / BATCH
+
+
+def falling(costs: Floats) -> tuple[float, ...]:
+    """Return the costs (L,), each lowered to the minimum of itself and those before it."""
+    return tuple(np.minimum.accumulate(costs).tolist())
+
+
+def _question(session: Session) -> tuple[Floats, Floats, Floats]:
+    """Return controls (B, d) and times (B, 1), s, across the ranges, and zero labels (B, p)."""
+    card = session.card
+    low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
+    times = np.linspace(0.0, card.durations[0], BATCH)[:, None]
+    return np.linspace(low, high, BATCH), times, np.zeros((BATCH, len(card.performers)))
+
+
+def _ask(session: Session, question: tuple[Floats, Floats, Floats], level: int) -> float:
+    """Return the seconds of one call."""
+    controls, times, labels = question
+    start = time.perf_counter()
+    session.run(controls, times, *OUTPUTS, labels=labels, level=level)
+    return time.perf_counter() - start

@@ -1,0 +1,65 @@
+"""Inputs and outputs of a model's graph by name, and a check of the graph's answers."""
+
+from typing import Any
+
+import numpy as np
+
+from posefield.common.errors import ModelError
+from posefield.common.units import Floats
+from posefield.inference.onnx_runtime import first_line
+from posefield.model_file.model_card import ModelCard
+
+PERFORMER, LEVEL = "performer", "level"
+OUTPUTS = {
+    "rotations": 4,
+    "root_position": 3,
+    "bone_offsets": 3,
+    "duration": 1,
+    "sigma": 1,
+    "travel": 3,
+}
+
+
+def check(runtime: Any, card: ModelCard, source: str) -> None:
+    """Check the answers of an onnxruntime session at each level of detail.
+
+    Raises ModelError, which names `source`, where inputs or outputs do not fit the card.
+    """
+    for level in range(len(card.levels)):
+        _check_answer(runtime, card, source, level)
+
+
+def middle(card: ModelCard) -> Floats:
+    """Return the controls (1, d) at their defaults."""
+    return np.array([[control.default for control in card.controls]])
+
+
+def _check_answer(runtime: Any, card: ModelCard, source: str, level: int) -> None:
+    """Check poses at three times of two clips; two rows and three times reveal mixed-up axes."""
+    points = np.vstack([middle(card), card.examples[0]]).astype(np.float32)
+    times = np.tile(np.linspace(0.0, card.durations[0], 3, dtype=np.float32), (2, 1))
+    feed = {"controls": points, "time": times, LEVEL: np.array(level)}
+    if card.performers:
+        feed[PERFORMER] = np.eye(1, len(card.performers), dtype=np.float32)
+    try:
+        answers = dict(zip(OUTPUTS, runtime.run([*OUTPUTS], feed), strict=True))
+    except Exception as fault:  # onnxruntime's exceptions share no base of their own
+        raise ModelError(source, f"does not run: {first_line(fault)}") from fault
+    for name, shape in _shapes(len(points), times.shape[1], len(card.skeleton)).items():
+        if answers[name].shape != shape:
+            raise ModelError(source, f"{name} {answers[name].shape}, expected {shape}")
+        if not np.isfinite(answers[name]).all():
+            raise ModelError(source, f"its {name} are not finite numbers")
+    if not (answers["duration"] > 0.0).all():
+        raise ModelError(source, f"its duration is {answers['duration'].min()} s, expected above 0")
+
+
+def _shapes(rows: int, times: int, joints: int) -> dict[str, tuple[int, ...]]:
+    return {
+        "rotations": (rows, times, joints, 4),
+        "root_position": (rows, times, 3),
+        "bone_offsets": (rows, joints, 3),
+        "duration": (rows,),
+        "sigma": (rows,),
+        "travel": (rows, times, 3),
+    }

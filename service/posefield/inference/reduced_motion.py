@@ -1,0 +1,89 @@
+"""Reduced tensor of a model file, and poses of a reduced motion."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from posefield.common.units import Floats
+from posefield.model_file.level_of_detail import Level
+from posefield.motion import blend, quat
+
+Weights = Mapping[str, npt.NDArray[Any]]
+"""Constants of a model's graph by name."""
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Core and bases of one level of detail.
+
+    core: (r2, r1, r3), modes of time, degrees of freedom and samples. time: (T, r2). directions:
+    (r1, D) and mean: (D,), pose vectors of the root's position and a rotation vector for each joint
+    about its mean rotation. rotations: mean rotations (J, 4).
+    """
+
+    core: Floats
+    time: Floats
+    directions: Floats
+    mean: Floats
+    rotations: Floats
+
+    @property
+    def frames(self) -> int:
+        """Number of canonical frames T."""
+        return len(self.time)
+
+    def motion(self, coefficients: Floats) -> Floats:
+        """Return the reduced motion (r2, r1) of sample coefficients (r3,)."""
+        return self.core @ coefficients
+
+    def row(self, place: float) -> Floats:
+        """Return the time coefficients (r2,) at a canonical frame, interpolated linearly."""
+        before = min(int(place), self.frames - 2)
+        share = place - before
+        found: Floats = (1.0 - share) * self.time[before] + share * self.time[before + 1]
+        return found
+
+    def rows(self, places: Floats) -> Floats:
+        """Return the time coefficients (S, r2) at canonical frames (S,)."""
+        return blend.between(self.time, places)
+
+    def poses(self, motion: Floats, places: Floats) -> tuple[Floats, Floats]:
+        """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
+        numbers = self.mean + self.rows(places) @ motion @ self.directions
+        vectors = numbers[:, 3:].reshape(len(places), -1, 3)
+        return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
+
+
+def read(weights: Weights, level: Level) -> Reduced:
+    """Return the reduced tensor of a level; KeyError for a missing constant."""
+    r1, r2, r3 = level.ranks
+    rotations = weights["mean_rotations"][:, :, 0].astype(np.float64)
+    moves = np.zeros((1 + len(rotations), 1))
+    moves[[0, *(1 + joint for joint in level.joints)]] = 1.0
+    directions = _directions(weights)[:, :r1] * np.repeat(moves, 3, axis=0)
+    return Reduced(
+        weights["core"][:r2, :r1, :r3].astype(np.float64),
+        weights["time_basis"][:r2].T.astype(np.float64),
+        directions.T.copy(),
+        np.concatenate([weights["root_mean"], _mean_vectors(weights, rotations).ravel()]),
+        rotations,
+    )
+
+
+def _directions(weights: Weights) -> Floats:
+    """Return the directions (D, r1), with zeros for degrees of freedom that never vary."""
+    stored = weights["directions"]
+    whole = np.vstack([stored, np.zeros((1, stored.shape[1]))])
+    found: Floats = whole[weights["freedoms"]].astype(np.float64)
+    return found
+
+
+def _mean_vectors(weights: Weights, rotations: Floats) -> Floats:
+    """Return the mean rotation vectors (J, 3); the graph stores mean rotation · vector / 2."""
+    turned = weights["rotation_mean"].reshape(-1, 4).astype(np.float64)
+    if "joint_order" in weights:
+        turned = turned[np.argsort(weights["joint_order"])]
+    return 2.0 * quat.mul(quat.conj(rotations), turned)[:, 1:]

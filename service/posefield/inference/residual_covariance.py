@@ -1,0 +1,118 @@
+"""Covariance of the residuals of captured motions: the metric of a correction.
+
+The residuals are standardised leave-one-out errors of the captured clips. For a Gaussian
+conditioned on a target, the least change in this metric is the most probable one. Few residuals
+leave most directions undetermined, so the covariance is shrunk towards the Kronecker product of its
+marginals over time and degrees of freedom, which keeps corrections smooth in time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices
+from posefield.inference.reduced_motion import Reduced, Weights
+from posefield.kriging import kriging_model, leave_one_out
+from posefield.model_file.model_card import ModelCard
+
+# Weight of the marginals. On real motion, weights from 0.3 to 1 are equally accurate; smaller ones
+# are less smooth.
+SHRUNK = 0.7
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Covariance of a reduced motion (r2, r1) and of the variables beside it.
+
+    All for a sigma of one metre. residuals: (r2 r1, r3), a root of the covariance of residuals.
+    time: (r2, r2) and freedoms: (r1, r1), its marginals, their product scaled to its trace. beside:
+    (b, b), covariance of the logarithm of the duration and of a cycle's travel; empty for motions
+    without cycles. captured: (n, r2 r1), reduced motions of the captured clips. predicted: (n, r2
+    r1), their leave-one-out predictions. sigmas: (n,), standard deviations of the predictions, m,
+    times the root of n.
+    """
+
+    residuals: Floats
+    time: Floats
+    freedoms: Floats
+    beside: Floats
+    captured: Floats
+    predicted: Floats
+    sigmas: Floats
+
+    def shrunk(self, gradients: Floats) -> Floats:
+        """Return the shrunk covariance times gradients (k, r2 r1 + b): (r2 r1 + b, k)."""
+        inner = gradients[:, : len(self.residuals)]
+        r2, r1 = len(self.time), len(self.freedoms)
+        blocks = self.time @ inner.reshape(-1, r2, r1) @ self.freedoms
+        even = blocks.reshape(len(gradients), -1)
+        own = (inner @ self.residuals) @ self.residuals.T
+        both = SHRUNK * even + (1.0 - SHRUNK) * own
+        return np.hstack([both, gradients[:, len(self.residuals) :] @ self.beside]).T
+
+
+def of(card: ModelCard, weights: Weights, samples: Floats, reduced: Reduced) -> Spread:
+    """Return the covariance for a model's level.
+
+    samples: (n, d + p), points of the captured clips. Their coefficients are recovered from the
+    dual weights: the kriging system times the weights gives the samples.
+    """
+    hyper = card.kriging
+    left_out = leave_one_out.leave_out(hyper, samples, groups(card, samples))
+    variances = leave_one_out.left_out_variances(hyper, samples, left_out)
+    sill = np.mean(np.square(card.left_out) / variances)
+    r3 = reduced.core.shape[2]
+    held = coefficients(card, weights, samples)[:, :r3]
+    missed = left_out @ held
+    sigmas = np.sqrt(sill * variances * len(samples))
+    # Standardised residuals, of a kriging model whose sill is one square metre.
+    strays = missed / sigmas[:, None]
+    root = np.linalg.cholesky(strays.T @ strays + 1e-12 * np.eye(r3))
+    spread = reduced.core @ root
+    time = np.einsum("tdk,sdk->ts", spread, spread)
+    freedoms = np.einsum("tdk,tek->de", spread, spread)
+    own = np.array(card.beside, dtype=float).reshape(len(card.beside), len(card.beside))
+    marginals = time / np.trace(time), freedoms
+    flat = reduced.core.reshape(-1, r3).T
+    motions = held @ flat, (held - missed) @ flat
+    return Spread(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
+
+
+def coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
+    """Return the sample coefficients (n, r3) of the captured clips, in the card's order."""
+    hyper = card.kriging
+    r3 = weights["core"].shape[2]
+    order = order_of(card, weights, samples)
+    held = samples[order]
+    dual = weights["pose_weights"].astype(np.float64)
+    trend = weights["drift_weights"][:, -r3:].astype(np.float64)
+    functions = kriging_model.drift(held, len(card.controls), 1)
+    found = np.empty((len(samples), r3))
+    found[order] = kriging_model.noisy(hyper, held) @ dual + functions @ trend
+    return found
+
+
+def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
+    """Return the index on the card (n,) of each sample, in the file's order of importance."""
+    held = weights["samples"][0].T
+    listed = samples[:, : len(card.controls)].astype(np.float32)
+    whose = weights["whose"] if card.performers else np.zeros(len(held), dtype=np.int64)
+    moved = np.array(card.moved_by or [0] * len(listed))
+    place = np.empty(len(held), dtype=np.int64)
+    place[np.lexsort((*held.T, whose))] = np.lexsort((*listed.T, moved))
+    return place
+
+
+def groups(card: ModelCard, samples: Floats) -> Indices:
+    """Return indices (n,) of the groups of captured clips that are left out together.
+
+    Clips of one file form a group; each clip is a group of its own if the other groups could not
+    determine the drift.
+    """
+    hyper = card.kriging
+    files = [source.partition(", frames ")[0] for source in card.sources]
+    takes = np.unique(files, return_inverse=True)[1]
+    functions = kriging_model.drift(samples, len(card.controls), max(hyper.drifts))
+    if kriging_model.needed(takes, functions) is not None:
+        return np.arange(len(samples))
+    return np.asarray(takes, dtype=np.int64)

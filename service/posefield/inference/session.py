@@ -1,0 +1,187 @@
+"""A checked model file opened in onnxruntime."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from dataclasses import field as field_of
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefield.common.units import Floats, Singles
+from posefield.inference import graph_ports, onnx_runtime
+from posefield.inference.graph_ports import OUTPUTS, PERFORMER
+from posefield.inference.onnx_runtime import Runtimes
+from posefield.inference.trial_process import LIMITS, Limits
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Weigher
+from posefield.model_file import checked_file, subgraph
+from posefield.model_file.model_card import ModelCard
+
+# Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
+# with weights.
+OWN_MEMORY, COPIES = 2 << 20, 12
+
+
+@dataclass(frozen=True)
+class State:
+    """Intermediate values of the graph from which the poses of one question are computed.
+
+    coefficients: sample coefficients (r3,). frames: canonical frames (S,) of the question's times.
+    way: travel (3,) of a cycle. bones: bone offsets (J, 3), m. duration: s. sigma: m.
+    """
+
+    coefficients: Floats
+    frames: Floats
+    way: Floats
+    bones: Floats
+    duration: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Session:
+    """An open model.
+
+    card: its metadata. digest: identifies the file's bytes. runtimes: onnxruntime sessions, one for
+    each level of detail. clocks: sessions that compute only the duration. gauges: the session that
+    computes only sigma, at the finest level. states: sessions that compute a State. size: of the
+    file, bytes. content: the file. golden: the answer at the default controls.
+    """
+
+    card: ModelCard
+    digest: str
+    runtimes: Sequence[Any]
+    clocks: Sequence[Any]
+    gauges: Sequence[Any]
+    size: int
+    states: Sequence[Any] = ()
+    content: bytes = field_of(default=b"", repr=False)
+    golden: bytes = b""
+
+    def run(
+        self,
+        controls: Floats | Singles,
+        time: Floats | Singles,
+        *outputs: str,
+        labels: Floats | Singles | None = None,
+        level: int = 0,
+    ) -> list[Any]:
+        """Return the graph's outputs, in their order, for controls (B, d) and times (B, S).
+
+        labels (B or 1, p): performers; an unseen performer if None. level: level of detail.
+        """
+        feed = self._feed(controls, labels)
+        feed["time"] = time.astype(np.float32, copy=False)
+        answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
+        return answers
+
+    def durations(
+        self, controls: Floats | Singles, labels: Floats | Singles | None = None, level: int = 0
+    ) -> Singles:
+        """Return the durations (B,), s, of `run`, in a quarter of its time."""
+        answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
+        return answers[0]
+
+    def state(
+        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+    ) -> State:
+        """Return the intermediate values for one question: controls (1, d), times (S,)."""
+        feed = self._feed(controls, labels)
+        feed["time"] = time[None].astype(np.float32, copy=False)
+        found = self.states[level].run(list(self._parts), feed)
+        coefficients, frames, bones, durations, sigmas, *ways = (a.astype(float) for a in found)
+        way = ways[0][0] if ways else np.zeros(3)
+        numbers = float(durations[0]), float(sigmas[0])
+        return State(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
+
+    @property
+    def _parts(self) -> tuple[str, ...]:
+        return parts(self.card)
+
+    def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
+        """Return the sigmas (B,), m, of `run` at level 0, in half of its time."""
+        answers: list[Singles] = self.gauges[0].run(["sigma"], self._feed(controls, labels))
+        return answers[0]
+
+    @cached_property
+    def weigher(self) -> Weigher:
+        """Kriging weights of the captured clips."""
+        own = self.card
+        low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
+        points = kriging_model.half_ranges(np.array(own.examples), low, high)
+        return Weigher(own.kriging, np.hstack([points, own.labels]))
+
+    @property
+    def memory(self) -> int:
+        """Estimated memory in bytes with all levels open."""
+        return OWN_MEMORY + COPIES * self.size
+
+    def trial(self) -> bytes:
+        """Return the answer at the default controls; equals `golden` for a sound model."""
+        answers = self.run(graph_ports.middle(self.card), np.zeros((1, 1)), *OUTPUTS)
+        return b"".join(
+            answer.tobytes() for answer in (*answers, self.durations(graph_ports.middle(self.card)))
+        )
+
+    def _feed(
+        self, controls: Floats | Singles, labels: Floats | Singles | None
+    ) -> dict[str, Singles]:
+        feed = {"controls": controls.astype(np.float32, copy=False)}
+        if labels is not None and self.card.performers:
+            feed[PERFORMER] = labels.astype(np.float32, copy=False)
+        return feed
+
+
+def parts(card: ModelCard) -> tuple[str, ...]:
+    """Return the names of the graph's values that a State holds."""
+    own = ("coefficients", "frame", "bone_offsets", "duration", "sigma")
+    return (*own, "way") if card.cyclic else own
+
+
+def load(path: Path) -> Session:
+    """Return a session on a model file; ModelError if it cannot be served."""
+    return load_bytes(checked_file.read(path), str(path))
+
+
+def load_bytes(content: bytes, source: str, limits: Limits = LIMITS) -> Session:
+    """Return a session on untrusted bytes, which a child process opens first.
+
+    source: path or URL for messages. Raises ModelError for a file that cannot be served.
+    """
+    limits.check(content, source)
+    return of(content, checked_file.checked(content, source), source)
+
+
+def open_bytes(content: bytes, source: str) -> Session:
+    """Return a session on bytes that this program wrote, checked without a child process."""
+    card = checked_file.checked(content, source)
+    graph_ports.check(onnx_runtime.start(content, source), card, source)
+    return of(content, card, source)
+
+
+def of(content: bytes, card: ModelCard, source: str) -> Session:
+    """Return a session on a checked file, with the finest level and its clock open."""
+
+    def whole(level: int) -> Any:
+        return onnx_runtime.start(subgraph.at_level(content, level), source)
+
+    def telling(*outputs: str) -> Callable[[int], Any]:
+        return lambda level: onnx_runtime.start(
+            subgraph.for_outputs(subgraph.at_level(content, level), *outputs), source
+        )
+
+    count = len(card.levels)
+    session = Session(
+        card,
+        checked_file.digest(content),
+        runtimes=Runtimes(whole, count),
+        clocks=Runtimes(telling("duration"), count),
+        gauges=Runtimes(telling("sigma"), 1),
+        size=len(content),
+        states=Runtimes(telling(*parts(card)), count),
+        content=content,
+    )
+    # The trial runs the finest level and its clock, which opens them.
+    return replace(session, golden=session.trial())

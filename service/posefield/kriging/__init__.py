@@ -1,0 +1,1 @@
+"""Kriging in NumPy: covariances, predictions, leave-one-out errors and support."""

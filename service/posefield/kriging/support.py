@@ -1,0 +1,152 @@
+"""Support of a query: whether clips with similar controls were captured.
+
+Sigma extrapolates linear trends confidently, far beyond the clips and between clusters of them.
+Support depends on the controls of the captured clips alone, not on the motion: on the distance of a
+query beyond the range of each control, and on the kriging variance of a field over the controls
+with a fixed Gaussian covariance, which detects gaps.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posefield.common import cancellation
+from posefield.common.units import Floats, Singles, Truths
+from posefield.kriging.kriging_model import half_ranges
+
+BEYOND = 0.1
+"""Share of a control's range by which a supported query may lie beyond it."""
+QUANTILE = 0.95
+"""Share of the captured clips whose leave-one-out variance is within the limit."""
+# The field: standard deviation of its Gaussian covariance in half-ranges, and its nugget in sills.
+SCALE, NUGGET = 1.0, 0.05
+RATE = 0.5 / SCALE**2
+# Largest error of a variance in single precision; nearer to the limit it is computed in double.
+DOUBT = 1e-3
+# Rows whose intermediate arrays fit the cache of a core.
+BATCH = 512
+
+
+@dataclass(frozen=True)
+class Support:
+    """Captured samples and their range; points are in the controls' own units.
+
+    low, high (d,): range of the samples. samples (n, d): in half-ranges.
+    """
+
+    low: Floats
+    high: Floats
+    samples: Floats
+
+    def beyond(self, points: Floats) -> Floats:
+        """Return how far points lie beyond the range of each control (B, d), as shares of it."""
+        return np.maximum(0.5 * (np.abs(self.scaled(points)) - 1.0), 0.0)
+
+    def variance(self, points: Floats) -> Floats:
+        """Return the kriging variance (B,) at points (B, d), from 0 to 1.
+
+        Near 0 among dense samples and near 1 far from all samples.
+        """
+        near = covariances(self.scaled(points), self.samples)
+        return 1.0 - np.sum(near @ self._inverse * near, axis=1)
+
+    def holds(self, points: Floats) -> Truths:
+        """Return whether each of the points (B, d) is supported, as (B,)."""
+        low, high = np.transpose(self._box)
+        inside = ((low <= points) & (points <= high)).all(axis=1)
+        found = np.zeros(len(points), dtype=bool)
+        own = points[inside]
+        room = self.limit - self._roughly(own)
+        close = np.abs(room) < DOUBT
+        room[close] = self.limit - self.variance(own[close])
+        found[inside] = room >= 0.0
+        return found
+
+    def held(self, point: Sequence[float]) -> bool:
+        """Return whether a point (d,) is supported: `holds` for a single point."""
+        if not all(a <= x <= b for x, (a, b) in zip(point, self._box, strict=True)):
+            return False
+        slopes, offsets = self._exponents
+        near = np.exp(slopes @ np.array(point) + offsets)
+        squared = sum((x * f - o) ** 2 for x, (f, o) in zip(point, self._scale, strict=True))
+        explained = math.exp(-2.0 * RATE * squared) * float(near @ (self._inverse @ near))
+        return 1.0 - explained <= self.limit
+
+    @cached_property
+    def left_out(self) -> Floats:
+        """Return the kriging variance (n,) at each sample, computed without it."""
+        return 1.0 / np.diagonal(self._inverse) - NUGGET
+
+    @cached_property
+    def limit(self) -> float:
+        """Return the largest variance at which a point is supported."""
+        return float(np.quantile(self.left_out, QUANTILE))
+
+    @cached_property
+    def _inverse(self) -> Floats:
+        own = covariances(self.samples, self.samples) + NUGGET * np.eye(len(self.samples))
+        return np.asarray(np.linalg.inv(own))
+
+    @cached_property
+    def _box(self) -> list[tuple[float, float]]:
+        room = BEYOND * (self.high - self.low)
+        return list(zip((self.low - room).tolist(), (self.high + room).tolist(), strict=True))
+
+    @cached_property
+    def _scale(self) -> list[tuple[float, float]]:
+        """Return the factor and the offset of each control that scale it to half-ranges."""
+        width = self.high - self.low
+        ends = (2.0 / width).tolist(), ((self.low + self.high) / width).tolist()
+        return list(zip(*ends, strict=True))
+
+    @cached_property
+    def _exponents(self) -> tuple[Floats, Floats]:
+        """Return slopes (n, d) and offsets (n,) of the log covariance between samples and a point.
+
+        The term of the point's own square is left out: `held` multiplies by it once.
+        """
+        factors, offsets = np.transpose(self._scale)
+        slopes = 2.0 * RATE * self.samples
+        own = RATE * np.sum(np.square(self.samples), axis=1)
+        return slopes * factors, -slopes @ offsets - own
+
+    @cached_property
+    def _single(self) -> tuple[Singles, Singles, Singles]:
+        """Return in float32 `_exponents` for half-ranges, (d, n) and (n,), and the inverse."""
+        own = RATE * np.sum(np.square(self.samples), axis=1)
+        parts = (2.0 * RATE * self.samples.T, -own, self._inverse)
+        slopes, offsets, inverse = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
+        return slopes, offsets, inverse
+
+    def _roughly(self, points: Floats) -> Floats:
+        """Return `variance` (B,) in single precision, for points near the range."""
+        slopes, offsets, inverse = self._single
+        scaled = self.scaled(points).astype(np.float32)
+        found = np.empty(len(points))
+        for rows in (slice(at, at + BATCH) for at in range(0, len(points), BATCH)):
+            cancellation.check()
+            own = scaled[rows]
+            near = own @ slopes
+            near += offsets - np.float32(RATE) * np.sum(np.square(own), axis=1)[:, None]
+            np.exp(near, out=near)
+            found[rows] = 1.0 - np.einsum("bi,bi->b", near @ inverse, near)
+        return found
+
+    def scaled(self, points: Floats) -> Floats:
+        """Return points (B, d) in half-ranges."""
+        return half_ranges(points, self.low, self.high)
+
+
+def of(controls: Floats) -> Support:
+    """Return the support of captured clips' controls (n, d); each control must vary."""
+    low, high = controls.min(axis=0), controls.max(axis=0)
+    return Support(low, high, half_ranges(controls, low, high))
+
+
+def covariances(a: Floats, b: Floats) -> Floats:
+    """Return the covariances (A, B) between points (A, d) and (B, d) in half-ranges."""
+    gaps = a[:, None] - b
+    return np.asarray(np.exp(-RATE * np.sum(np.square(gaps), axis=-1)))

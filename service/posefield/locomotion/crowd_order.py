@@ -1,0 +1,112 @@
+"""Order of a walking crowd: validated parameters, and the crowd they result in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.inference.level_selection import Camera
+from posefield.inference.named_model import NamedModel
+from posefield.locomotion import level_transitions, random_paths, walking_crowd
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.level_transitions import Detail
+from posefield.locomotion.locomotion_plan import Plan
+from posefield.locomotion.routes import Route
+from posefield.motion.crowd_clip import CrowdClip
+from posefield.question.walk_question import FOV, HEIGHT, WalkQuestion
+
+MOST = 1_000_000
+"""Largest number of characters of one crowd, which may share motions."""
+FPS, PIXELS = 30.0, 1.0
+
+
+@dataclass(frozen=True)
+class Order:
+    """Parameters of a walking crowd.
+
+    count: characters, each on its own path; with routes, their number. routes: given routes.
+    motions: number of distinct motions that the characters share, None for one each. seconds:
+    duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
+    if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
+    """
+
+    count: int
+    routes: Sequence[Route] = ()
+    motions: int | None = None
+    seconds: float = 10.0
+    fps: float = FPS
+    seed: int = 0
+    level: int | None = None
+    camera: Camera | None = None
+    pixels: float = PIXELS
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= MOST:
+            raise InvalidField("count", f"{self.count}, expected 1 to {MOST} characters")
+        if self.level is not None and self.camera is not None:
+            raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
+        if self.motions is not None and not 1 <= self.motions <= self.count:
+            raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
+        if self.motions is not None and self.routes:
+            raise InvalidField("motions", f"{self.motions}, expected none: every route has its own")
+        if self.motions is not None and self.camera is not None:
+            raise InvalidField(
+                "motions", "shared by characters near and far, expected a level and no camera"
+            )
+        if not self.pixels >= 0.0:
+            raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
+
+
+def of(asked: WalkQuestion, routes: Sequence[Route] = ()) -> Order:
+    """Return the order of a question; its characters follow the routes if there are any."""
+    camera = None
+    if asked.camera is not None:
+        fov = FOV if asked.fov is None else asked.fov
+        height = HEIGHT if asked.height is None else asked.height
+        camera = Camera(np.array(asked.camera), fov, height)
+    return Order(
+        count=asked.count,
+        routes=routes,
+        motions=asked.motions,
+        seconds=asked.seconds,
+        fps=asked.fps,
+        seed=asked.seed,
+        level=asked.level,
+        camera=camera,
+        pixels=PIXELS if asked.pixels is None else asked.pixels,
+    )
+
+
+def crowd(model: NamedModel, gait: Gait, order: Order) -> CrowdClip:
+    """Return the crowd of an order, whose motions are computed on demand.
+
+    Raises InvalidField for parameters that the model or the limits do not permit.
+    """
+    plan = _plan(gait, order)
+    return _crowd(gait, plan, _detail(model, plan, order), order)
+
+
+def _crowd(gait: Gait, plan: Plan, shown: Detail, order: Order) -> CrowdClip:
+    if order.motions is None:
+        return walking_crowd.crowd(gait.session, plan, shown)
+    return walking_crowd.sharing(
+        gait.session, plan, shown, random_paths.stands(order.count, order.seed)
+    )
+
+
+def _plan(gait: Gait, order: Order) -> Plan:
+    span = order.seconds, order.fps, order.seed
+    if order.routes:
+        return walking_crowd.following(gait, order.routes, *span)
+    return walking_crowd.wandering(gait, order.motions or order.count, *span)
+
+
+def _detail(model: NamedModel, plan: Plan, order: Order) -> Detail:
+    level, coarsest = order.level or 0, len(model.session.card.levels) - 1
+    if not 0 <= level <= coarsest:
+        raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
+    if order.camera is None:
+        return level_transitions.constant(level, plan.phases.shape)
+    scale = level_transitions.scale(order.camera, plan.roots + model.middle, model.radius)
+    return level_transitions.seen(model.ladder, scale, order.pixels, order.fps)

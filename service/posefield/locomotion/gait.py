@@ -1,0 +1,108 @@
+"""Gait of a cyclic model: controls for speeds and rates of turning.
+
+Names and units of controls are the recipe's, so their effect is measured on the model's own clips:
+speed and rate of turning.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats, Indices
+from posefield.inference.session import Session
+from posefield.locomotion import gait_region, stride
+from posefield.locomotion.gait_region import Region
+
+# A lower speed does not count as travel, and speeds closer than this count as equal, m/s.
+STILL = 0.05
+# Iterations that correct the requested rates by the resulting ones.
+ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Gait:
+    """Relation between the controls of a model and the rates at which it walks.
+
+    rates: (N, 2), speed, m/s, and rate of turning, rad/s, of each captured clip as the model
+    synthesises it. slopes: (3, d), regression of controls on 1 and rates. manners: (p + 1, d), mean
+    residual of each performer; zeros at the end, for an unseen performer. region: convex hull of
+    the rates, extended by walking straight at all speeds.
+    """
+
+    session: Session
+    rates: Floats
+    slopes: Floats
+    manners: Floats
+    region: Region
+
+    def typical(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
+        """Return the conditional mean of the controls (K, d) at given rates.
+
+        speeds: (K,), m/s. turning: (K,), rad/s. who: performers (K,) by index on the card, -1 for
+        an unseen performer. The mean is a linear regression over the captured clips, which also
+        determines controls that do not affect speed or turning, such as the stride length.
+        """
+        return _design(speeds, turning) @ self.slopes + self.manners[who]
+
+    def controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
+        """Return the controls (K, d), along the regression, that lead to these rates."""
+        labels = stride.PerformerLabels(self.session, who)
+        speed, turn = speeds, turning
+        for _ in range(ROUNDS):
+            done = stride.strides(self.session, self.typical(speed, turn, who), labels)
+            speed, turn = speed + speeds - done.speeds, turn + turning - done.turning
+        return self.typical(speed, turn, who)
+
+
+def of(session: Session) -> Gait:
+    """Return the gait of a model.
+
+    Raises InvalidField if it is not cyclic, stays in place or has one speed.
+    """
+    card = session.card
+    if not card.cyclic:
+        raise InvalidField("model", f"{card.name} is no cycle, expected one that can be repeated")
+    if card.root != "travelling":
+        raise InvalidField("model", f"{card.name} stays in place, expected one that travels")
+    controls = np.array(card.examples)
+    who = stride.movers(card)
+    own = stride.strides(session, controls, stride.labels(session, who))
+    rates = np.column_stack([own.speeds, own.turning])
+    _refuse_one_speed(card.name, rates[:, 0])
+    slopes = np.linalg.lstsq(_design(*rates.T), controls, rcond=None)[0]
+    manners = mean_residuals(controls - _design(*rates.T) @ slopes, who, len(card.performers))
+    return Gait(session, rates, slopes, manners, gait_region.hull(_with_straight(rates)))
+
+
+def _refuse_one_speed(name: str, speeds: Floats) -> None:
+    low, high = speeds.min(), speeds.max()
+    if low < STILL or high - low < STILL:
+        raise InvalidField(
+            "model",
+            f"{name} goes {low:.3f} to {high:.3f} m/s, expected one that travels at several speeds",
+        )
+
+
+def _with_straight(rates: Floats) -> Floats:
+    """Return the rates with straight walking added at the slowest and the fastest speed.
+
+    A stride cut from a straight walk turns by a few degrees, which is no lower bound of the
+    turning.
+    """
+    ends = np.array([rates[:, 0].min(), rates[:, 0].max()])
+    return np.vstack([rates, np.column_stack([ends, np.zeros(2)])])
+
+
+def _design(speeds: Floats, turning: Floats) -> Floats:
+    return np.column_stack([np.ones(len(speeds)), speeds, turning])
+
+
+def mean_residuals(residuals: Floats, who: Indices, performers: int) -> Floats:
+    """Return the mean residuals (p + 1, d) of performers, with zeros at the end.
+
+    Each mean is shrunk by one additional clip with a residual of zero.
+    """
+    theirs = np.arange(performers)[:, None] == who
+    means = theirs @ residuals / (theirs.sum(axis=1, keepdims=True) + 1.0)
+    return np.vstack([means, np.zeros(residuals.shape[1])])

@@ -1,0 +1,57 @@
+"""Paths on the floor that characters follow, with speeds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import Plane
+
+# Distance between known points of a path, m. Heading is linear between them.
+STEP = 0.1
+
+
+@dataclass(frozen=True)
+class Paths:
+    """N paths, each known at K points that lie STEP apart along it.
+
+    starts: (N,), first points. headings: (N, K), rad, of the tangents, without jumps; between two
+    points a path is an arc. speeds: (N, K), m/s. lengths: (N,), m.
+    """
+
+    starts: Plane
+    headings: Floats
+    speeds: Floats
+    lengths: Floats
+
+    @property
+    def bends(self) -> Floats:
+        """Curvature (N, K), 1/m, positive to the left."""
+        return np.gradient(self.headings, STEP, axis=1)
+
+    @property
+    def places(self) -> Plane:
+        """Known points of the paths (N, K)."""
+        turns = np.diff(self.headings, axis=1)
+        steps = floor_plane.facing(self.headings[:, :-1]) * floor_plane.arc(np.array(STEP), turns)
+        return self.starts[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
+
+    def at(self, gone: Floats) -> tuple[Plane, Floats]:
+        """Return points (N, F) and headings (N, F), rad, of the tangents after (N, F) metres."""
+        before, share = self._between(gone)
+        turns = share * np.take_along_axis(np.diff(self.headings, axis=1), before, axis=1)
+        first = np.take_along_axis(self.headings, before, axis=1)
+        along = floor_plane.facing(first) * floor_plane.arc(STEP * share, turns)
+        return np.take_along_axis(self.places, before, axis=1) + along, first + turns
+
+    def along(self, values: Floats, gone: Floats) -> Floats:
+        """Return values (N, K, ...) of the known points after (N, F) metres: (N, F, ...)."""
+        before, share = self._between(gone)
+        rows = np.arange(len(values))[:, None]
+        share = share.reshape(*share.shape, *[1] * (values.ndim - 2))
+        return (1.0 - share) * values[rows, before] + share * values[rows, before + 1]
+
+    def _between(self, gone: Floats) -> tuple[Indices, Floats]:
+        before = np.minimum((gone / STEP).astype(np.int64), self.headings.shape[1] - 2)
+        return before, gone / STEP - before

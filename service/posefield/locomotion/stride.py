@@ -1,0 +1,174 @@
+"""One cycle of a model: its duration and travel, and poses relative to the travel.
+
+A cycle moves a character along an arc: at constant speed and direction in its own axes, while its
+heading turns evenly. Poses are given in a frame that moves along that arc evenly in time. In that
+frame the last pose of a cycle equals its first, and the sway about the arc is part of the pose.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common import cancellation
+from posefield.common.units import Floats, Indices, Singles
+from posefield.inference.session import Session
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import Plane
+from posefield.model_file.model_card import ModelCard
+
+# For larger batches onnxruntime's buffers outgrow the caches, and a pose costs up to eight times as
+# much.
+BATCH = 1000
+# A time after the end of every clip, s; the graph limits times to the end.
+AFTER = 1e9
+
+
+@dataclass(frozen=True)
+class Strides:
+    """One cycle each of B characters.
+
+    durations: (B,), s. ways: (B,), travel along the arc, m, in the character's own axes. turns:
+    (B,), change of heading, rad. starts: (B,), root positions at the beginning.
+    """
+
+    durations: Floats
+    ways: Plane
+    turns: Floats
+    starts: Plane
+
+    @property
+    def speeds(self) -> Floats:
+        """Speed (B,) along the arc, m/s."""
+        return np.abs(self.ways) / self.durations
+
+    @property
+    def turning(self) -> Floats:
+        """Rate of turning (B,) to the left, rad/s."""
+        return self.turns / self.durations
+
+    @property
+    def drifts(self) -> Floats:
+        """Direction of travel (B,) relative to the heading, positive to the left, rad."""
+        return np.angle(self.ways)
+
+
+@dataclass(frozen=True)
+class PerformerLabels:
+    """Labels (B, p) of performers (B,), computed for the requested rows.
+
+    who: performers by index on the card, -1 for an unseen one. All rows at once would take more
+    memory than the rest of a plan.
+    """
+
+    session: Session
+    who: Indices
+
+    def __getitem__(self, rows: slice) -> Floats:
+        return labels(self.session, self.who[rows])
+
+
+@dataclass(frozen=True)
+class Poses:
+    """K poses in frames that travel with the characters.
+
+    rotations: (K, J, 4). heights: (K,), of the root, m. places: (K,), of the root over the floor.
+    """
+
+    rotations: Floats
+    heights: Floats
+    places: Plane
+
+
+def strides(
+    session: Session, controls: Floats, labels: Floats | PerformerLabels, level: int = 0
+) -> Strides:
+    """Return the cycles of controls (B, d) for performer labels (B, p), at a level of detail."""
+    ends = np.full((len(controls), 1), AFTER)
+    asked = ("duration", "travel", "root_position")
+    durations, travel, roots = _ask(session, controls, ends, labels, level, *asked)
+    gap, turns = travel[:, 0, 1] + 1j * travel[:, 0, 0], travel[:, 0, 2]
+    # A cycle without its travel ends at its start.
+    starts = floor_plane.of(roots[:, 0]) - gap
+    return Strides(durations, floor_plane.straightened(gap, turns), turns, starts)
+
+
+def straight(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
+    """Return the straight line from first to last pose of clips that are not cyclic."""
+    times = np.tile([0.0, AFTER], (len(controls), 1))
+    asked = ("duration", "root_position")
+    durations, roots = _ask(session, controls, times, labels, level, *asked)
+    begin, end = floor_plane.of(roots).T
+    return Strides(durations, end - begin, np.zeros(len(begin)), begin)
+
+
+def poses(
+    session: Session, controls: Floats, labels: Floats, phases: Floats, level: int = 0
+) -> Poses:
+    """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
+    own = strides(session, controls, labels, level)
+    times = (phases * own.durations)[:, None]
+    asked = ("rotations", "root_position")
+    rotations, roots = _ask(session, controls, times, labels, level, *asked)
+    return beside(own, phases, rotations[:, 0], roots[:, 0])
+
+
+def beside(own: Strides, phases: Floats, rotations: Floats, roots: Floats) -> Poses:
+    """Return poses relative to the travel, at phases (K,) of the cycle.
+
+    own: K strides, or one for all. rotations: (K, J, 4) and roots: (K, 3), m, of the poses.
+    """
+    turned = phases * own.turns
+    gone = floor_plane.of(roots) - own.starts - floor_plane.arc(phases * own.ways, turned)
+    return Poses(
+        floor_plane.turned(rotations, -turned), roots[:, 1], gone * floor_plane.facing(-turned)
+    )
+
+
+def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
+    """Return the bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
+    begin = np.zeros((len(controls), 1))
+    return _ask(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
+
+
+def movers(card: ModelCard) -> Indices:
+    """Return the performers (N,) of the captured clips by index on the card; -1 without any."""
+    return np.array(card.moved_by or [-1] * len(card.examples))
+
+
+def labels(session: Session, who: Indices) -> Floats:
+    """Return the labels (..., p) of performers by index on the card; all zero for -1."""
+    performers = len(session.card.performers)
+    return np.vstack([np.eye(performers), np.zeros(performers)])[who]
+
+
+def _ask(
+    session: Session,
+    controls: Floats,
+    times: Floats,
+    labels: Floats | PerformerLabels,
+    level: int,
+    *outputs: str,
+) -> list[Floats]:
+    """Return the graph's outputs for any number of rows, computed in batches."""
+    found: list[Floats] = []
+    for rows in _batches(len(controls)):
+        cancellation.check()
+        own = controls[rows], times[rows]
+        parts = session.run(*own, *outputs, labels=labels[rows], level=level)
+        if not found:
+            found = [np.empty((len(controls), *part.shape[1:])) for part in parts]
+        # Copied, not kept: small blocks between onnxruntime's large ones would prevent the
+        # allocator from reusing those, and memory would grow with each batch.
+        for whole, part in zip(found, parts, strict=True):
+            whole[rows] = part
+    return found
+
+
+def _batches(rows: int) -> Iterator[slice]:
+    first = 0
+    while first < rows:
+        # A matrix product with one row sums in another order, so no batch of several has one row.
+        count = BATCH - 1 if rows - first == BATCH + 1 else BATCH
+        yield slice(first, first + count)
+        first += count

@@ -1,0 +1,224 @@
+"""Crowds of walking characters: validation, plans, and motions computed on demand."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats, Indices
+from posefield.inference.session import Session
+from posefield.locomotion import (
+    floor_plane,
+    level_transitions,
+    locomotion_plan,
+    random_paths,
+    stride,
+)
+from posefield.locomotion import routes as given
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.level_transitions import Detail
+from posefield.locomotion.locomotion_plan import Plan
+from posefield.locomotion.routes import Route
+from posefield.locomotion.stride import Poses
+from posefield.model_file.model_card import ModelCard
+from posefield.motion import blend, foot_skate, skeleton
+from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+
+# Poses of one batch of motions: 8 MB at 31 joints, or one longer motion.
+TOGETHER = 8_000
+# Poses computed at once in double precision: 25 MB at 31 joints.
+POSED = 16_000
+
+
+# Largest number of poses of one plan, which takes a few hundred bytes for each.
+MOST_POSES = 20_000_000
+# Longest interval between planned points of a path, s, for crowds with few frames a second.
+PLANNED = 0.05
+LARGEST_SEED = 2**63
+Pairs = tuple[Indices, Indices]
+"""Indices of characters (K,) and frames (K,)."""
+RATES = (1.0, 1000.0)
+
+
+def wandering(gait: Gait, count: int, seconds: float, rate: float, seed: int) -> Plan:
+    """Return a plan of `count` characters on random paths.
+
+    Raises InvalidField for numbers out of range.
+    """
+    frames = _frames(count, seconds, rate, seed)
+    characters = random_paths.cast(gait, count, seed)
+    ways = random_paths.paths(gait, characters, seconds)
+    return locomotion_plan.follow(gait, ways, characters.who, characters.phases, frames, rate)
+
+
+def following(gait: Gait, routes: Sequence[Route], seconds: float, rate: float, seed: int) -> Plan:
+    """Return a plan of characters that follow routes; performers and phases depend on the seed.
+
+    Raises InvalidField as `wandering` and `given.through` do, and for a route that is too short.
+    """
+    frames = _frames(len(routes), seconds, rate, seed)
+    characters = random_paths.cast(gait, len(routes), seed)
+    ways = given.through(gait, routes)
+    return locomotion_plan.follow(gait, ways, characters.who, characters.phases, frames, rate)
+
+
+def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
+    if count < 1:
+        raise InvalidField("count", f"{count}, expected at least 1 character")
+    if not 0 <= seed < LARGEST_SEED:
+        raise InvalidField("seed", f"{seed}, expected 0 to less than {LARGEST_SEED}")
+    if not RATES[0] <= rate <= RATES[1]:
+        raise InvalidField("fps", f"{rate:g}, expected {RATES[0]:g} to {RATES[1]:g}")
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise InvalidField("seconds", f"{seconds:g}, expected a time above 0")
+    most = poses(count, seconds, rate)
+    if most > MOST_POSES:
+        raise InvalidField("count", f"{most:.3g} poses, expected {MOST_POSES} at most")
+    return frames(seconds, rate)
+
+
+def frames(seconds: float, rate: float) -> int:
+    """Return the number of frames of a motion of this length, s."""
+    # Tolerance of a millionth of a frame for the rounding of seconds * rate.
+    return math.floor(seconds * rate + 1e-6) + 1
+
+
+def poses(count: int, seconds: float, rate: float) -> float:
+    """Return the number of poses of a crowd, or of planned points if these are more."""
+    return count * (seconds * max(rate, 1.0 / PLANNED) + 1.0)
+
+
+def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:
+    """Return the crowd of a plan, each character with its own motion in the frame of its start."""
+    characters, frames = plan.phases.shape
+    return CrowdClip(
+        session.card.skeleton,
+        plan.rate,
+        frames,
+        Placement(plan.roots[:, 0], plan.headings[:, 0]),
+        np.arange(characters),
+        _batches(session, plan.at_home(), shown),
+        {**_facts(session, plan), "level_shares": _shares(session, shown)},
+    )
+
+
+def sharing(session: Session, plan: Plan, shown: Detail, stands: Placement) -> CrowdClip:
+    """Return a crowd at given placements, whose characters reuse the plan's motions in turn."""
+    one_each = crowd(session, plan, shown)
+    return replace(one_each, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
+
+
+def _facts(session: Session, plan: Plan) -> dict[str, Any]:
+    card = session.card
+    return {
+        "model": f"{card.name}@{session.digest}",
+        "performers": [card.performers[who] if who >= 0 else None for who in plan.who],
+        "outside_share": _outside(card, plan),
+    }
+
+
+def _shares(session: Session, shown: Detail) -> list[float]:
+    """Return the share of the poses that has each level."""
+    counts = np.bincount(shown.levels.ravel(), minlength=len(session.card.levels))
+    return [float(f"{share:.4g}") for share in counts / shown.levels.size]
+
+
+def _outside(card: ModelCard, plan: Plan) -> float:
+    """Return the share of the poses with some control outside its sampled range."""
+    low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
+    return float(np.mean(np.any((plan.controls < low) | (plan.controls > high), axis=-1)))
+
+
+def _batches(session: Session, plan: Plan, shown: Detail) -> Iterator[Motions]:
+    count, frames = plan.phases.shape
+    together = max(1, TOGETHER // frames)
+    for first in range(0, count, together):
+        who = np.arange(first, min(first + together, count))
+        yield motions(session, plan, who, shown.of(who))
+
+
+def motions(session: Session, plan: Plan, who: Indices, shown: Detail) -> Motions:
+    """Return the motions of characters (M,) of the plan, at their levels of detail."""
+    shape = (len(who), plan.phases.shape[1])
+    count, joints = shape[0] * shape[1], len(session.card.skeleton)
+    rotations = np.empty((count, joints, 4), np.float32)
+    roots = np.empty((count, 3), np.float32)
+    for rows in (slice(first, first + POSED) for first in range(0, count, POSED)):
+        character, frame = np.divmod(np.arange(count)[rows], shape[1])
+        posed = _posed(session, plan, (who[character], frame), shown.rows(rows))
+        rotations[rows] = posed.rotations
+        roots[rows] = floor_plane.at_height(posed.places, posed.heights)
+    # Bone lengths must not vary with the speed: they are those at the mean controls.
+    usual = plan.controls[who].mean(axis=1)
+    bones = stride.bones(session, usual, stride.labels(session, plan.who[who]))
+    turns = rotations.reshape(*shape, joints, 4)
+    return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels)
+
+
+def _posed(session: Session, plan: Plan, pairs: Pairs, shown: Detail) -> Poses:
+    """Return the poses of K pairs of a character and a frame, blended where levels change.
+
+    shown: levels of the pairs, in arrays (K,).
+    """
+    after, shares = _at_levels(session, plan, pairs, shown.levels), shown.shares
+    between = np.flatnonzero(shares < 1.0)
+    if len(between):
+        some = pairs[0][between], pairs[1][between]
+        before = _at_levels(session, plan, some, shown.before[between])
+        for name, whole in vars(after).items():
+            mix = blend.rotations if name == "rotations" else blend.straight
+            whole[between] = mix(getattr(before, name), whole[between], shares[between])
+    return after
+
+
+def _at_levels(session: Session, plan: Plan, pairs: Pairs, levels: Indices) -> Poses:
+    joints, count = len(session.card.skeleton), len(levels)
+    poses = Poses(np.empty((count, joints, 4)), np.empty(count), np.empty(count, dtype=complex))
+    for level in np.unique(levels).tolist():
+        rows = np.flatnonzero(levels == level)
+        own = locomotion_plan.pose(session, plan, pairs[0][rows], pairs[1][rows], level)
+        for name, whole in vars(poses).items():
+            whole[rows] = getattr(own, name)
+    return poses
+
+
+def foot_skate_of(card: ModelCard, motions: Motions, rate: float) -> Floats:
+    """Return the mean foot skate (M, strides), m/s, of motions cut into lengths of a mean stride.
+
+    The ground is at the lowest height of each stride, as for captured clips. A remainder at the end
+    is ignored, unless the motion is shorter than a stride. Needs a card with feet.
+    """
+    frames = motions.rotations.shape[1]
+    length = min(round(float(np.mean(card.durations)) * rate) + 1, frames)
+    bones, roots, rotations = (
+        part.astype(np.float64)
+        for part in (motions.bone_offsets, motions.root_position, motions.rotations)
+    )
+    local = skeleton.translations(bones, roots)
+    joints = skeleton.positions(card.skeleton.parents, rotations, local)
+    feet = joints[:, : frames // length * length, list(card.feet)]
+    return foot_skate.skate(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
+
+
+def stride_skate(gait: Gait, rate: float) -> Floats:
+    """Return the foot skate (N, 1), m/s, of one stride at each captured clip's controls."""
+    card = gait.session.card
+    controls = np.array(card.examples)
+    length = round(float(np.mean(card.durations)) * rate) + 1
+    who = stride.movers(card)
+    nowhere = np.zeros(len(controls))
+    origin = floor_plane.of(np.zeros((len(controls), 3)))
+    held = np.repeat(controls[:, None], length, axis=1)
+    plan = locomotion_plan.roam(gait, held, who, nowhere, (origin, nowhere), rate)
+    finest = level_transitions.constant(0, plan.phases.shape)
+    return foot_skate_of(card, motions(gait.session, plan, np.arange(len(controls)), finest), rate)
+
+
+def usual_skate(gait: Gait, rate: float) -> float:
+    """Return the mean foot skate of the model's strides, m/s, performers weighted equally."""
+    speeds = stride_skate(gait, rate)[:, 0]
+    moved_by = stride.movers(gait.session.card)
+    return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))

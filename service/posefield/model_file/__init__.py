@@ -1,0 +1,1 @@
+"""Model files: their card, and the checks before onnxruntime opens them."""

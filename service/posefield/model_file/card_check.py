@@ -1,0 +1,226 @@
+"""Consistency of a model card: with itself, and with the graph that it describes.
+
+A model whose card passes answers every valid question: lengths agree, indices are in range, and
+divisors are not zero.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sized
+from itertools import pairwise
+
+from posefield.kriging.covariance import FORMULAS
+from posefield.model_file.model_card import ModelCard
+from posefield.motion.joint_roles import ROLES
+from posefield.motion.measures import AXES, TRAVELLED, Measure
+
+MOST = {"controls": 64, "levels": 16, "skeleton": 4096}
+"""Largest number of entries of lists that need at least one."""
+DURATIONS = 1e-3, 1e4
+"""Shortest and longest clip, s."""
+FARTHEST = 1e3
+"""Longest bone, m, and largest entry of `beside`."""
+BESIDE = 4
+"""Rows and columns of a cycle's `beside`: logarithm of the duration, and travel."""
+SHOWN = 60
+"""Largest number of characters of a value in a message."""
+
+ANY = -1
+"""A size that the card does not determine."""
+PARTS = ("coefficients", "frame")
+"""Values inside the graph that corrections start from; a cyclic model has `way` as well."""
+
+
+def check(card: ModelCard) -> None:
+    """Raise ValueError for a card that contradicts itself.
+
+    The message names path, value and expectation.
+    """
+    for name, most in MOST.items():
+        found = len(getattr(card, name))
+        _expect(1 <= found <= most, name, found, f"1 to {most}")
+    _check_lengths(card)
+    _check_controls(card)
+    _check_clips(card)
+    _check_kriging(card)
+    _check_skeleton(card)
+    _check_levels(card)
+    _check_making(card)
+
+
+def check_graph(
+    card: ModelCard, shapes: Mapping[str, tuple[int, ...]], values: Collection[str]
+) -> None:
+    """Raise ValueError where the card does not describe the graph with these constants and values.
+
+    shapes: shapes of the graph's constants by name. values: names of the values that its nodes
+    compute.
+    """
+    for name, expected in _shapes(card).items():
+        found = shapes.get(name, ())
+        fits = [b in (a, ANY) for a, b in zip(found, expected, strict=False)]
+        if len(found) != len(expected) or not all(fits):
+            wanted = str(expected).replace(str(ANY), "any")
+            raise ValueError(
+                f"its graph's constant {name!r} has shape {found}, expected {wanted} by its card"
+            )
+    for name in (*PARTS, "way") if card.cyclic else PARTS:
+        if name not in values:
+            raise ValueError(f"its graph computes no value {name!r}, expected one")
+
+
+def _expect(right: bool, path: str, found: object, expected: str) -> None:
+    if not right:
+        text = str(found)
+        shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+        raise ValueError(f"its card's {path} is {shown}, expected {expected}")
+
+
+def _expect_length(found: Sized, path: str, expected: int) -> None:
+    if len(found) != expected:
+        raise ValueError(f"its card's {path} has {len(found)} entries, expected {expected}")
+
+
+def _expect_unique(found: Iterable[Hashable], path: str) -> None:
+    twice = [entry for entry, count in Counter(found).items() if count > 1]
+    _expect(not twice, path, twice, "each entry once")
+
+
+def _expect_joints(found: tuple[int, ...], path: str, card: ModelCard) -> None:
+    last = len(card.skeleton) - 1
+    _expect_unique(found, path)
+    _expect(max(found, default=0) <= last, path, list(found), f"joints from 0 to {last}")
+
+
+def _check_lengths(card: ModelCard) -> None:
+    """Check the lengths of lists that have an entry for each clip, joint or control."""
+    clips, joints, controls = len(card.examples), len(card.skeleton), len(card.controls)
+    _expect(clips > 0, "examples", [], "captured clips")
+    size = BESIDE if card.cyclic else 0
+    rows: list[tuple[str, Sized, int]]
+    rows = [(f"examples[{i}]", row, controls) for i, row in enumerate(card.examples)]
+    rows += [(f"beside[{i}]", row, size) for i, row in enumerate(card.beside)]
+    rows += [
+        ("sources", card.sources, clips),
+        ("left_out", card.left_out, clips),
+        ("moved_by", card.moved_by, clips if card.performers else 0),
+        ("joint_sigma", card.joint_sigma, joints),
+        ("levels[0].joints", card.levels[0].joints, joints),
+        ("kriging.scales", card.kriging.scales, controls),
+        ("beside", card.beside, size),
+    ]
+    for path, found, expected in rows:
+        _expect_length(found, path, expected)
+
+
+def _check_controls(card: ModelCard) -> None:
+    _expect_unique([control.name for control in card.controls], "controls")
+    for index, control in enumerate(card.controls):
+        path, sampled = f"controls[{index}]", sorted(example[index] for example in card.examples)
+        low, middle, high = sampled[0], sampled[len(sampled) // 2], sampled[-1]
+        _expect(low < high, path, f"{low} in all clips", "a control that varies")
+        found = (control.minimum, control.default, control.maximum)
+        _expect(found == (low, middle, high), path, found, f"{low}, {middle}, {high} by its clips")
+        known = control.values in ((), tuple(sorted({*sampled})))
+        _expect(known, f"{path}.values", control.values, "those of its clips, or none")
+        if control.measure:
+            _check_measure(f"{path}.measure", control.measure, card)
+
+
+def _check_measure(path: str, own: Measure, card: ModelCard) -> None:
+    _expect_joints(own.joints, f"{path}.joints", card)
+    count = len(own.joints)
+    if own.quantity in AXES:
+        _expect(own.at is not None, f"{path}.at", None, f"a moment of {own.quantity}")
+        _expect(count > 0, f"{path}.joints", [], f"joints of {own.quantity}")
+    if own.quantity == "step_length":
+        _expect_length(own.joints, f"{path}.joints", 2)
+    if own.quantity == "leg_length":
+        _expect(count > 0, f"{path}.joints", [], "the joints of a leg")
+    if own.at == "landmark":
+        _expect(own.share is not None, f"{path}.share", None, "the place of the landmark")
+    of_cycles = own.quantity in (*TRAVELLED, "step_length")
+    _expect(card.cyclic or not of_cycles, path, own.quantity, "another, for it is of cycles")
+
+
+def _check_clips(card: ModelCard) -> None:
+    clips, performers = len(card.examples), len(card.performers)
+    _expect(card.samples == clips, "samples", card.samples, f"{clips}, as many as examples")
+    _expect_unique(card.performers, "performers")
+    most = max(card.moved_by, default=0)
+    _expect(most < max(performers, 1), "moved_by", most, f"performers below {performers}")
+    low, high = card.durations
+    shortest, longest = DURATIONS
+    right = shortest <= low <= high <= longest
+    _expect(right, "durations", [low, high], f"two in order, from {shortest} to {longest} s")
+    tensor = card.diagnostics["tensor"]
+    right = tuple(tensor[1:]) == (card.frames, card.samples)
+    _expect(right, "diagnostics.tensor", tensor, f"{card.frames} frames and {clips} clips")
+
+
+def _check_kriging(card: ModelCard) -> None:
+    own = card.kriging
+    _expect(own.covariance in FORMULAS, "kriging.covariance", own.covariance, f"of {[*FORMULAS]}")
+    _expect(len(own.drifts) > 0, "kriging.drifts", [], "degrees")
+    right = own.scales.ndim == 1 and bool((own.scales > 0.0).all())
+    _expect(right, "kriging.scales", own.scales.tolist(), "numbers above 0")
+    for index, row in enumerate(card.beside):
+        right = max(map(abs, row)) <= FARTHEST
+        _expect(right, f"beside[{index}]", list(row), f"at most {FARTHEST:g}")
+
+
+def _check_skeleton(card: ModelCard) -> None:
+    joints = card.skeleton
+    for name, offsets in (("offsets", joints.offsets), ("tip_offsets", joints.tip_offsets)):
+        most = float(abs(offsets).max(initial=0.0))
+        _expect(most <= FARTHEST, f"skeleton.{name}", most, f"at most {FARTHEST:g} m")
+    _expect_joints(card.feet, "feet", card)
+    _expect_joints((card.event.joint,) if card.event else (), "event.joint", card)
+    for role, joint in card.roles.items():
+        _expect(role in ROLES, "roles", role, "roles of a VRM humanoid")
+        _expect(joint in joints.names, f"roles.{role}", joint, "a joint")
+    _expect_unique(card.roles.values(), "roles")
+
+
+def _check_levels(card: ModelCard) -> None:
+    finest = card.levels[0]
+    _expect(finest.samples == card.samples, "levels[0].samples", finest.samples, "all")
+    _expect(card.frames > 1, "frames", card.frames, "2 or more")
+    for index, level in enumerate(card.levels):
+        _expect_joints(level.joints, f"levels[{index}].joints", card)
+    for index, (finer, level) in enumerate(pairwise(card.levels), start=1):
+        path, more = f"levels[{index}]", sorted({*level.joints} - {*finer.joints})
+        _expect(not more, f"{path}.joints", more, "joints of the finer level")
+        _expect(level.samples <= finer.samples, f"{path}.samples", level.samples, "no more")
+        ranks = zip(level.ranks, finer.ranks, strict=True)
+        _expect(all(a <= b for a, b in ranks), f"{path}.ranks", level.ranks, "no higher ones")
+
+
+def _check_making(card: ModelCard) -> None:
+    for name, own in card.making.fields.items():
+        right = len(own) > 1 and {*own[1:]} <= {0, 1}
+        _expect(right, f"making.fields.{name}", list(own), "a nugget, and degrees 0 or 1")
+    for joint in card.making.joint_weights:
+        _expect(joint in card.skeleton.names, "making.joint_weights", joint, "a joint")
+
+
+def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of constants that the exporter writes for a card, ANY for other sizes."""
+    joints, controls, performers = len(card.skeleton), len(card.controls), len(card.performers)
+    r1, r2, r3 = card.levels[0].ranks
+    shapes = {
+        "ladder": (len(card.levels), ANY),
+        "samples": (1, controls, card.samples),
+        "pose_weights": (card.samples, r3),
+        "drift_weights": (1 + controls, ANY),
+        "core": (r2, r1, r3),
+        "time_basis": (r2, card.frames),
+        "root_mean": (3,),
+        "directions": (ANY, r1),
+        "mean_rotations": (joints, 4, 1),
+        "rotation_mean": (4 * joints, 1),
+        "offset_mean": (3 * joints,),
+        "freedoms": (3 + 3 * joints,),
+    }
+    # Without performers the graph has no such constants.
+    labelled = {"performer": (1, performers), "whose": (card.samples,)}
+    return shapes | (labelled if performers else dict.fromkeys(labelled, ()))

@@ -1,0 +1,165 @@
+"""The model card: the description of a model in the metadata of its .onnx file.
+
+Every entry is JSON text under a key that begins with "posefield."; `FORMAT` changes whenever an
+older reader would misread a file. `card_reader` reads what `dump` writes.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from posefield.common.bounded_types import (
+    Count,
+    Degree,
+    Index,
+    Key,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Rate,
+    Share,
+    Slug,
+    Text,
+)
+from posefield.common.units import Floats
+from posefield.kriging.kriging_model import Hyper
+from posefield.model_file.level_of_detail import Level
+from posefield.motion import measures
+from posefield.motion.measures import Measure
+from posefield.motion.skeleton import Skeleton
+
+FORMAT = 2
+PREFIX = "posefield."
+UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
+
+
+@dataclass(frozen=True)
+class Control:
+    """One control parameter, its unit and its sampled range.
+
+    default: the median of the sampled values. values: the distinct sampled values where there are
+    at most ten (a handful of performers, sitting or standing), else empty. measure: how it is
+    measured of a motion; None for a control whose values come from the table of clips.
+    """
+
+    name: Key
+    unit: Text
+    description: Text
+    minimum: Number
+    maximum: Number
+    default: Number
+    values: tuple[Number, ...]
+    measure: Measure | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Joint and moment of a motion's main event, such as the hand at the end of a grasp.
+
+    share: moment as a share of a clip's duration, mean over the captured clips.
+    """
+
+    joint: Index
+    share: Share
+
+
+@dataclass(frozen=True)
+class Making:
+    """Parameters of training that the graph does not hold and that adapting a model needs.
+
+    fields: nugget and degrees of the drifts of each kriged quantity but the pose. landmarks:
+    columns of the table that name them, and their canonical times. joint_weights: of joints whose
+    weight in the metric is not one. in_phase: whether cycles were shifted to begin in phase.
+    """
+
+    fields: Mapping[Name, tuple[Degree | NonNegative, ...]] = field(default_factory=dict)
+    landmarks: Mapping[Name, Share] = field(default_factory=dict)
+    joint_weights: Mapping[Name, Positive] = field(default_factory=dict)
+    in_phase: bool = False
+
+
+@dataclass(frozen=True)
+class ModelCard:
+    """Everything about a model but its weights.
+
+    cyclic: the last pose leads into the first. root: whether the root travels or stays in place.
+    rate: frames a second of the captured clips. frames, samples: T and N of the motion tensor.
+    levels: of detail, the finest first. durations: shortest and longest captured clip, s.
+    performers: names of performers, in the order of the graph's labels; empty where the model does
+    not distinguish performers. examples (N, d): controls of the captured clips. moved_by (N,):
+    index of each clip's performer, empty where performers is. feet: indices of the joints that
+    contact the ground, empty where the recipe names none. diagnostics: measured in training.
+    provenance: recipe, hashes of the data, versions, licence. sources (N,): file and frames of each
+    captured clip. kriging: parameters of the pose's kriging. left_out (N,): distance between each
+    clip and its prediction from the others, root mean square over joints and frames, m.
+    joint_sigma (J,): error of each joint as a share of sigma. making: not sent to clients. roles:
+    joints by the part that each plays (`joint_roles`). event: None where the recipe names
+    none. beside (4, 4): of a cycle, a root of the covariance of the errors of its duration's
+    logarithm and its travel, for a sigma of one metre; else empty.
+    """
+
+    name: Slug
+    description: Text
+    controls: tuple[Control, ...]
+    skeleton: Skeleton
+    cyclic: bool
+    root: Literal["travelling", "in_place"]
+    rate: Rate
+    frames: Count
+    samples: Count
+    levels: tuple[Level, ...]
+    durations: tuple[Positive, Positive]
+    performers: tuple[Name, ...]
+    examples: tuple[tuple[Number, ...], ...]
+    moved_by: tuple[Index, ...]
+    feet: tuple[Index, ...]
+    diagnostics: Mapping[str, Any]
+    provenance: Mapping[str, Any]
+    sources: tuple[Text, ...]
+    kriging: Hyper
+    left_out: tuple[NonNegative, ...]
+    joint_sigma: tuple[NonNegative, ...]
+    making: Making
+    roles: Mapping[Name, Name] = field(default_factory=dict)
+    event: Event | None = None
+    beside: tuple[tuple[Number, ...], ...] = ()
+
+    @property
+    def labels(self) -> Floats:
+        """Return the labels (N, p) of the captured clips' performers."""
+        moved = np.array(self.moved_by or [0] * len(self.examples))
+        return np.eye(max(len(self.performers), 1), len(self.performers))[moved]
+
+    def control(self, name: str) -> Control | None:
+        """Return the control of that name; None for an unknown name."""
+        return next((c for c in self.controls if c.name == name), None)
+
+
+def dump(card: ModelCard) -> dict[str, str]:
+    """Return the metadata entries of a card: keys in a fixed order, values JSON text."""
+    making: dict[str, Any] = msgspec.to_builtins(card.making)
+    # All defaults are false or empty.
+    told = {key: value for key, value in making.items() if value}
+    plain = {**plain_values(card), "format": FORMAT, "making": told}
+    return {PREFIX + key: json.dumps(plain[key], sort_keys=True) for key in sorted(plain)}
+
+
+def plain_values(card: ModelCard) -> dict[str, Any]:
+    """Return the card as numbers, texts, lists and dicts, without `making`."""
+    plain: dict[str, Any] = msgspec.to_builtins(card, enc_hook=np.ndarray.tolist)
+    del plain["making"]
+    # msgspec leaves out defaults of objects that it decoded.
+    for control, own in zip(plain["controls"], card.controls, strict=True):
+        control.pop("measure", None)
+        if own.measure:
+            control["measure"] = measures.plain(own.measure)
+    joints = plain["skeleton"]
+    # To the micrometre.
+    joints["offsets"] = np.round(card.skeleton.offsets, 6).tolist()
+    joints["tip_offsets"] = np.round(card.skeleton.tip_offsets, 6).tolist()
+    return {**plain, "units": dict(UNITS)}

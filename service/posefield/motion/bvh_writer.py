@@ -1,0 +1,196 @@
+"""BVH writer: a clip to the bytes of a file that all BVH readers interpret alike."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+
+WORD = re.compile(r"[^\s{}]+", re.ASCII)
+"""Only ASCII blanks separate words: the ideographic space belongs to a Japanese name."""
+
+AXES = "ZYX"
+ROTATIONS = "Zrotation Yrotation Xrotation"
+POSITIONS = "Xposition Yposition Zposition"
+STILL = 1e-9
+"""Largest variation, m, of a translation that is written as OFFSET, without channels."""
+
+MOST_STEPS = 1e18
+FINEST = 1e-8
+FEWEST_DECIMALS = 7
+"""Step of written lengths in metres, and digits of an angle in degrees.
+
+Six digits hold each joint within 1e-6, but not the hand at the end of a chain: its error is the sum
+of all roundings before it, each turned into a length by the arm behind it.
+"""
+
+
+def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
+    """Return the clip as a BVH file, in degrees and the given unit, with joints depth first.
+
+    The root's OFFSET is zero, since readers differ on whether its channels replace or follow it. A
+    joint whose translation varies has six channels and the mean translation as OFFSET; another has
+    three. A leaf without an end site gets one of zero length, which other readers require. Readers
+    recover the exact rate where it lies within 1e-4 of a whole or broadcast rate. Raises ValueError
+    for a name that the grammar cannot hold and for numbers that are not finite.
+    """
+    refuse_unwritable(clip, metres_per_unit)
+    sheet = Sheet(clip, metres_per_unit)
+    header = f"MOTION\nFrames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.10g}\n"
+    return ("HIERARCHY\n" + sheet.hierarchy() + header).encode() + sheet.rows()
+
+
+def refuse_unwritable(clip: Clip, metres_per_unit: float) -> None:
+    """Raise ValueError for a unit, names or numbers that a BVH file cannot hold."""
+    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
+        raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
+    for name in clip.skeleton.names:
+        if not name or name != " ".join(WORD.findall(name)):
+            raise ValueError(
+                f"joint name {name!r}, expected words parted by single blanks, without braces"
+            )
+    if not all(np.all(np.isfinite(values)) for values in (clip.rotations, clip.translations)):
+        raise ValueError("rotations or translations that are not finite, expected numbers")
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Clip laid out as the sections of a BVH file."""
+
+    clip: Clip
+    metres_per_unit: float
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Return the clip's skeleton."""
+        return self.clip.skeleton
+
+    @cached_property
+    def moving(self) -> list[bool]:
+        """Return whether each joint has position channels."""
+        spread = np.ptp(self.clip.translations, axis=0).max(axis=-1)
+        return [True, *(spread[1:] > STILL).tolist()]
+
+    @cached_property
+    def offsets(self) -> Floats:
+        """Return the mean translations (J, 3) from each joint's parent, m; zero for the root."""
+        offsets = self.clip.translations.mean(axis=0)
+        offsets[0] = 0.0
+        return offsets
+
+    def hierarchy(self) -> str:
+        """Return the lines of all joints, from the root to its closing brace."""
+        lines: list[str] = []
+        levels: list[int] = []
+        for joint, level in depth_first(self.skeleton):
+            while levels and levels[-1] >= level:
+                lines.append("\t" * levels.pop() + "}")
+            lines += ["\t" * level + line for line in self.joint(joint)]
+            levels.append(level)
+        lines += ["\t" * level + "}" for level in reversed(levels)]
+        return "\n".join(lines) + "\n"
+
+    def joint(self, joint: int) -> list[str]:
+        """Return the lines of one joint and its end sites, without children and closing brace."""
+        channels = f"6 {POSITIONS} {ROTATIONS}" if self.moving[joint] else f"3 {ROTATIONS}"
+        lines = [
+            f"{'JOINT' if joint else 'ROOT'} {self.skeleton.names[joint]}",
+            "{",
+            f"\tOFFSET {self.numbers(self.offsets[joint])}",
+            f"\tCHANNELS {channels}",
+        ]
+        for tip in self.tips(joint):
+            lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {self.numbers(tip)}", "\t}"]
+        return lines
+
+    def tips(self, joint: int) -> list[Floats]:
+        """Return the offsets of the joint's end sites; one of zero length for a bare leaf."""
+        sites = zip(self.skeleton.tip_joints, self.skeleton.tip_offsets, strict=True)
+        tips = [offset for owner, offset in sites if owner == joint]
+        return tips if tips or joint in self.skeleton.parents else [np.zeros(3)]
+
+    def numbers(self, metres: Floats) -> str:
+        """Return three lengths as text, in the unit of the file."""
+        # Without a negative zero.
+        lengths = np.round(metres / self.metres_per_unit, self.decimals) + 0.0
+        return " ".join(f"{length:.{self.decimals}f}" for length in lengths.tolist())
+
+    @property
+    def decimals(self) -> int:
+        """Return the digits after the decimal point: more for a unit above a decimetre."""
+        return max(FEWEST_DECIMALS, int(np.ceil(np.log10(self.metres_per_unit / FINEST))))
+
+    def rows(self) -> bytes:
+        """Return the motion lines, one per frame."""
+        angles = np.rad2deg(continuous(quat.to_euler(self.clip.rotations, AXES)))
+        lengths = self.clip.translations / self.metres_per_unit
+        blocks = []
+        for joint, _ in depth_first(self.skeleton):
+            blocks += [lengths[:, joint]] if self.moving[joint] else []
+            blocks.append(angles[:, joint])
+        return written(np.concatenate(blocks, axis=1), self.decimals)
+
+
+def written(values: Floats, decimals: int) -> bytes:
+    """Return numbers (rows, columns) as text with fixed decimals and without a negative zero.
+
+    The same bytes as %f in a fifth of the time: the digits of all numbers are computed at once, one
+    decimal place at a time from the last; unused places are zero bytes, which are removed at the
+    end. Raises ValueError for numbers of more digits than 64 bits hold.
+    """
+    scaled = np.rint(np.abs(values) * 10.0**decimals)
+    if scaled.max() > MOST_STEPS:
+        raise ValueError(f"numbers of up to {np.abs(values).max():g}, expected fewer digits")
+    steps = scaled.astype(np.int64)
+    places = max(len(str(steps.max())), decimals + 1)
+    text = np.zeros((*values.shape, places + 3), np.uint8)
+    text[..., 0] = np.where((values < 0.0) & (steps > 0), ord("-"), 0)
+    text[..., -decimals - 2], text[..., -1], text[:, -1, -1] = b". \n"
+    rest = steps
+    for place in range(places):
+        column = -2 - place - (place >= decimals)
+        tenth = rest // 10
+        needed = True if place <= decimals else rest > 0
+        text[..., column] = np.where(needed, rest - 10 * tenth + ord("0"), 0)
+        rest = tenth
+    return text.tobytes().translate(None, b"\0")
+
+
+def depth_first(skeleton: Skeleton) -> list[tuple[int, int]]:
+    """Return every joint and its depth, each joint followed by its descendants."""
+    children: list[list[int]] = [[] for _ in skeleton.names]
+    for joint in range(len(skeleton) - 1, 0, -1):
+        children[skeleton.parents[joint]].append(joint)
+    order, ahead = [], [(0, 0)]
+    while ahead:
+        joint, level = ahead.pop()
+        order.append((joint, level))
+        ahead += [(child, level + 1) for child in children[joint]]
+    return order
+
+
+def continuous(angles: Floats) -> Floats:
+    """Return equal rotations as ZYX angles (frames, ..., 3), rad, without jumps between frames.
+
+    Besides whole turns there is a second triple for each rotation: the outer angles half a turn on,
+    the middle one mirrored. The test whether the other triple is nearer has the same result from
+    either triple, so the parity of all tests so far selects the triple of each frame.
+    """
+    mirrored = np.array([1.0, -1.0, 1.0]) * angles + np.pi
+    same, other = (_squared(both[1:] - angles[:-1]) for both in (angles, mirrored))
+    crossed = np.zeros(angles.shape[:-1], bool)
+    crossed[1:] = other < same
+    chosen = np.where(np.cumsum(crossed, axis=0)[..., None] % 2, mirrored, angles)
+    turns = np.round(np.diff(chosen, axis=0, prepend=chosen[:1]) / (2.0 * np.pi))
+    return chosen - 2.0 * np.pi * np.cumsum(turns, axis=0)
+
+
+def _squared(apart: Floats) -> Floats:
+    """Return squared lengths (...) of differences of angles (..., 3), rad, each wrapped to pi."""
+    nearest = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+    return np.einsum("...k,...k->...", nearest, nearest)

@@ -1,0 +1,59 @@
+"""Clip: one motion of one skeleton, sampled at a constant rate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import skeleton
+from posefield.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Frames of a skeleton's motion.
+
+    rotations (F, J, 4): unit quaternions local to the parent. translations (F, J, 3): joint
+    translations local to the parent, m; the root's is its path, the others' are the bone offsets.
+    rate: frames a second.
+    """
+
+    skeleton: Skeleton
+    rotations: Floats
+    translations: Floats
+    rate: float
+
+    def __post_init__(self) -> None:
+        frames, joints = len(self.rotations), len(self.skeleton)
+        if frames < 1 or self.rotations.shape != (frames, joints, 4):
+            raise ValueError(f"rotations {self.rotations.shape}, expected (frames, {joints}, 4)")
+        if self.translations.shape != (frames, joints, 3):
+            raise ValueError(
+                f"translations {self.translations.shape}, expected {frames, joints, 3}"
+            )
+        if not (np.isfinite(self.rate) and self.rate > 0):
+            raise ValueError(f"rate {self.rate}, expected a positive number")
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    @property
+    def duration(self) -> float:
+        """Return the seconds from the first frame to the last."""
+        return (len(self) - 1) / self.rate
+
+    @property
+    def root_path(self) -> Floats:
+        """Return the root positions (F, 3), m."""
+        return self.translations[:, 0]
+
+    def positions(self) -> Floats:
+        """Return the joint positions (F, J, 3) in the character's frame, m."""
+        return skeleton.positions(self.skeleton.parents, self.rotations, self.translations)
+
+
+def assemble(
+    joints: Skeleton, rotations: Floats, root_path: Floats, bone_offsets: Floats, rate: float
+) -> Clip:
+    """Return a clip with constant bone offsets (J, 3), m, whose root follows a path (F, 3), m."""
+    return Clip(joints, rotations, skeleton.translations(bone_offsets, root_path), rate)

@@ -1,0 +1,102 @@
+"""Crowds: placements, motions and poses of many characters of one skeleton."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from posefield.common.units import UP, Floats, Indices, Singles, Truths
+from posefield.motion import quat
+from posefield.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Positions and headings of the characters' own frames in the world.
+
+    positions: (N, 3), m. headings: (N,), rad. A heading turns the frame about +Y: a character that
+    faces +Z in its own frame faces +X at a heading of a quarter turn.
+    """
+
+    positions: Floats
+    headings: Floats
+
+    def __len__(self) -> int:
+        return len(self.headings)
+
+    def of(self, some: Indices) -> "Placement":
+        """Return the placement of the characters of some indices (M,)."""
+        return Placement(self.positions[some], self.headings[some])
+
+    @property
+    def turns(self) -> Floats:
+        """Return the quaternions (N, 4) of the headings."""
+        return quat.about(UP, self.headings)
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Motions of equal length, each in its character's own frame.
+
+    rotations: (M, F, J, 4). root_position: (M, F, 3), m. bone_offsets: (M, J, 3), m. levels (M, F):
+    level of detail at which each pose was computed.
+    """
+
+    rotations: Singles
+    root_position: Singles
+    bone_offsets: Singles
+    levels: Indices
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+
+@dataclass(frozen=True)
+class CrowdPoses:
+    """One pose of each of N characters, placed in the world.
+
+    model: name@contenthash. rotations (N, J, 4): local to the parent, the root's in the world.
+    root_position (N, 3): in the world, m. bone_offsets: (N, J, 3), m. levels (N,): level of detail
+    of each character. error_px (N,): projected error of the level, pixels; None without a camera.
+    duration (N,): of each character's clip, s. sigma (N,), m, and supported (N,): as in Trust.
+    warnings: sentences about the crowd as a whole.
+    """
+
+    model: str
+    skeleton: Skeleton
+    rotations: Singles
+    root_position: Singles
+    bone_offsets: Singles
+    levels: Indices
+    error_px: Singles | None
+    duration: Singles
+    sigma: Singles
+    supported: Truths
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+
+@dataclass(frozen=True)
+class CrowdClip:
+    """Moving crowd: N characters that play M motions of equal length.
+
+    frames: of each motion. rate: frames a second. motion (N,): index of the motion that each
+    character plays. batches: the motions in order, several at a time, computed lazily to bound
+    memory; they can be iterated once. facts: provenance as plain values.
+    """
+
+    skeleton: Skeleton
+    rate: float
+    frames: int
+    placement: Placement
+    motion: Indices
+    batches: Iterable[Motions]
+    facts: Mapping[str, Any]
+
+    @property
+    def shared(self) -> bool:
+        """Return whether any motion is played by more than one character."""
+        return len(np.unique(self.motion)) < len(self.motion)

@@ -1,0 +1,173 @@
+"""Measures: quantities of a motion that are computed, not entered by hand.
+
+Position of a joint at a moment, greatest distance between the feet, distance and speed of
+locomotion, body size. The same definitions measure captured clips and results, so that a query can
+constrain them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from posefield.common.bounded_types import Index, Share
+from posefield.common.units import Floats
+from posefield.motion import blend, skeleton
+
+Quantity = Literal[
+    "left",
+    "height",
+    "forward",
+    "step_length",
+    "stride_length",
+    "speed",
+    "turn",
+    "leg_length",
+    "stature",
+]
+At = Literal["start", "end", "highest", "lowest", "farthest", "landmark"]
+
+AXES = {"left": 0, "height": 1, "forward": 2}
+"""Quantities of a joint's position, m, and the axis of each in the frame of the clip."""
+TRAVELLED = ("stride_length", "speed", "turn")
+"""Quantities of a whole clip: m, m/s, degrees to the left."""
+BODILY = ("leg_length", "stature")
+"""Quantities of the performer, not of the motion, m."""
+UNITS = {"speed": "m/s", "turn": "deg"}
+"""Units of the quantities that are not in metres."""
+QUANTITIES: tuple[str, ...] = get_args(Quantity)
+MOMENTS: tuple[str, ...] = get_args(At)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One quantity of a motion.
+
+    joints: for a position those whose centre is taken; for the step length two feet (the greatest
+    distance of one ahead of the other); for the leg length the chain from hip to foot; otherwise
+    empty. at: moment of a position; "farthest" is from the root. share: canonical time of the
+    landmark, as a share of the clip.
+    """
+
+    quantity: Quantity
+    joints: tuple[Index, ...] = ()
+    at: At | None = None
+    share: Share | None = None
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the values."""
+        return UNITS.get(self.quantity, "m")
+
+    @property
+    def bodily(self) -> bool:
+        """Return whether the quantity is the performer's, independent of the motion."""
+        return self.quantity in BODILY
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Motion as input of a measure.
+
+    positions: of the joints (F, J, 3), m, at equal steps of time. duration: s. travel (3,): to the
+    left and ahead, m, and change of heading, rad. parents: of the joints. offsets: of the bones (J,
+    3), m. landmark: fractional frame index, 0 to F - 1, of the measure's landmark.
+    """
+
+    positions: Floats
+    duration: float
+    travel: Floats
+    parents: tuple[int, ...]
+    offsets: Floats
+    landmark: float = 0.0
+
+
+def value(measure: Measure, seen: Seen) -> float:
+    """Return the value of a quantity, in its unit."""
+    match measure.quantity:
+        case "stride_length" | "speed" | "turn":
+            return travelled(measure.quantity, seen.travel, seen.duration)
+        case "leg_length":
+            return float(np.linalg.norm(seen.offsets[list(measure.joints)], axis=-1).sum())
+        case "stature":
+            return _stature(seen)
+        case "step_length":
+            return float(np.abs(_stride_out(measure, seen.positions)).max())
+        case _:
+            at = moment(measure, seen.positions, seen.landmark)
+            place = blend.between(_middle(measure, seen.positions), np.array(at))
+            return float(place[AXES[measure.quantity]])
+
+
+def travelled(quantity: str, travel: Floats, duration: float) -> float:
+    """Return the distance, m, the speed, m/s, or the change of heading, degrees, of a travel (3,).
+
+    duration: s.
+    """
+    if quantity == "turn":
+        return float(np.degrees(travel[2]))
+    way = float(np.hypot(travel[0], travel[1]))
+    return way / duration if quantity == "speed" else way
+
+
+def moment(measure: Measure, positions: Floats, landmark: float) -> float:
+    """Return the fractional frame index, 0 to F - 1, at which a quantity is measured.
+
+    positions: (F, J, 3), m. landmark: fractional frame index of the landmark.
+    """
+    last = len(positions) - 1
+    match measure.at:
+        case "start":
+            return 0.0
+        case "end":
+            return float(last)
+        case "landmark":
+            return landmark
+        case "highest":
+            return float(np.argmax(_middle(measure, positions)[:, 1]))
+        case "lowest":
+            return float(np.argmin(_middle(measure, positions)[:, 1]))
+        case "farthest":
+            away = _middle(measure, positions) - positions[:, 0]
+            return float(np.argmax(np.sum(np.square(away), axis=-1)))
+        case _:
+            return float(np.argmax(np.abs(_stride_out(measure, positions))))
+
+
+def _middle(measure: Measure, positions: Floats) -> Floats:
+    return positions[:, list(measure.joints)].mean(axis=1)
+
+
+def _stride_out(measure: Measure, positions: Floats) -> Floats:
+    """Return the distance (F,) of the first foot ahead of the second, m."""
+    first, second = measure.joints
+    return positions[:, first, 2] - positions[:, second, 2]
+
+
+def _stature(seen: Seen) -> float:
+    """Return the height of the highest joint above the lowest in the rest pose, m."""
+    still = np.zeros((len(seen.parents), 4))
+    still[:, 0] = 1.0
+    positions = skeleton.positions(seen.parents, still, seen.offsets)
+    return float(np.ptp(positions[:, 1]))
+
+
+def words(measure: Measure, names: Sequence[str]) -> str:
+    """Return a measure as text: "height of rhand at end". names: of all joints."""
+    own = " and ".join(names[joint] for joint in measure.joints)
+    of = f" of {own}" if own else ""
+    at = f" at {measure.at}" if measure.at else ""
+    when = "" if measure.share is None else f" ({measure.share:.0%})"
+    return f"{measure.quantity.replace('_', ' ')}{of}{at}{when}"
+
+
+def plain(measure: Measure) -> dict[str, Any]:
+    """Return a measure as plain values for JSON, without empty fields."""
+    known = {"joints": list(measure.joints), "at": measure.at, "share": measure.share}
+    return {"quantity": measure.quantity, **{k: v for k, v in known.items() if v not in (None, [])}}
+
+
+def parse(found: Mapping[str, Any]) -> Measure:
+    """Return the measure of the plain values of `plain`."""
+    return Measure(**{**found, "joints": tuple(found.get("joints", ()))})

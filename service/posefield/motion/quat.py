@@ -1,0 +1,164 @@
+"""Unit quaternions w x y z over arrays (..., 4); all functions broadcast over leading axes."""
+
+import numpy as np
+
+from posefield.common.units import Floats
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def mul(a: Floats, b: Floats) -> Floats:
+    """Return the product a b: the rotation b followed by a."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def conj(q: Floats) -> Floats:
+    """Return the conjugate, which is the inverse of a unit quaternion."""
+    return q * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def normalize(q: Floats) -> Floats:
+    """Return the unit quaternion in the direction of q."""
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def rotate(q: Floats, v: Floats) -> Floats:
+    """Return the vector v (..., 3) rotated by q."""
+    w, u = q[..., :1], q[..., 1:]
+    t = 2.0 * cross(u, v)
+    return v + w * t + cross(u, t)
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return the vector product (..., 3).
+
+    Twice as fast as numpy.cross, which also supports other sizes.
+    """
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def exp(v: Floats) -> Floats:
+    """Return the quaternion of a rotation vector (..., 3), rad."""
+    half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
+    # np.sinc is sin(pi x) / (pi x), and exact at zero.
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
+
+
+def log(q: Floats) -> Floats:
+    """Return the rotation vector (..., 3) of q, rad, of length at most pi."""
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    return np.where(sine < 1e-12, 2.0, angle / np.maximum(sine, 1e-12)) * q[..., 1:]
+
+
+def slerp(a: Floats, b: Floats, t: Floats) -> Floats:
+    """Return the rotation at a fraction t (...) of the shorter arc from a to b."""
+    return mul(a, exp(np.asarray(t)[..., None] * log(mul(conj(a), b))))
+
+
+def unroll(q: Floats) -> Floats:
+    """Return equal rotations (frames, ..., 4) with signs such that neighbours lie close."""
+    dots = np.einsum("...k,...k->...", q[1:], q[:-1])
+    signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0, dtype=q.dtype)
+    return np.concatenate([q[:1], q[1:] * signs[..., None]])
+
+
+def mean(q: Floats) -> Floats:
+    """Return the chordal mean (joints, 4) of rotations (samples, joints, 4), with w >= 0.
+
+    The eigenvector of the largest eigenvalue of the sum of q qᵀ, which does not depend on the signs
+    of the quaternions (Markley et al. 2007).
+    """
+    _, vectors = np.linalg.eigh(np.einsum("njk,njl->jkl", q, q))
+    top = vectors[..., -1]
+    return np.where(top[..., :1] < 0, -top, top)
+
+
+def twist(q: Floats, axis: Floats) -> Floats:
+    """Return the angle (...) of the twist of q about the unit axis (3,), rad, in (-pi, pi]."""
+    angle = 2.0 * np.arctan2(q[..., 1:] @ axis, q[..., 0])
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def about(axis: Floats, angle: Floats) -> Floats:
+    """Return the quaternion of a rotation by angle (...), rad, about the unit axis (3,)."""
+    half = 0.5 * np.asarray(angle)[..., None]
+    return np.concatenate([np.cos(half), np.sin(half) * axis], axis=-1)
+
+
+def to_matrix(q: Floats) -> Floats:
+    """Return the rotation matrices (..., 3, 3), for column vectors."""
+    return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
+
+
+def from_matrix(m: Floats) -> Floats:
+    """Return the quaternions of rotation matrices (..., 3, 3), with w at or above zero.
+
+    Of the four equivalent formulas the one with the largest divisor is taken (Shepperd 1978).
+    """
+    xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    yz, zx, xy = (m[..., i, j] - m[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0)))
+    YZ, ZX, XY = (m[..., i, j] + m[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0)))
+    rows = np.stack(
+        [
+            np.stack([1 + xx + yy + zz, yz, zx, xy], axis=-1),
+            np.stack([yz, 1 + xx - yy - zz, XY, ZX], axis=-1),
+            np.stack([zx, XY, 1 - xx + yy - zz, YZ], axis=-1),
+            np.stack([xy, ZX, YZ, 1 - xx - yy + zz], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(np.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
+    q = normalize(np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :])
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def from_euler(angles: Floats, axes: str) -> Floats:
+    """Return the rotation of angles (..., len(axes)), rad, about moving axes, the leftmost first.
+
+    axes: any number of X, Y and Z; "ZYX" is the product Rz Ry Rx of BVH files.
+    """
+    q = np.broadcast_to(IDENTITY, (*angles.shape[:-1], 4))
+    for index, axis in enumerate(axes):
+        q = mul(q, about(np.eye(3)["XYZ".index(axis)], angles[..., index]))
+    return q
+
+
+def to_euler(q: Floats, axes: str) -> Floats:
+    """Return the angles (..., 3), rad, about three different moving axes.
+
+    The middle angle is in [-pi/2, pi/2]. Where it is a quarter turn the axes of the outer two
+    coincide: the last angle is then zero.
+    """
+    i, j, k = ("XYZ".index(axis) for axis in axes)
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    m = to_matrix(q)
+    middle = np.arcsin(np.clip(sign * m[..., i, k], -1.0, 1.0))
+    locked = np.hypot(m[..., i, i], m[..., i, j]) < 1e-9
+    first = np.arctan2(-sign * m[..., j, k], m[..., k, k])
+    first = np.where(locked, np.arctan2(sign * m[..., k, j], m[..., j, j]), first)
+    last = np.where(locked, 0.0, np.arctan2(-sign * m[..., i, j], m[..., i, i]))
+    return np.stack([first, middle, last], axis=-1)
+
+
+def right_jacobian(v: Floats) -> Floats:
+    """Return the matrix J (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order."""
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    safe = np.maximum(angle, 1e-4)
+    across = cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    return np.eye(3) - first * across + second * across @ across

@@ -1,0 +1,131 @@
+"""Decoding of queries from JSON bodies with msgspec; its errors are converted to FormError."""
+
+import itertools
+import json
+import sys
+from functools import cache
+from typing import Any, TypeVar, cast
+
+import msgspec
+
+from posefield.common.errors import FormError
+
+Question = TypeVar("Question")
+_PATH = " - at `$"
+_FIELD = "Object contains unknown field `", "Object missing required field `"
+LONGEST_PLAIN = 1 << 20
+"""Bytes of the largest body that is decoded again to Python objects, twenty times its size."""
+_ANY_KEY = "..."
+"""Placeholder of msgspec's messages for the key of a mapping."""
+
+
+def question(form: type[Question], content: bytes) -> Question:
+    """Return the query of a JSON body.
+
+    Raises FormError for an invalid body, and the errors of the query's own checks.
+    """
+    try:
+        found: Question = _decoder(cast(Any, form)).decode(content)
+        return found
+    except msgspec.ValidationError as fault:
+        return _of_plain(form, content, fault)
+    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+        raise FormError("", f"expected UTF-8 JSON; {fault}") from None
+    except RecursionError:
+        raise FormError("", "nested too deeply") from None
+
+
+@cache
+def _decoder(form: Any) -> msgspec.json.Decoder[Any]:
+    return msgspec.json.Decoder(form)
+
+
+def _of_plain(form: type[Question], content: bytes, fault: msgspec.ValidationError) -> Question:
+    """Return the query of a rejected body with whole floats as integers: in JSON 1.0 equals 1.
+
+    Raises FormError if it is still invalid.
+    """
+    if len(content) > LONGEST_PLAIN:
+        raise _form_error(str(fault), None) from None
+    try:
+        plain, said = json.loads(content.decode()), str(fault)
+    except (RecursionError, ValueError):
+        # msgspec reports a wrong type before it parses the rest, which may be invalid JSON.
+        raise _form_error(str(fault), None) from None
+    if "out of range" not in said:
+        try:
+            return msgspec.convert(_with_whole_numbers(plain), form)
+        except msgspec.ValidationError as refused:
+            said = str(refused)
+    raise _form_error(said, plain) from None
+
+
+def _form_error(said: str, plain: Any) -> FormError:
+    """Return the error of msgspec's message about a body; plain: its value, if known."""
+    path, found = list(itertools.takewhile(_ANY_KEY.__ne__, steps(said))), dict[str, Any]()
+    if plain is not None:
+        path, found = _followed(steps(said), plain)
+    message = said.rpartition(_PATH)[0] or said
+    typed = said.startswith("Expected") and not isinstance(found, dict | list)
+    shown = f" {found!r}" if typed else ""
+    return FormError(pointer(*path).removeprefix("/"), message + shown)
+
+
+def _with_whole_numbers(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _with_whole_numbers(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_with_whole_numbers(value) for value in node]
+    return int(node) if isinstance(node, float) and node.is_integer() else node
+
+
+def _followed(path: list[str], node: Any) -> tuple[list[str], Any]:
+    """Return the path with the invalid key for each placeholder, and the value at its end."""
+    named = []
+    for step in path:
+        if step == _ANY_KEY and isinstance(node, dict):
+            step = _key_at_fault(node)
+        named.append(step)
+        if isinstance(node, list):
+            node = node[int(step)]
+        else:
+            node = node.get(step, {})
+    return named, node
+
+
+def _key_at_fault(numbers: dict[str, Any]) -> str:
+    """Return the first key whose value is not a number, else the first whose value is a list."""
+    wrong = (key for key, value in numbers.items() if not _is_numeric(value))
+    lists = (key for key, value in numbers.items() if isinstance(value, list))
+    return next(itertools.chain(wrong, lists))
+
+
+def _is_numeric(value: Any) -> bool:
+    values = value if isinstance(value, list) else [value]
+    return all(type(each) in (int, float) and abs(each) <= sys.float_info.max for each in values)
+
+
+def pointer(*parts: str) -> str:
+    """Return the JSON pointer of keys and indices, RFC 6901."""
+    return "".join("/" + part.replace("~", "~0").replace("/", "~1") for part in parts)
+
+
+def steps(message: str) -> list[str]:
+    """Return the keys and indices of the invalid value in a message of msgspec.
+
+    The message repeats the client's input, so it is parsed from its two ends: "Object contains
+    unknown field `NAME` - at `$.KEY[INDEX]`", where either part may be absent.
+    """
+    rest, found = message, []
+    if rest.endswith("`") and (start := rest.rfind(_PATH)) >= 0:
+        path = rest[start + len(_PATH) : -1].replace("[...]", f"[{_ANY}]")
+        found = path.replace("[", ".").replace("]", "").split(".")[1:]
+        found = [_ANY_KEY if step == _ANY else step for step in found]
+        rest = rest[:start]
+    for opening in _FIELD:
+        if rest.startswith(opening) and rest.endswith("`"):
+            found.append(rest[len(opening) : -1])
+    return found
+
+
+_ANY = "\0"

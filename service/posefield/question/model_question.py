@@ -1,0 +1,64 @@
+"""Queries about a model: sigma grids, reasons of a result, and clips to capture next."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from posefield.common.errors import InvalidField
+from posefield.question.motion_question import Controls, Extrapolate, Performer
+from posefield.question.value_validation import within
+
+FEWEST, MOST_STEPS, WIDEST = 2, 1024, 1.0
+"""Limits of the values per axis of a grid, and of its margin as a share of a control's range."""
+MOST_NEAREST, MOST_SUGGESTED = 10_000, 200
+
+
+class SigmaQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Query for a sigma grid: `columns` values of the control `across` by `rows` of `along`.
+
+    controls: values of the other controls, by default those of the card. margin: share of a
+    control's sampled range by which the grid extends beyond it on either side.
+    """
+
+    across: str
+    along: str
+    columns: int = 32
+    rows: int = 32
+    controls: Controls = {}
+    performer: Performer = None
+    margin: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.across == self.along:
+            raise InvalidField("along", f"{self.along!r}, expected another control than across")
+        for name in ("columns", "rows"):
+            within(name, getattr(self, name), FEWEST, MOST_STEPS, "values")
+        within("margin", self.margin, 0.0, WIDEST, "of the range")
+
+    def __len__(self) -> int:
+        return self.columns * self.rows
+
+
+class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Query for the reasons of a result at given controls."""
+
+    controls: Controls
+    extrapolate: Extrapolate = "warn"
+    performer: Performer = None
+    nearest: Annotated[int, Meta(description="captured clips to list")] = 10
+
+    def __post_init__(self) -> None:
+        within("nearest", self.nearest, 1, MOST_NEAREST, "clips")
+
+
+class SuggestQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Query for the clips to capture next."""
+
+    count: Annotated[int, Meta(description="points to list")] = 10
+    performer: Annotated[
+        str | None,
+        Meta(description="whose clips alone count as captured; everybody's if not said"),
+    ] = None
+
+    def __post_init__(self) -> None:
+        within("count", self.count, 1, MOST_SUGGESTED, "points")

@@ -1,0 +1,155 @@
+"""Queries for poses and for clips."""
+
+import re
+from typing import Annotated, Literal, cast
+
+import msgspec
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from posefield.motion.joint_roles import Names
+
+Policy = Literal["ok", "warn", "refuse"]
+Root = Literal["travelling", "in_place"]
+Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
+"""Moment of the motion; "farthest" is from the root."""
+When = float | Moment
+"""Time of a target: seconds from the start of the clip, or a moment of the motion."""
+Exact = Literal["auto", "none"] | Annotated[tuple[str, ...], Meta(min_length=1)]
+Unit = Literal["m", "cm"]
+Up = Literal["y", "z"]
+LEGAL_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}", re.ASCII)
+"""Names that are legal as file names on all systems."""
+Name = Annotated[str, Meta(pattern=rf"^{LEGAL_NAME.pattern}\Z")]
+
+# Fields that several queries share. `word`: name of the parameter in URLs and commands, if other
+# than the field's; `metavar`: placeholder of its value in the help of a command.
+Controls = Annotated[
+    dict[str, float],
+    Meta(
+        description="value of a control; a model chooses the controls that are left out",
+        extra={"word": "control", "metavar": "NAME=VALUE"},
+    ),
+]
+Extrapolate = Annotated[
+    Policy,
+    Meta(description="controls like which nothing was captured: answer, warn as well, or refuse"),
+]
+Performer = Annotated[
+    str | None, Meta(description="who moves, by name; somebody never seen if not said")
+]
+
+
+class Target(Struct, frozen=True, forbid_unknown_fields=True):
+    """Constraint on the position of a joint at a moment.
+
+    joint: name. position: in the frame of the clip, m. Exactly one of time, s, and at is given.
+    """
+
+    joint: str
+    position: tuple[float, float, float]
+    time: float | UnsetType = UNSET
+    at: Moment | UnsetType = UNSET
+
+    def __post_init__(self) -> None:
+        if (self.time is UNSET) == (self.at is UNSET):
+            said = "neither time nor at" if self.at is UNSET else "time and at"
+            raise ValueError(f"{said}, expected one of them")
+
+    @property
+    def when(self) -> When:
+        """Return seconds from the start of the clip, or a moment of the motion."""
+        return cast(Moment, self.at) if isinstance(self.time, UnsetType) else self.time
+
+
+class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Query for a motion: controls, performer, level of detail and constraints."""
+
+    controls: Controls
+    extrapolate: Extrapolate = "warn"
+    performer: Performer = None
+    level: Annotated[int, Meta(description="level of detail: 0 is the finest")] = 0
+    joint_sigma: Annotated[bool, Meta(description="say how far each joint may err, too")] = False
+    exact: Annotated[
+        Exact,
+        Meta(
+            description="measured controls to be met exactly: auto (those given), none, or names",
+            extra={"metavar": "auto|none|NAME,NAME"},
+        ),
+    ] = "auto"
+    targets: Annotated[
+        tuple[Target, ...],
+        Meta(
+            description="where a joint is to be, m; MOMENT is seconds, start, end, event, highest, "
+            "lowest or farthest; may be repeated",
+            extra={"word": "target", "metavar": "JOINT@MOMENT=X,Y,Z"},
+        ),
+    ] = ()
+    pin_feet: Annotated[bool, Meta(description="keep feet that stand where they stand")] = False
+
+    @property
+    def corrects(self) -> bool:
+        """Return whether there are constraints besides the given controls."""
+        return self.exact != "auto" or bool(self.targets) or self.pin_feet
+
+
+class PoseQuestion(MotionQuestion, frozen=True, kw_only=True):
+    """Query for poses of a motion."""
+
+    times: Annotated[
+        list[float],
+        Meta(description="seconds from the start of the clip", extra={"word": "time", "unit": "s"}),
+    ]
+
+
+class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
+    """Query for a part of a motion, at a frame rate.
+
+    names: renames joints only; bones keep their axes. root: "in_place" removes the root's travel.
+    From a cycle it removes the frame that moves along its arc, heading included; from another
+    motion the straight line from the first pose to the last, evenly, and keeps the heading. Heights
+    are kept, and a model that is in place already is unchanged. loop: a whole cycle as N = max(1,
+    round(duration * fps)) steps, without start and end. Its frame N equals the first one if it
+    stays in place, else it is the first one moved by the cycle's travel and turn. It plays N / fps
+    seconds, which is the rounded duration.
+    """
+
+    fps: Annotated[
+        float, Meta(description="frames a second", extra={"unit": "frames a second"})
+    ] = 30.0
+    start: Annotated[float, Meta(description="where the part begins", extra={"unit": "s"})] = 0.0
+    end: Annotated[
+        float | None,
+        Meta(description="where the part ends, s; the clip's end if not said", extra={"unit": "s"}),
+    ] = None
+    names: Annotated[Names, Meta(description="what joints are called")] = "own"
+    root: Annotated[Root, Meta(description="whether the root travels")] = "travelling"
+    loop: Annotated[bool, Meta(description="one whole cycle whose last frame is its first")] = False
+
+
+class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
+    """Query for a clip in a file; unit and up are None for the format's defaults."""
+
+    unit: Annotated[
+        Unit | None, Meta(description="of length in the file; the format's own if not said")
+    ] = None
+    up: Annotated[Up | None, Meta(description="axis in the file; the format's own if not said")] = (
+        None
+    )
+
+
+class NamedClipQuestion(ClipQuestion, frozen=True, kw_only=True):
+    """Query for one clip of many, with the name of its file."""
+
+    name: Name | None = None
+
+
+class ClipsQuestion(Struct, frozen=True, forbid_unknown_fields=True):
+    """Query for several clips in one format."""
+
+    format: str
+    clips: list[NamedClipQuestion]
+    unit: Unit | None = None
+    up: Up | None = None
+
+
+replace = msgspec.structs.replace

@@ -1,0 +1,219 @@
+"""Results of a query: poses or clips with provenance and uncertainty, sigma grids, reasons."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefield.common.units import Floats, Singles, Truths
+from posefield.model_file.model_card import Control
+from posefield.motion.clip import Clip
+
+Number = TypeVar("Number", bound=np.floating[Any])
+
+
+@dataclass(frozen=True)
+class Met:
+    """Residual of one constraint: a measured control or a target.
+
+    what: a control's name, or joint and moment of a target. miss: distance between the requested
+    and the reached value, in `unit`. reached: whether the miss is at most a millimetre, or a
+    thousandth of the unit.
+    """
+
+    what: str
+    miss: float
+    unit: str
+    reached: bool
+
+
+@dataclass(frozen=True)
+class Trust:
+    """Provenance and uncertainty of a result.
+
+    model: name@contenthash. controls: requested values in the model's units. duration: natural
+    length of the whole clip at these controls, s. sigma: expected distance between this clip and a
+    captured clip at these controls, root mean square over joints and frames, m. warnings: one
+    sentence for each control outside its sampled range, or one for controls in a gap between the
+    samples, and one for each target that is not reached. performer: requested name; None for an
+    unseen performer. level: of detail. supported: whether clips with similar controls were
+    captured. performer_seen: whether the requested performer was captured; None where the model
+    does not distinguish performers. inferred: names of the controls that were not given and were
+    set to the most typical values for the given ones. measured: values in this result of the
+    controls for which the recipe has a measure. targets: residuals of the constraints. joint_sigma
+    (J,), m: sigma of each joint; empty unless requested.
+    """
+
+    model: str
+    controls: dict[str, float]
+    duration: float
+    sigma: float
+    warnings: tuple[str, ...]
+    performer: str | None = None
+    level: int = 0
+    supported: bool = True
+    performer_seen: bool | None = None
+    inferred: tuple[str, ...] = ()
+    measured: Mapping[str, float] = field(default_factory=dict)
+    targets: tuple[Met, ...] = ()
+    joint_sigma: tuple[float, ...] = ()
+
+    def facts(self) -> dict[str, Any]:
+        """Return the fields that are not empty as plain values, for the metadata of files."""
+        return {
+            "model": self.model,
+            "controls": self.controls,
+            "performer": self.performer,
+            "level": self.level,
+            "duration": self.duration,
+            "sigma": self.sigma,
+            "supported": self.supported,
+            "warnings": list(self.warnings),
+            **self._more(),
+        }
+
+    def _more(self) -> dict[str, Any]:
+        seen = {} if self.performer_seen is None else {"performer_seen": self.performer_seen}
+        more = {
+            "inferred": list(self.inferred),
+            "measured": dict(self.measured),
+            "targets": [asdict(met) for met in self.targets],
+            "joint_sigma": list(self.joint_sigma),
+        }
+        return seen | {name: fact for name, fact in more.items() if fact}
+
+
+@dataclass(frozen=True)
+class PoseAnswer(Generic[Number]):
+    """Poses at times (S,), s.
+
+    rotations: (S, J, 4). root_position: (S, 3), m. bone_offsets: (J, 3), m.
+    """
+
+    times: Floats
+    rotations: NDArray[Number]
+    root_position: NDArray[Number]
+    bone_offsets: NDArray[Number]
+    trust: Trust
+
+
+@dataclass(frozen=True)
+class ClipAnswer:
+    """A clip sampled at a constant rate."""
+
+    clip: Clip
+    trust: Trust
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Axis of a grid: a control and its values (n,), in the control's unit."""
+
+    control: Control
+    values: Floats
+
+
+@dataclass(frozen=True)
+class SigmaGrid:
+    """Sigma over two controls, at the finest level of detail.
+
+    across: axis of the C columns. along: axis of the R rows. model: name@contenthash. controls:
+    values of the other controls. sigma (R, C): m. inside (R, C): whether all controls lie within
+    their sampled ranges. supported (R, C): whether clips with similar controls were captured.
+    """
+
+    model: str
+    across: Axis
+    along: Axis
+    controls: dict[str, float]
+    performer: str | None
+    sigma: Singles
+    inside: Truths
+    supported: Truths
+
+
+@dataclass(frozen=True)
+class Captured:
+    """Captured clip and its contribution to a result.
+
+    source: its file and frames. distance: between its controls and the requested ones, in the
+    model's metric; at distance one, at most 5 % of the covariance is left. weight: kriging weight
+    of the clip in the poses of the result.
+    """
+
+    source: str
+    controls: dict[str, float]
+    performer: str | None
+    distance: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Backing:
+    """Support of a query by the captured clips, and the quantities that decide it.
+
+    beyond: distance of each control beyond its sampled range, as a share of the range; at most
+    `most` is supported. variance: kriging variance of a field over the controls of the captured
+    clips, from 0 where clips are dense to 1 far from all clips. limit: largest variance that is
+    supported.
+    """
+
+    supported: bool
+    beyond: dict[str, float]
+    most: float
+    variance: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Reasons:
+    """Explanation of a result: the nearest captured clips, the nearest first, and their weights.
+
+    model: name@contenthash. warnings, inferred: as in Trust. others, others_weight: count and total
+    weight of the clips that are not listed. All weights sum to one.
+    """
+
+    model: str
+    controls: dict[str, float]
+    performer: str | None
+    warnings: tuple[str, ...]
+    backing: Backing
+    nearest: tuple[Captured, ...]
+    others: int
+    others_weight: float
+    inferred: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """Point in the control space at which to capture the next clip.
+
+    gain: share by which the mean variance over the control space falls once it is captured.
+    variance: at the point itself, from 0 to 1. nearest: source of the nearest captured clip.
+    lacking: the control in which that clip differs most. gap: this difference as a share of the
+    control's range.
+    """
+
+    controls: dict[str, float]
+    gain: float
+    variance: float
+    nearest: str
+    lacking: str
+    gap: float
+
+
+@dataclass(frozen=True)
+class Suggestions:
+    """Points to capture next, by descending gain; each gain assumes the points before as captured.
+
+    model: name@contenthash. performer: name of the performer whose clips alone count as captured;
+    None for the clips of all performers. candidates: number of points among which they were
+    selected.
+    """
+
+    model: str
+    performer: str | None
+    candidates: int
+    suggestions: tuple[Suggestion, ...]

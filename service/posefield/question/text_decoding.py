@@ -1,0 +1,246 @@
+"""Decoding of queries from text: the parameters of a URL, a command or a table.
+
+A target as text is JOINT@MOMENT and a position in the frame of the clip, m:
+`RightHand@end:0.3,1.2,0.4`. A moment is seconds from the start of the clip, or one of MOMENTS.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from msgspec import NODEFAULT, Meta, Struct, structs
+
+from posefield.common.errors import FormError
+from posefield.question.motion_question import Exact, Moment, Target
+
+Question = TypeVar("Question", bound=Struct)
+MOMENTS: tuple[Moment, ...] = get_args(Moment)
+# The number syntax of JSON, the same as in a body: no nan, inf, 1_000 or blanks.
+NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
+FLAGS = {"true": True, "false": False}
+CONTROLS = "controls"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Field of a query as a text parameter.
+
+    word: its name in text. kind: type of one value. read: converts a text to a value, and raises
+    ValueError for an invalid one. repeated: whether it may occur several times, once per value.
+    """
+
+    field: str
+    word: str
+    kind: Any
+    read: Callable[[str], Any]
+    repeated: bool
+    default: Any
+    help: str
+    unit: str | None
+    metavar: str | None
+
+    @property
+    def required(self) -> bool:
+        """Return whether a query must contain it."""
+        return self.default is NODEFAULT
+
+
+@cache
+def parameters(form: type[Struct]) -> Mapping[str, Parameter]:
+    """Return the parameters of a query by name, without the controls."""
+    hints = get_type_hints(form, include_extras=True)
+    found = [
+        _parameter(each, hints[each.name]) for each in structs.fields(form) if each.name != CONTROLS
+    ]
+    return {each.word: each for each in found}
+
+
+def question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Question:
+    """Return the query of names and texts; a name that is not a parameter is a control.
+
+    Raises FormError for an invalid text, a name that occurs twice and one that is missing, and the
+    errors of the query's own checks.
+    """
+    known, said, controls = parameters(form), dict[str, Any](), dict[str, float]()
+    for name, text in pairs:
+        parameter = known.get(name)
+        where = controls if parameter is None else said
+        field = name if parameter is None else parameter.field
+        if parameter is not None and parameter.repeated:
+            said.setdefault(field, []).append(value(parameter, text))
+        elif field in where:
+            raise FormError(name, "given twice, expected once")
+        else:
+            where[field] = (
+                _read(name, number, text) if parameter is None else value(parameter, text)
+            )
+    for parameter in known.values():
+        if parameter.required and parameter.field not in said:
+            expected = parameter.help or "the name of a control"
+            raise FormError(parameter.word, f"missing, expected {expected}")
+    if CONTROLS in form.__struct_fields__:
+        said[CONTROLS] = controls
+    if "targets" in said:
+        said["targets"] = tuple(said["targets"])
+    return form(**said)
+
+
+def value(parameter: Parameter, text: str) -> Any:
+    """Return the value of a parameter's text.
+
+    Raises FormError for an invalid text.
+    """
+    return _read(parameter.word, parameter.read, text)
+
+
+def _read(name: str, read: Callable[[str], Any], text: str) -> Any:
+    try:
+        return read(text)
+    except ValueError as fault:
+        raise FormError(name, str(fault)) from None
+
+
+def number(text: str) -> float:
+    """Return the finite number of a text.
+
+    Raises ValueError for any other text.
+    """
+    found = float(text) if NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(found):
+        raise ValueError(f"{text!r}, expected a finite number")
+    return found
+
+
+def whole(text: str) -> int:
+    """Return the whole number of a text.
+
+    Raises ValueError for any other text.
+    """
+    # Whole numbers of queries are below ten digits; int would read any length.
+    if not re.fullmatch("[0-9]{1,9}", text, re.ASCII):
+        raise ValueError(f"{text!r}, expected a whole number")
+    return int(text)
+
+
+def choice(choices: tuple[str, ...]) -> Callable[[str], str]:
+    """Return a function that accepts one of the choices, and raises ValueError for others."""
+
+    def read(text: str) -> str:
+        if text not in choices:
+            raise ValueError(f"{text!r}, expected one of {', '.join(choices)}")
+        return text
+
+    return read
+
+
+def position(text: str) -> tuple[float, float, float]:
+    """Return the three numbers of a text, separated by commas, m.
+
+    Raises ValueError for any other text.
+    """
+    try:
+        x, y, z = map(number, text.split(","))
+    except ValueError:
+        raise ValueError(f"{text!r}, expected x,y,z in metres") from None
+    return x, y, z
+
+
+def flag(text: str) -> bool:
+    """Return the boolean of "true" or "false".
+
+    Raises ValueError for any other text.
+    """
+    return FLAGS[choice(tuple(FLAGS))(text)]
+
+
+def exact(text: str) -> Exact:
+    """Return auto, none, or names of controls separated by commas.
+
+    Raises ValueError for any other text.
+    """
+    if text in ("auto", "none"):
+        return cast(Exact, text)
+    names = tuple(text.split(","))
+    if "" in names:
+        raise ValueError(f"{text!r}, expected auto, none or names of controls, commas between")
+    return names
+
+
+def target(text: str) -> Target:
+    """Return the target of a text.
+
+    Raises ValueError for an invalid text.
+    """
+    mark = max(text.rfind(":"), text.rfind("="))
+    joint, _, moment = text[: max(mark, 0)].rpartition("@")
+    try:
+        place = position(text[mark + 1 :])
+        when = {"at": moment} if moment in MOMENTS else {"time": number(moment)}
+    except ValueError:
+        joint = ""
+    if not joint:
+        raise ValueError(
+            f"{text!r}, expected JOINT@MOMENT:X,Y,Z, m; a moment is seconds or one of "
+            f"{', '.join(MOMENTS)}"
+        )
+    return Target(joint, place, **when)
+
+
+READERS: Mapping[Any, Callable[[str], Any]] = {
+    float: number,
+    int: whole,
+    bool: flag,
+    str: str,
+    Exact: exact,
+    Target: target,
+    tuple[float, float, float]: position,
+}
+"""Function that reads a text, by type of field; literals have their choices instead."""
+
+
+def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
+    kind, meta = hint, Meta()
+    if get_origin(hint) is Annotated and isinstance(get_args(hint)[1], Meta):
+        kind, meta = get_args(hint)
+    kind = _without_none(kind)
+    repeated = get_origin(kind) in (list, tuple) and kind not in READERS
+    one = get_args(kind)[0] if repeated else kind
+    read = choice(get_args(one)) if get_origin(one) is Literal else READERS[_bare(one)]
+    extra = meta.extra or {}
+    return Parameter(
+        field.name,
+        extra.get("word", field.name),
+        one,
+        read,
+        repeated,
+        NODEFAULT if field.required else field.default,
+        meta.description or "",
+        extra.get("unit"),
+        extra.get("metavar"),
+    )
+
+
+def _without_none(kind: Any) -> Any:
+    if get_origin(kind) not in (Union, UnionType) or type(None) not in get_args(kind):
+        return kind
+    rest = [part for part in get_args(kind) if part is not type(None)]
+    return rest[0] if len(rest) == 1 else Union[tuple(rest)]  # noqa: UP007  # built at run time
+
+
+def _bare(kind: Any) -> Any:
+    """Return a type without its annotations, as in READERS."""
+    return get_args(kind)[0] if get_origin(kind) is Annotated else kind

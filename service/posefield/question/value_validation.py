@@ -1,0 +1,43 @@
+"""Validation of single values; all functions raise InvalidField."""
+
+import math
+
+from posefield.common.errors import InvalidField
+
+ROUNDING = 2.0**-23
+"""Relative error of a number in single precision."""
+
+
+def number(field: str, value: object) -> float:
+    """Return a finite number, 0 for -0.
+
+    Raises InvalidField for any other value.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidField(field, f"{value!r}, expected a number")
+    try:
+        found = float(value)
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
+        raise InvalidField(field, f"{found}, expected a finite number")
+    return found + 0.0
+
+
+def within(field: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise InvalidField for a value outside low to high."""
+    if not low <= value <= high:
+        # Nine digits tell any two numbers of single precision apart.
+        raise InvalidField(field, f"{value:.9g} {unit}, expected {low:.9g} to {high:.9g} {unit}")
+
+
+def rounded_within(field: str, value: float, low: float, high: float, unit: str) -> float:
+    """Return the value, or `high` for a value that is `high` rounded to single precision.
+
+    Clients read durations from responses, and many keep them as float32. Raises InvalidField for a
+    value outside low to high.
+    """
+    if high < value <= high * (1.0 + ROUNDING):
+        return high
+    within(field, value, low, high, unit)
+    return value

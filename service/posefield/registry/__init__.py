@@ -1,0 +1,1 @@
+"""Model registry: model sources, loading and hot reload."""

@@ -1,0 +1,98 @@
+"""Ranking of clips to capture next: candidates across the sampled ranges, or given ones."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats, Indices
+from posefield.kriging import acquisition
+from posefield.kriging.acquisition import Worth
+from posefield.kriging.support import Support
+from posefield.model_file.model_card import Control, ModelCard
+from posefield.question.model_question import SuggestQuestion
+from posefield.question.results import Suggestion, Suggestions
+from posefield.question.value_validation import within
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import input_limits, question_validation
+
+DRAWN, GIVEN = 1000, 10_000
+"""Number of drawn candidates, and the largest number of given ones."""
+
+
+def suggest(
+    model: Synthesizer,
+    asked: SuggestQuestion,
+    candidates: Sequence[Mapping[str, float]] | None = None,
+) -> Suggestions:
+    """Return points to capture in order of their expected variance reduction.
+
+    candidates: the points, by their controls; None for points across the sampled ranges. Each rank
+    assumes that the points before it were captured. Raises InvalidField for an unknown performer
+    and for an unusable candidate.
+    """
+    card, own = model.session.card, model.door.support
+    question_validation.labels(card.performers, asked.performer)
+    points = _drawn(own) if candidates is None else _given(model, candidates)
+    captured = _captured(card, asked.performer)
+    ranked = acquisition.rank(own.scaled(points), own.samples[captured], asked.count)
+    found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
+    return Suggestions(model.identity, asked.performer, len(points), found)
+
+
+def _captured(card: ModelCard, performer: str | None) -> Indices:
+    """Return the indices of the performer's captured clips; of all clips for None."""
+    if performer is None:
+        return np.arange(len(card.examples))
+    return np.flatnonzero(np.array(card.moved_by) == card.performers.index(performer))
+
+
+def _given(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
+    """Return the points (C, d) of candidates, in the card's order."""
+    within("candidates", len(candidates), 1, GIVEN, "points")
+    card = model.session.card
+    rows = []
+    for index, controls in enumerate(candidates):
+        try:
+            input_limits.check_names(card, controls)
+            rows.append([_value(control, controls) for control in card.controls])
+        except InvalidField as fault:
+            raise InvalidField(f"candidates/{index}/{fault.field}", fault.message) from fault
+    return np.array(rows)
+
+
+def _value(control: Control, controls: Mapping[str, float]) -> float:
+    """Return the value of a candidate's control; InvalidField if it is missing or unusable."""
+    if control.name not in controls:
+        raise InvalidField(f"controls/{control.name}", f"missing; give a number in {control.unit}")
+    return question_validation.checked(control, controls[control.name])
+
+
+def _drawn(own: Support) -> Floats:
+    """Return points (DRAWN, d) across the sampled ranges by Roberts' additive recurrence."""
+    d = len(own.low)
+    ratio = 2.0
+    for _ in range(64):
+        # The root of x^(d + 1) = x + 1; for one control, the golden ratio.
+        ratio = (1.0 + ratio) ** (1.0 / (d + 1))
+    steps = ratio ** -np.arange(1.0, d + 1.0)
+    share = np.mod(0.5 + np.arange(1, DRAWN + 1)[:, None] * steps, 1.0)
+    return own.low + share * (own.high - own.low)
+
+
+def _suggestion(
+    card: ModelCard, own: Support, captured: Indices, point: Floats, found: Worth
+) -> Suggestion:
+    """Return a point with its nearest captured clip and the control in which that differs most."""
+    gaps = 0.5 * np.abs(own.samples[captured] - own.scaled(point[None]))
+    nearest = int(np.argmin(np.sum(np.square(gaps), axis=1)))
+    control = int(np.argmax(gaps[nearest]))
+    names = [each.name for each in card.controls]
+    return Suggestion(
+        dict(zip(names, point.tolist(), strict=True)),
+        found.gain,
+        found.variance,
+        card.sources[captured[nearest]],
+        names[control],
+        float(gaps[nearest, control]),
+    )

@@ -1,0 +1,172 @@
+"""Synthesis of clips, and their frame count, warnings and solver cost before synthesis."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
+from posefield.constraints import constrained_motion
+from posefield.constraints.targets import NOTHING, Goals
+from posefield.locomotion import stride
+from posefield.locomotion.stride import Strides
+from posefield.motion.clip import assemble
+from posefield.motion.skeleton import Skeleton
+from posefield.question.motion_question import ClipQuestion
+from posefield.question.results import ClipAnswer, PoseAnswer
+from posefield.synthesis import frame_times
+from posefield.synthesis.poses import ANSWERED
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.question_validation import Question
+
+OPEN_COST, PIN_COST = 4, 4
+"""Cost of a target of a clip with open controls, and of pinned feet, relative to the cost of a
+target.
+"""
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """Properties of a clip that are known before its synthesis.
+
+    frames: number of frames. warnings: as in the answer. missed: true if the clip misses a target.
+    """
+
+    frames: int
+    warnings: tuple[str, ...]
+    missed: bool = False
+
+
+def clip(model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MOST_POSES) -> ClipAnswer:
+    """Return the clip of a question; frame i is the pose at start + i / fps.
+
+    most: largest number of frames. The N steps of a loop share the duration evenly, but are played
+    at fps. Raises as `poses.pose` does, and InvalidField for a loop of a model that is not cyclic,
+    for joint names without roles and for more than `most` frames.
+    """
+    question = model.question(asked)
+    joints = _joints(model, asked)
+    goals = model.keeper.goals(question, asked)
+    if goals:
+        answer = _held(model, question, goals, asked, most)
+    else:
+        answer = _plain(model, question, asked, most)
+    turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
+    return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
+
+
+def check(model: Synthesizer, asked: ClipQuestion) -> None:
+    """Raise the errors of `clip` that are known before the duration of the clip is."""
+    model.keeper.goals(model.question(asked), asked)
+    _joints(model, asked)
+    frame_times.window(asked, model.durations[1])
+
+
+def prospect(
+    model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MOST_POSES
+) -> Prospect:
+    """Return frame count, warnings and misses of a clip, without synthesising its frames.
+
+    The duration comes from a call with this question alone, as in `clip`: in a batch it differs in
+    the last digit, and a question that ends with the clip could pass here and be refused later.
+    Raises as `clip` does.
+    """
+    question = model.question(asked)
+    _joints(model, asked)
+    duration, misses = _outlook(model, question, asked)
+    times = frame_times.times(asked, duration, most)
+    # A loop ends with its first frame again.
+    return Prospect(len(times) + asked.loop, question.warnings, misses)
+
+
+def solver_cost(model: Synthesizer, asked: ClipQuestion) -> int:
+    """Return the cost of solving the targets of a clip, in units of a plain target.
+
+    Open controls and pinned feet cost several units each (decision 0028).
+    """
+    targets, controls = len(asked.targets), len(model.session.card.controls)
+    each = OPEN_COST if len(asked.controls) < controls else 1
+    return each * targets + PIN_COST * asked.pin_feet
+
+
+def _joints(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
+    """Return the skeleton with the requested names.
+
+    Raises InvalidField for names of a convention without roles, and for a loop of a model that is
+    not cyclic.
+    """
+    if asked.loop and not model.session.card.cyclic:
+        raise InvalidField(
+            "loop", "true, expected false: this model's last pose does not lead into its first"
+        )
+    return model.skeleton(asked.names)
+
+
+def _plain(
+    model: Synthesizer, question: Question, asked: ClipQuestion, most: int
+) -> PoseAnswer[np.float64]:
+    """Return the frames of a clip without constraints."""
+    when = frame_times.times(asked, _duration(model, question), most)
+    answer = _answer(model, question, asked, when)
+    if model.keeper.measures:
+        predicted = model.keeper.held(question, NOTHING)
+        measured = model.keeper.measured(question, predicted)
+        answer = replace(answer, trust=replace(answer.trust, measured=measured))
+    if asked.loop or asked.root == "in_place":
+        card = model.session.card
+        measure = stride.strides if card.cyclic else stride.straight
+        way = measure(model.session, question.point, question.labels, question.level)
+        answer = _routed(model, answer, way, asked)
+    return answer
+
+
+def _held(
+    model: Synthesizer, question: Question, goals: Goals, asked: ClipQuestion, most: int
+) -> PoseAnswer[np.float64]:
+    """Return the frames of a clip that meets constraints."""
+    held = model.meeting(question, goals, asked.extrapolate)
+    when = frame_times.times(asked, model.sensible(held.duration), most)
+    trust = model.held_trust(asked, question, held)
+    answer = model.keeper.poses(question, held, when, trust)
+    routed = asked.loop or asked.root == "in_place"
+    return _routed(model, answer, constrained_motion.of(held), asked) if routed else answer
+
+
+def _outlook(model: Synthesizer, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
+    """Return the duration of a clip, s, and whether it misses a target.
+
+    Constraints can change the duration, as a target speed does.
+    """
+    goals = model.keeper.goals(question, asked)
+    strict = asked.extrapolate == "refuse" or model.session.card.cyclic
+    if not (goals.targets or (goals and strict)):
+        return _duration(model, question), False
+    held = model.meeting(question, goals, asked.extrapolate)
+    targets = held.met[len(held.met) - len(goals.targets) :]
+    misses = asked.extrapolate != "ok" and not all(met.reached for met in targets)
+    return model.sensible(held.duration), misses
+
+
+def _duration(model: Synthesizer, question: Question) -> float:
+    """Return the duration of the clip, s; OutsideSamples if extrapolation makes it implausible."""
+    durations = model.session.durations(question.point, question.labels, question.level)
+    return model.sensible(float(durations[0]))
+
+
+def _routed(
+    model: Synthesizer, answer: PoseAnswer[np.float64], way: Strides, asked: ClipQuestion
+) -> PoseAnswer[np.float64]:
+    """Return the answer in place, or closed to a loop, as the question requests."""
+    stays = asked.root == "in_place" and model.session.card.root == "travelling"
+    answer = frame_times.in_place(answer, way) if stays else answer
+    return frame_times.closed(answer, None if stays else way) if asked.loop else answer
+
+
+def _answer(
+    model: Synthesizer, question: Question, asked: ClipQuestion, when: Floats
+) -> PoseAnswer[np.float64]:
+    labels, level = question.labels, question.level
+    answers = model.session.run(question.point, when[None], *ANSWERED, labels=labels, level=level)
+    rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
+    trust = model.trust(asked, question, float(duration), float(sigma))
+    return PoseAnswer(when, rotations, root, offsets, trust)

@@ -1,0 +1,214 @@
+"""Poses of many characters at one time each, in a few large calls of the graph per level of detail.
+
+All work is on whole columns, without a loop over characters. Errors name the index of a character.
+"""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefield.common import cancellation
+from posefield.common.units import Floats, Indices, Singles
+from posefield.inference import level_selection
+from posefield.inference.level_selection import Ladder, View
+from posefield.motion import blend
+from posefield.motion.crowd_clip import CrowdPoses, Placement
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import crowd_question, crowd_validation
+from posefield.validation.crowd_question import Blending, CrowdQuestion
+
+# Poses of one call: the fewest, the most, and the number of calls to aim for in between. Smaller
+# calls are dominated by their overhead; larger ones exceed a core's cache between operators. The
+# number of calls is fixed, not the number of cores: rounding depends on it.
+FEWEST, BATCH, CALLS = 256, 1536, 8
+# Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
+SLACK = 1e-5
+# Durations differ between levels, and a client does not know the level that its time is checked
+# against where a view chooses levels or two levels are blended.
+COARSE_SLACK = 0.1
+
+# Threads suffice: onnxruntime and NumPy release the interpreter lock while they compute.
+_WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Inputs of the graph: controls (N, d), times (N, 1) and labels (N, p)."""
+
+    controls: Singles
+    times: Singles
+    labels: Singles
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def rows(self, which: Indices) -> "_Asked":
+        """Return the rows at these indices."""
+        return _Asked(*(column[which] for column in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Outputs of the graph for N characters, each in the frame of its own clip."""
+
+    rotations: Singles
+    root_position: Singles
+    bone_offsets: Singles
+    duration: Singles
+    sigma: Singles
+    travel: Singles
+
+
+def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
+    """Return the poses of a crowd, placed where its characters stand.
+
+    With a view, distances are measured to the characters' placements. Raises InvalidField and
+    OutsideSamples as `poses.pose` does for one character, with the index of the first character at
+    fault.
+    """
+    card = model.session.card
+    controls, supported, said = crowd_validation.controls(card, model.door.support, question)
+    labels = crowd_question.labels(question, card.performers)
+    crowd_question.check_levels(question, len(card.levels))
+    early = question.times < 0.0
+    crowd_validation.refuse("time", question.times, early, "s, expected 0 s or later")
+    levels, error_px, sentences = _levels(model, question)
+    asked = _Asked(controls.astype(np.float32), question.times.astype(np.float32)[:, None], labels)
+    block = _answers(model, asked, levels)
+    if question.blending is not None:
+        _blend(model, asked, block, levels, question.blending)
+    crowd_validation.check_durations(card, block.duration)
+    exact = (levels == 0) & (not isinstance(question.detail, View)) & (question.blending is None)
+    slack = np.where(exact, SLACK, COARSE_SLACK)
+    crowd_validation.check_times(question.times, block.duration, slack)
+    if question.root == "in_place":
+        _stay(block)
+    _place(block, question.placement)
+    return CrowdPoses(
+        model.identity,
+        card.skeleton,
+        block.rotations,
+        block.root_position,
+        block.bone_offsets,
+        levels,
+        error_px,
+        block.duration,
+        block.sigma,
+        supported,
+        (*said, *sentences),
+    )
+
+
+def _levels(
+    model: Synthesizer, question: CrowdQuestion
+) -> tuple[Indices, Singles | None, tuple[str, ...]]:
+    """Return levels (N,), the pixels (N,) of their errors (None without a view), and warnings."""
+    if not isinstance(question.detail, View):
+        return question.detail, None, ()
+    ladder, asked = model.ladder, question.detail
+    middle = question.placement.positions + model.middle
+    scale = level_selection.pixels_per_metre(asked.camera, middle, model.radius)
+    if question.blending is None or asked.previous is None:
+        choice = level_selection.see(ladder, scale, asked)
+        levels, said = choice.levels, level_selection.warnings(choice, ladder, asked)
+    else:
+        levels, said = _held(ladder, scale, asked, asked.previous, question.blending)
+    return levels, level_selection.error_pixels(ladder.errors, scale, levels), said
+
+
+def _held(
+    ladder: Ladder, scale: Floats, asked: View, previous: Indices, blending: Blending
+) -> tuple[Indices, tuple[str, ...]]:
+    """Return levels (N,) and warnings where some characters are in a transition between two levels.
+
+    Characters in transition keep their level; the costs of their two poses are subtracted from the
+    budget of the others.
+    """
+    free = blending.shares >= 1.0
+    levels, budget = previous.copy(), asked.budget
+    if budget is not None:
+        spent = ladder.costs[previous[~free]] + ladder.costs[blending.levels[~free]]
+        budget = max(budget - float(spent.sum()), 0.0)
+    if not free.any():
+        return levels, ()
+    rest = replace(asked, previous=previous[free], budget=budget)
+    choice = level_selection.see(ladder, scale[free], rest)
+    levels[free] = choice.levels
+    return levels, level_selection.warnings(choice, ladder, rest)
+
+
+def _answers(model: Synthesizer, asked: _Asked, levels: Indices) -> _Block:
+    joints = len(model.session.card.skeleton)
+    shapes = ((joints, 4), (3,), (joints, 3), (), (), (3,))
+    block = _Block(*(np.empty((len(asked), *shape), np.float32) for shape in shapes))
+
+    def fill(part: tuple[int, Indices | slice]) -> None:
+        level, rows = part
+        given, labels = (asked.controls[rows], asked.times[rows]), asked.labels[rows]
+        answers = model.session.run(*given, *vars(block), labels=labels, level=level)
+        for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
+            whole[rows] = answer[:, 0] if name in _TIMED else answer
+
+    # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
+    list(_WORKERS.map(cancellation.carried(fill), list(_parts(levels))))
+    return block
+
+
+def _blend(
+    model: Synthesizer, asked: _Asked, block: _Block, levels: Indices, blending: Blending
+) -> None:
+    """Blend poses of the previous levels into those of characters in transition, in place."""
+    rows = np.flatnonzero((blending.shares < 1.0) & (blending.levels != levels))
+    if len(rows):
+        before = _answers(model, asked.rows(rows), blending.levels[rows])
+        shares = blending.shares[rows].astype(np.float32)
+        for name, whole in vars(block).items():
+            mixing = blend.rotations if name == "rotations" else blend.straight
+            whole[rows] = mixing(getattr(before, name), whole[rows], shares)
+
+
+_TIMED = ("rotations", "root_position", "travel")
+
+
+def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
+    """Yield the level and rows of each call; contiguous rows as a slice."""
+    most = min(max(len(levels) // CALLS, FEWEST), BATCH)
+    for level in np.unique(levels).tolist():
+        rows = np.flatnonzero(levels == level)
+        for part in np.array_split(rows, -(-len(rows) // most)):
+            together = part[-1] - part[0] + 1 == len(part)
+            yield level, slice(part[0], part[-1] + 1) if together else part
+
+
+def _stay(block: _Block) -> None:
+    """Subtract the travel within the cycle from the poses, in place."""
+    block.root_position[:, [0, 2]] -= block.travel[:, :2]
+    _turn_roots(block, -block.travel[:, 2])
+
+
+def _place(block: _Block, placement: Placement) -> None:
+    """Move the poses to the characters' positions and headings, in place."""
+    # Within one turn, where float32 still resolves small angles.
+    angles = np.remainder(placement.headings, 2.0 * np.pi).astype(np.float32)
+    _turn_roots(block, angles)
+    _turn_paths(block, angles)
+    np.add(block.root_position, placement.positions, out=block.root_position, casting="same_kind")
+
+
+def _turn_paths(block: _Block, angles: Singles) -> None:
+    """Rotate the root positions about the vertical through each origin, in place."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    x, z = block.root_position[:, 0].copy(), block.root_position[:, 2].copy()
+    block.root_position[:, 0], block.root_position[:, 2] = cos * x + sin * z, cos * z - sin * x
+
+
+def _turn_roots(block: _Block, angles: Singles) -> None:
+    """Rotate the root orientations about the vertical, in place."""
+    cos, sin = np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None]
+    root = block.rotations[:, 0]
+    # The quaternion product of (cos, 0, sin, 0) with (w, x, y, z).
+    across = np.stack([-root[:, 2], root[:, 3], root[:, 0], -root[:, 1]], axis=1)
+    block.rotations[:, 0] = cos * root + sin * across

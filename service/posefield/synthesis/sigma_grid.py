@@ -1,0 +1,87 @@
+"""Sigma and support on a grid of two controls."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from posefield.common import cancellation
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats, Singles, Truths
+from posefield.model_file.model_card import ModelCard
+from posefield.question.model_question import SigmaQuestion
+from posefield.question.results import Axis, SigmaGrid
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import input_limits, question_validation
+
+# Larger batches exceed a core's cache between operators and take 1.5 times as long per row.
+BATCH = 1024
+
+
+def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
+    """Return the grid of sigma and support.
+
+    Raises InvalidField for an unknown control or performer, and for a value too far outside the
+    sampled range.
+    """
+    card = model.session.card
+    input_limits.check_names(card, asked.controls)
+    labels = question_validation.labels(card.performers, asked.performer)
+    across = _axis(card, "across", asked.across, asked.columns, asked)
+    along = _axis(card, "along", asked.along, asked.rows, asked)
+    fixed = _fixed(card, asked)
+    points = _points(card, across, along, fixed)
+    sigma = _sigmas(model, points, labels)
+    shape = asked.rows, asked.columns
+    return SigmaGrid(
+        model.identity,
+        across,
+        along,
+        fixed,
+        asked.performer,
+        sigma.reshape(shape),
+        _inside(card, points).reshape(shape),
+        model.door.support.holds(points).reshape(shape),
+    )
+
+
+def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
+    """Return sigma (B,), m, at points (B, d)."""
+    found = []
+    for first in range(0, len(points), BATCH):
+        cancellation.check()
+        found.append(model.session.sigmas(points[first : first + BATCH], labels))
+    return np.concatenate(found)
+
+
+def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> Axis:
+    control = card.control(name)
+    if control is None:
+        known = ", ".join(c.name for c in card.controls)
+        raise InvalidField(field, f"{name!r}, expected one of this model's controls, {known}")
+    if name in asked.controls:
+        raise InvalidField(f"controls/{name}", f"given, and {field} the grid too; expected one")
+    room = asked.margin * (control.maximum - control.minimum)
+    return Axis(control, np.linspace(control.minimum - room, control.maximum + room, count))
+
+
+def _fixed(card: ModelCard, asked: SigmaQuestion) -> dict[str, float]:
+    """Return the values of the controls that are not axes, in the card's order."""
+    usual = {control.name: control.default for control in card.controls} | dict(asked.controls)
+    return {
+        control.name: question_validation.checked(control, usual[control.name])
+        for control in card.controls
+        if control.name not in (asked.across, asked.along)
+    }
+
+
+def _points(card: ModelCard, across: Axis, along: Axis, fixed: Mapping[str, float]) -> Floats:
+    """Return the controls (R C, d) of the grid points in the card's order, row by row."""
+    right, up = np.meshgrid(across.values, along.values)
+    columns = {across.control.name: right.ravel(), along.control.name: up.ravel()}
+    full = (columns.get(c.name, np.full(right.size, fixed.get(c.name))) for c in card.controls)
+    return np.stack(list(full), axis=1)
+
+
+def _inside(card: ModelCard, points: Floats) -> Truths:
+    low, high = np.transpose([input_limits.sampled(control) for control in card.controls])
+    return np.all((points >= low) & (points <= high), axis=1)

@@ -1,0 +1,1 @@
+"""Validation of questions against a model: controls, performers, limits, open controls."""

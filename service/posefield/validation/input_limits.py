@@ -1,0 +1,56 @@
+"""Limits of a model's inputs, shared by questions for one character and for crowds."""
+
+from collections.abc import Iterable
+
+from posefield.common.errors import InvalidField
+from posefield.model_file.model_card import Control, ModelCard
+
+# A clip this many times longer or shorter than any captured one is no plausible motion.
+FARTHEST = 10.0
+
+
+def check_names(card: ModelCard, names: Iterable[str]) -> None:
+    """Raise InvalidField for the first name that is not a control of the model."""
+    for name in names:
+        if card.control(name) is None:
+            known = ", ".join(c.name for c in card.controls)
+            raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+
+
+def reach(control: Control) -> tuple[float, float]:
+    """Return the lowest and the highest accepted value of a control.
+
+    The limits prevent overflow of float32.
+    """
+    room = 100.0 * (control.maximum - control.minimum)
+    return control.minimum - room, control.maximum + room
+
+
+def sampled(control: Control) -> tuple[float, float]:
+    """Return the lowest and the highest sampled value of a control.
+
+    A slack of a millionth of the range allows for rounding of values that a client read from the
+    card.
+    """
+    slack = 1e-6 * (control.maximum - control.minimum)
+    return control.minimum - slack, control.maximum + slack
+
+
+def durations(card: ModelCard) -> tuple[float, float]:
+    """Return the shortest and the longest plausible duration of a clip, s."""
+    low, high = card.durations
+    return low / FARTHEST, high * FARTHEST
+
+
+def senseless(card: ModelCard, duration: float) -> str:
+    """Return the message for controls that lead to an implausible duration, s."""
+    low, high = card.durations
+    return (
+        f"so far outside what was sampled that the clip would last {duration:.3g} s; "
+        f"captured clips last {low:.3g} to {high:.3g} s"
+    )
+
+
+def known(performers: tuple[str, ...]) -> str:
+    """Return the accepted performers as text for a message."""
+    return f"one of {', '.join(performers)}" if performers else "none: this model knows none"

@@ -1,1 +1,0 @@
-"""Answers that satisfy constraints: the smallest correction of the predicted reduced motion."""
