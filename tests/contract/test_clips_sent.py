@@ -5,7 +5,6 @@ import io
 import logging
 import time
 import zipfile
-from functools import partial
 from pathlib import Path
 
 import httpx
@@ -19,8 +18,8 @@ from posefield.encode.formats import ENCODERS
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import build
-from posefield.http.operations import OPERATIONS, query_clips
-from posefield.http.service import Formatted
+from posefield.http.clip_operations import query_clips
+from posefield.http.operations import OPERATIONS
 
 PATH = "/v1/models/reach/clips"
 MANY = 1000
@@ -41,7 +40,7 @@ def counting(most=MANY):
 
 def served(loaded, encoder):
     """The application with one encoder in place of the others for many clips."""
-    handlers = {"queryClipsInFormat": Formatted(PACKS, partial(query_clips, {"usdc": encoder}))}
+    handlers = {"queryClipsInFormat": query_clips({"usdc": encoder})}
     return build(contract.load(), {**OPERATIONS, **handlers}, loaded, Settings())
 
 

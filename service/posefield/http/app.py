@@ -7,7 +7,7 @@ from functools import partial
 from starlette.types import Receive, Scope, Send
 
 from posefield.common.errors import UnknownFormat
-from posefield.http import pages
+from posefield.http import pages, request_cycle
 from posefield.http.access import access_policy
 from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
@@ -17,9 +17,10 @@ from posefield.http.middleware import cors, request_head
 from posefield.http.middleware.request_head import HeadLimits
 from posefield.http.operations import OPERATIONS
 from posefield.http.readiness import Readiness
-from posefield.http.request_cycle import Exchange, Site
+from posefield.http.request_cycle import Site
 from posefield.http.routing import Map, Route
-from posefield.http.service import Formatted, Handler, Service
+from posefield.http.service import Service
+from posefield.http.steps import Handler, Steps
 from posefield.http.telemetry.telemetry import SILENT, Telling
 from posefield.registry.model_registry import Library
 from posefield.registry.model_reload import Fixed
@@ -70,23 +71,22 @@ def build(
     places = Map(
         route
         for operation in agreed.operations
-        for route in _routes(operation, handlers[operation.id], service)
+        for route in _routes(operation, handlers[operation.id])
     )
     hosts = request_head.names(settings.hosts, f"{PREFIX}HOSTS")
     limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
     return App(Site(places, service, partial(_missing, places), limits), lifespan)
 
 
-def _routes(operation: Operation, handler: Handler, service: Service) -> Iterator[Route]:
+def _routes(operation: Operation, handler: Handler) -> Iterator[Route]:
     """Yield the routes of an operation: one per format if its path ends in `{format}`, else one."""
-    endpoint = partial(handler, service)
-    formats = handler.formats if isinstance(handler, Formatted) else {}
+    formats = handler.formats if isinstance(handler, Steps) else {}
     offers = tuple((name, each.media_type) for name, each in formats.items())
     _check_formats(operation, dict(offers))
     if not operation.formats:
-        yield Route(operation, endpoint, offers=offers)
+        yield Route(operation, handler, offers=offers)
     for name in operation.formats:
-        yield Route(operation, endpoint, name)
+        yield Route(operation, handler, name)
 
 
 def _check_formats(operation: Operation, encoders: Mapping[str, str]) -> None:
@@ -98,7 +98,7 @@ def _check_formats(operation: Operation, encoders: Mapping[str, str]) -> None:
 
 
 class App:
-    """ASGI application; runs an Exchange for each request."""
+    """ASGI application; see `request_cycle` for a request."""
 
     def __init__(self, site: Site, lifespan: Lifespan) -> None:
         self.site = site
@@ -106,7 +106,7 @@ class App:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            await Exchange(self.site, scope, receive, send).run()
+            await request_cycle.handle(self.site, scope, receive, send)
         elif scope["type"] == "lifespan":
             await receive()
             async with self._lifespan(self.site):

@@ -1,43 +1,41 @@
-"""Handlers of pose requests; formats other than JSON are sent as attachments."""
+"""Steps of pose requests; formats other than JSON are sent as attachments."""
 
+from contextlib import AbstractAsyncContextManager, nullcontext
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from starlette.requests import Request
 from starlette.responses import Response
 
 from posefield.constraints.targets import Goals
 from posefield.encode.files.media_types import JSON
-from posefield.encode.formats import TableEncoder
-from posefield.http import responses, service
+from posefield.encode.formats import POSE_ENCODERS, TableEncoder
+from posefield.http import responses
 from posefield.http.concurrency import worker_threads
-from posefield.http.decoding import request_questions
-from posefield.http.service import Service
+from posefield.http.steps import Context, Steps, from_body, from_url
 from posefield.question.motion_question import PoseQuestion
 from posefield.question.results import PoseAnswer
 from posefield.synthesis import poses
 from posefield.synthesis.poses import Moments
-from posefield.synthesis.synthesizer import Synthesizer
 
-PoseEncoder = TableEncoder[PoseAnswer[Any]]
-
-
-async def get_pose(encoder: PoseEncoder, served: Service, request: Request) -> Response:
-    """Return poses for the query parameters."""
-    question = request_questions.of_url(PoseQuestion, request)
-    return await _answer(served, service.model(request), question, encoder)
+Poses = Context[TableEncoder[PoseAnswer[Any]]]
 
 
-async def query_pose(encoder: PoseEncoder, served: Service, request: Request) -> Response:
-    """Return poses for a JSON body."""
-    question = await request_questions.of_body(
-        PoseQuestion, request, served.settings.body_limit, served.bodies
-    )
-    return await _answer(served, service.model(request), question, encoder)
+@dataclass(frozen=True)
+class PoseTask:
+    """A validated question for poses.
+
+    goals: its constraints. apart: true if synthesis and encoding take a thread.
+    """
+
+    moments: Moments
+    goals: Goals
+    apart: bool
 
 
-async def _answer(
-    served: Service, model: Synthesizer, question: PoseQuestion, encoder: PoseEncoder
-) -> Response:
+async def validate(context: Poses, question: PoseQuestion) -> PoseTask:
+    """Return the question with its controls, times and constraints checked."""
+    model = context.model
     if question.targets:
         # Open controls are inferred from predictions of every captured clip, which takes time.
         asked = await worker_threads.run(
@@ -46,23 +44,50 @@ async def _answer(
     else:
         asked = poses.moments(model, question)
     goals = model.keeper.goals(asked.question, question)
-    if goals:
-        content = await worker_threads.run(
-            _held, model, asked, goals, encoder, places=worker_threads.SOLVER
-        )
-    elif len(question.times) > encoder.at_once:
-        content = await worker_threads.run(_made, model, asked, encoder)
+    return PoseTask(asked, goals, bool(goals) or len(question.times) > context.form.at_once)
+
+
+def places(context: Poses, task: PoseTask) -> AbstractAsyncContextManager[None]:
+    """Return the limit on requests that take a thread."""
+    if not task.apart:
+        return nullcontext()
+    return worker_threads.SOLVER if task.goals else worker_threads.WORK
+
+
+async def synthesise(context: Poses, task: PoseTask) -> PoseAnswer[Any]:
+    """Return the poses: of the constraint solver, of the graph, or of a batch of requests."""
+    model, moments = context.model, task.moments
+    if task.goals:
+        return await worker_threads.within(poses.held, model, moments, task.goals)
+    if task.apart:
+        (row,) = await worker_threads.within(poses.rows, model, [moments])
     else:
-        row = await served.batcher.row(model, asked)
-        content = encoder.encode(poses.posed(model, asked, row))
-    if encoder.media_type == JSON:
+        row = await context.service.batcher.row(model, moments)
+    return poses.posed(model, moments, row)
+
+
+async def encode(context: Poses, task: PoseTask, answer: PoseAnswer[Any]) -> bytes:
+    """Return the poses as bytes."""
+    if task.apart:
+        return await worker_threads.within(context.form.encode, answer)
+    return context.form.encode(answer)
+
+
+def respond(context: Poses, answer: PoseAnswer[Any], content: bytes) -> Response:
+    """Return the response."""
+    if context.form.media_type == JSON:
         return Response(content, media_type=JSON)
-    return responses.attachment(content, encoder, model.name)
+    return responses.attachment(content, context.form, context.model.name)
 
 
-def _held(model: Synthesizer, asked: Moments, goals: Goals, encoder: PoseEncoder) -> bytes:
-    return encoder.encode(poses.held(model, asked, goals))
-
-
-def _made(model: Synthesizer, asked: Moments, encoder: PoseEncoder) -> bytes:
-    return encoder.encode(poses.posed(model, asked, poses.rows(model, [asked])[0]))
+_steps = partial(
+    Steps[TableEncoder[PoseAnswer[Any]], PoseQuestion, PoseTask, PoseAnswer[Any], bytes],
+    POSE_ENCODERS,
+    validate=validate,
+    places=places,
+    synthesise=synthesise,
+    encode=encode,
+    respond=respond,
+)
+GET_POSE = _steps(decode=from_url(PoseQuestion))
+QUERY_POSE = _steps(decode=from_body(PoseQuestion))

@@ -1,4 +1,10 @@
-"""Processing of one request: checks, operation, errors, common headers and telemetry."""
+"""One request, from the server to its response: read this file first.
+
+The steps, in their order: find the operation, authorise the client, negotiate the format,
+revalidate the client's cached response, decode the question, validate it, synthesise the answer,
+encode it, and send the response. Authorisation comes before decoding, so that the body of a client
+without a key is not read, and revalidation before it, so that a 304 costs no work (decision 0046).
+"""
 
 import logging
 import os
@@ -32,6 +38,7 @@ from posefield.http.middleware.deadline import Watch
 from posefield.http.middleware.request_head import HeadLimits
 from posefield.http.routing import Map, Place, Route
 from posefield.http.service import Service
+from posefield.http.steps import Context, Handler, Steps
 from posefield.http.telemetry import log, metrics
 from posefield.http.telemetry.telemetry import trace
 
@@ -60,194 +67,138 @@ class Site:
 
 
 class Exchange:
-    """One request, its response in progress and its facts for telemetry."""
+    """State of one request and its response, for the common headers and for telemetry."""
 
     def __init__(self, site: Site, scope: Scope, receive: Receive, send: Send) -> None:
-        self._begun = time.perf_counter()
-        self._site, self._scope, self._send = site, scope, send
-        self._headers: dict[bytes, bytes] = dict(scope["headers"])
-        self._identity = _request_id(self._headers)
-        scope.setdefault("state", {})["request_id"] = self._identity
-        self._request = Request(scope, receive)
-        self._route: Route | None = None
-        self._coding: str | None = None
-        self._tag: str | None = None
-        self._lifetime = b""
-        self._status = self._size = 0
-        self._span = site.service.telling.begin(self._headers)
+        self.begun = time.perf_counter()
+        self.site, self.service, self.scope, self._send = site, site.service, scope, send
+        self.headers: dict[bytes, bytes] = dict(scope["headers"])
+        self.identity = _request_id(self.headers)
+        scope.setdefault("state", {})["request_id"] = self.identity
+        self.request = Request(scope, receive)
+        self.route: Route | None = None
+        self.coding: str | None = None
+        self.tag: str | None = None
+        self.lifetime = b""
+        self.status = self.size = 0
+        self.span = site.service.telling.begin(self.headers)
 
-    async def run(self) -> None:
-        """Send the response, or that of the error, and record the request."""
-        self._site.open += 1
-        try:
-            await self._finish(await self._response())
-        except ClientDisconnect:
-            faults.info("request %s: the client went away", self._identity)
-        except Exception:
-            if self._status:
-                faults.error("request %s failed, and its answer breaks off", self._identity)
-                raise
-            await self._fail()
-        finally:
-            self._site.open -= 1
-            self._site.service.bodies.release(self._scope.get("body_memory", 0))
-            self._note()
-
-    async def _fail(self) -> None:
-        faults.exception("request %s failed", self._identity)
-        self._coding = self._tag = None
-        await self._finish(problems.internal(self._request))
-
-    async def _response(self) -> Response:
-        try:
-            return await self._answer()
-        except RequestFault as fault:
-            return problems.of_fault(self._request, fault)
-        except QueryError as error:
-            return problems.of_query_error(self._request, error)
-        except caching.NotModified:
-            return Response(status_code=304)
-
-    async def _answer(self) -> Response:
-        site, scope = self._site, self._scope
-        site.head_limits.check(scope)
-        found = site.places.find(scope["path"])
-        if found is None:
-            raise site.missing(scope["path"])
-        place, scope["path_params"] = found
-        route = place.routes.get(scope["method"])
-        if route is None:
-            return self._other_method(place)
-        self._route, scope["format"] = route, route.format
-        self._prepare(route)
-        limit = deadline.seconds(self._headers.get(b"prefer"), site.service.settings.deadline)
-        return await site.watch.within(limit, route.endpoint(self._request))
-
-    def _other_method(self, place: Place) -> Response:
-        """Return the response to OPTIONS; raises RequestFault 405 for other methods."""
-        method, allow = self._scope["method"], {"Allow": place.allow}
-        if method != "OPTIONS":
-            detail = f"{method}, expected one of {place.allow}"
-            raise RequestFault(METHOD_NOT_ALLOWED, detail, headers=allow)
-        response = Response(status_code=204, headers=allow)
-        if self._site.service.origins and cors.is_preflight(self._headers):
-            response.raw_headers += cors.preflight(place.allow.encode())
-        return response
-
-    def _prepare(self, route: Route) -> None:
-        """Check overload, access, query parameters, format, model and the client's cached response.
-
-        Raises RequestFault, QueryError for an unknown model, and NotModified.
-        """
-        operation, site, scope = route.operation, self._site, self._scope
-        if site.open > site.service.settings.concurrency and operation.sheds:
-            detail = f"{site.open - 1} requests are being answered"
-            raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
-        self._let_in(route)
-        if scope["query_string"] and not operation.open_query:
-            _check_parameters(self._request, operation)
-        if route.compresses and b"accept-encoding" in self._headers:
-            self._coding = compression.preferred(self._headers[b"accept-encoding"])
-        if route.offers:
-            scope["format"] = negotiation.format_of(self._request, route.offers)
-        if "model" in scope["path_params"]:
-            key = scope["path_params"]["model"]
-            scope["model"] = scope["library"].find(key)
-            if operation.pure:
-                self._lifetime = site.service.lifetime(key)
-                self._check_held(*self._parts(route))
-        elif page := site.service.pages.get(operation.id):
-            self._lifetime = caching.PUBLIC + caching.AGAIN
-            self._check_held(page.digest)
-
-    def _let_in(self, route: Route) -> None:
-        """Set the request's principal and the library that it may read; raises RequestFault."""
-        scope, service = self._scope, self._site.service
-        scope["library"], scope["principal"] = service.library, EVERYONE
-        if service.rules.closed:
-            call, needed = Call(self._identity, scope["method"], route.path), route.operation.scope
-            known = access_control.check(service.rules, scope["headers"], needed, call)
-            scope["principal"] = known
-            if needed is not None:
-                asked = scope["path_params"].get("model")
-                scope["library"] = access_control.seen(service.library, known, asked, call)
-
-    def _parts(self, route: Route) -> tuple[bytes, ...]:
-        """Return all that the response of a pure operation depends on."""
-        scope, chosen = self._scope, (self._scope["format"] or "").encode()
-        model, code = scope["model"], self._site.service.code
-        return code, model.fingerprint, route.name, scope["query_string"], chosen
-
-    def _check_held(self, *parts: bytes) -> None:
-        """Set the entity tag; raises NotModified if the client has a response with this tag."""
-        self._tag = caching.tag(*parts, coding=self._coding)
-        given = self._headers.get(b"if-none-match")
-        if given is not None and caching.held(given.decode("latin-1"), self._tag):
-            raise caching.NotModified
-
-    async def _finish(self, response: Response) -> None:
-        if self._coding is not None and response.status_code == 200:
-            await compression.apply(response, self._coding)
-        response.raw_headers += self._surrounding(response)
-        await response(self._scope, self._request.receive, self._sent)
-
-    def _surrounding(self, response: Response) -> list[tuple[bytes, bytes]]:
-        """Return the common headers: request id, security, connection, CORS and caching."""
-        kind = security_headers.of(response.media_type, response.status_code)
-        headers = [(b"x-request-id", self._identity.encode()), *kind]
-        if self._site.service.readiness.draining and "connection" not in response.headers:
-            # The client's next request must reach a process that continues to run.
-            headers.append((b"connection", b"close"))
-        if origins := self._site.service.origins:
-            headers += cors.headers(self._headers.get(b"origin"), origins)
-        held = response.status_code in (200, 304)
-        if held and self._route and self._route.vary:
-            headers.append((b"vary", self._route.vary))
-        if held and self._tag:
-            headers += [(b"etag", self._tag.encode()), (b"cache-control", self._lifetime)]
-        elif "cache-control" not in response.headers:
-            headers.append((b"cache-control", caching.ALWAYS_NEW))
-        return headers
-
-    async def _sent(self, message: Message) -> None:
+    async def sent(self, message: Message) -> None:
+        """Pass a message on to the server, and note its status or size."""
         if message["type"] == "http.response.start":
-            self._status = message["status"]
+            self.status = message["status"]
         else:
-            self._size += len(message.get("body", b""))
+            self.size += len(message.get("body", b""))
         await self._send(message)
 
-    def _note(self) -> None:
-        """Record the request in the metrics, the log and the trace."""
-        took = time.perf_counter() - self._begun
-        operation = self._route.operation.id if self._route else "none"
-        form = self._scope.get("format")
-        metrics.answered(operation, form or "", self._status, took, self._size)
-        telling = self._site.service.telling
-        if telling.wanted:
-            telling.end(self._span, self._line(operation, took))
 
-    def _line(self, operation: str, took: float) -> dict[str, Any]:
-        model = self._scope.get("model")
-        return {
-            "time": log.moment(time.time()),
-            "request": self._identity,
-            "trace": trace(self._headers),
-            "method": self._scope["method"],
-            "operation": operation,
-            "format": self._scope.get("format"),
-            "model": model.identity if model else None,
-            "who": self._scope["principal"].name if "principal" in self._scope else None,
-            "tag": self._tag,
-            "status": self._status,
-            "bytes": self._size,
-            "milliseconds": round(took * 1e3, 3),
-        }
+async def handle(site: Site, scope: Scope, receive: Receive, send: Send) -> None:
+    """Send the response to a request, or that of its error, and record it."""
+    exchange = Exchange(site, scope, receive, send)
+    site.open += 1
+    try:
+        await send_response(exchange, await respond(exchange))
+    except ClientDisconnect:
+        faults.info("request %s: the client went away", exchange.identity)
+    except Exception:
+        if exchange.status:
+            faults.error("request %s failed, and its answer breaks off", exchange.identity)
+            raise
+        faults.exception("request %s failed", exchange.identity)
+        exchange.coding = exchange.tag = None
+        await send_response(exchange, problems.internal(exchange.request))
+    finally:
+        site.open -= 1
+        site.service.bodies.release(scope.get("body_memory", 0))
+        record(exchange)
 
 
-def _request_id(headers: dict[bytes, bytes]) -> str:
-    given = headers.get(b"x-request-id", b"")
-    known = REQUEST_ID.fullmatch(given)
-    return given.decode() if known else f"{_PROCESS}{next(_NUMBERS):08x}"
+async def respond(exchange: Exchange) -> Response:
+    """Return the response of an operation, or that of an error."""
+    try:
+        return await _respond(exchange)
+    except RequestFault as fault:
+        return problems.of_fault(exchange.request, fault)
+    except QueryError as error:
+        return problems.of_query_error(exchange.request, error)
+    except caching.NotModified:
+        return Response(status_code=304)
+
+
+async def _respond(exchange: Exchange) -> Response:
+    site, scope = exchange.site, exchange.scope
+    site.head_limits.check(scope)
+    place = find(site, scope)
+    route = place.routes.get(scope["method"])
+    if route is None:
+        return other_method(exchange, place)
+    exchange.route = route
+    check_load(site, route.operation)
+    authorise(exchange, route)
+    negotiate(exchange, route)
+    revalidate(exchange, route)
+    limit = deadline.seconds(exchange.headers.get(b"prefer"), site.service.settings.deadline)
+    return await site.watch.within(limit, answer(route.handler, site.service, exchange.request))
+
+
+def find(site: Site, scope: Scope) -> Place:
+    """Return the operations of a path, by method, and set the path's parameters.
+
+    Raises the error of an unknown path.
+    """
+    found = site.places.find(scope["path"])
+    if found is None:
+        raise site.missing(scope["path"])
+    place, scope["path_params"] = found
+    return place
+
+
+def other_method(exchange: Exchange, place: Place) -> Response:
+    """Return the response to OPTIONS; raises RequestFault 405 for other methods."""
+    method, allow = exchange.scope["method"], {"Allow": place.allow}
+    if method != "OPTIONS":
+        detail = f"{method}, expected one of {place.allow}"
+        raise RequestFault(METHOD_NOT_ALLOWED, detail, headers=allow)
+    response = Response(status_code=204, headers=allow)
+    if exchange.service.origins and cors.is_preflight(exchange.headers):
+        response.raw_headers += cors.preflight(place.allow.encode())
+    return response
+
+
+def check_load(site: Site, operation: Operation) -> None:
+    """Raise RequestFault 503 if too many requests are open for an operation that may wait."""
+    if site.open > site.service.settings.concurrency and operation.sheds:
+        detail = f"{site.open - 1} requests are being answered"
+        raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
+
+
+def authorise(exchange: Exchange, route: Route) -> None:
+    """Set the request's principal and the library that it may read; raises RequestFault."""
+    scope, service = exchange.scope, exchange.service
+    scope["library"], scope["principal"] = service.library, EVERYONE
+    if service.rules.closed:
+        call = Call(exchange.identity, scope["method"], route.path)
+        needed = route.operation.scope
+        known = access_control.check(service.rules, scope["headers"], needed, call)
+        scope["principal"] = known
+        if needed is not None:
+            asked = scope["path_params"].get("model")
+            scope["library"] = access_control.seen(service.library, known, asked, call)
+
+
+def negotiate(exchange: Exchange, route: Route) -> None:
+    """Set the response's format and content coding.
+
+    Raises RequestFault for an unknown query parameter and for formats that do not exist.
+    """
+    scope = exchange.scope
+    scope["format"] = route.format
+    if scope["query_string"] and not route.operation.open_query:
+        _check_parameters(exchange.request, route.operation)
+    if route.compresses and b"accept-encoding" in exchange.headers:
+        exchange.coding = compression.preferred(exchange.headers[b"accept-encoding"])
+    if route.offers:
+        scope["format"] = negotiation.format_of(exchange.request, route.offers)
 
 
 def _check_parameters(request: Request, operation: Operation) -> None:
@@ -255,3 +206,107 @@ def _check_parameters(request: Request, operation: Operation) -> None:
         name = min(unknown)
         detail = f"{name}: no such query parameter; there are {sorted(operation.query) or 'none'}"
         raise RequestFault(problems.BAD_PARAMETER, detail, {"parameter": name})
+
+
+def revalidate(exchange: Exchange, route: Route) -> None:
+    """Set the model, the entity tag and the lifetime of the response.
+
+    Raises UnknownModel, and NotModified if the client has a response with this tag.
+    """
+    scope, service, operation = exchange.scope, exchange.service, route.operation
+    if key := scope["path_params"].get("model"):
+        scope["model"] = model = scope["library"].find(key)
+        if operation.pure:
+            exchange.lifetime = service.lifetime(key)
+            chosen = (scope["format"] or "").encode()
+            parts = model.fingerprint, route.name, scope["query_string"], chosen
+            _check_tag(exchange, service.code, *parts)
+    elif page := service.pages.get(operation.id):
+        exchange.lifetime = caching.PUBLIC + caching.AGAIN
+        _check_tag(exchange, page.digest)
+
+
+def _check_tag(exchange: Exchange, *parts: bytes) -> None:
+    """Set the entity tag of a response that depends on these parts alone."""
+    exchange.tag = caching.tag(*parts, coding=exchange.coding)
+    given = exchange.headers.get(b"if-none-match")
+    if given is not None and caching.held(given.decode("latin-1"), exchange.tag):
+        raise caching.NotModified
+
+
+async def answer(handler: Handler, service: Service, request: Request) -> Response:
+    """Return the response of an operation, whose question is decoded and answered in steps."""
+    if not isinstance(handler, Steps):
+        return await handler(service, request)
+    scope = request.scope
+    context = Context(service, scope["model"], handler.formats.get(scope["format"]))
+    question = await handler.decode(context, request)
+    task = await handler.validate(context, question)
+    async with handler.places(context, task):
+        found = await handler.synthesise(context, task)
+        content = await handler.encode(context, task, found)
+    return handler.respond(context, found, content)
+
+
+async def send_response(exchange: Exchange, response: Response) -> None:
+    """Compress a response, add the common headers and send it."""
+    if exchange.coding is not None and response.status_code == 200:
+        await compression.apply(response, exchange.coding)
+    response.raw_headers += _common_headers(exchange, response)
+    await response(exchange.scope, exchange.request.receive, exchange.sent)
+
+
+def _common_headers(exchange: Exchange, response: Response) -> list[tuple[bytes, bytes]]:
+    """Return the headers of every response: request id, security, connection, CORS and caching."""
+    kind = security_headers.of(response.media_type, response.status_code)
+    headers = [(b"x-request-id", exchange.identity.encode()), *kind]
+    if exchange.service.readiness.draining and "connection" not in response.headers:
+        # The client's next request must reach a process that continues to run.
+        headers.append((b"connection", b"close"))
+    if origins := exchange.service.origins:
+        headers += cors.headers(exchange.headers.get(b"origin"), origins)
+    held = response.status_code in (200, 304)
+    if held and exchange.route and exchange.route.vary:
+        headers.append((b"vary", exchange.route.vary))
+    if held and exchange.tag:
+        tag = exchange.tag.encode()
+        headers += [(b"etag", tag), (b"cache-control", exchange.lifetime)]
+    elif "cache-control" not in response.headers:
+        headers.append((b"cache-control", caching.ALWAYS_NEW))
+    return headers
+
+
+def record(exchange: Exchange) -> None:
+    """Record a request in the metrics, the log and the trace."""
+    took = time.perf_counter() - exchange.begun
+    operation = exchange.route.operation.id if exchange.route else "none"
+    form = exchange.scope.get("format")
+    metrics.answered(operation, form or "", exchange.status, took, exchange.size)
+    telling = exchange.service.telling
+    if telling.wanted:
+        telling.end(exchange.span, _log_line(exchange, operation, took))
+
+
+def _log_line(exchange: Exchange, operation: str, took: float) -> dict[str, Any]:
+    scope = exchange.scope
+    model = scope.get("model")
+    return {
+        "time": log.moment(time.time()),
+        "request": exchange.identity,
+        "trace": trace(exchange.headers),
+        "method": scope["method"],
+        "operation": operation,
+        "format": scope.get("format"),
+        "model": model.identity if model else None,
+        "who": scope["principal"].name if "principal" in scope else None,
+        "tag": exchange.tag,
+        "status": exchange.status,
+        "bytes": exchange.size,
+        "milliseconds": round(took * 1e3, 3),
+    }
+
+
+def _request_id(headers: dict[bytes, bytes]) -> str:
+    given = headers.get(b"x-request-id", b"")
+    known = REQUEST_ID.fullmatch(given)
+    return given.decode() if known else f"{_PROCESS}{next(_NUMBERS):08x}"

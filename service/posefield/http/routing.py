@@ -3,31 +3,27 @@
 A path that ends in `{format}` has one entry per format, so that its look-up is as fast.
 """
 
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from starlette.requests import Request
-from starlette.responses import Response
-
 from posefield.http.api.contract import Operation
 from posefield.http.middleware import compression
 from posefield.http.middleware.negotiation import Offers
-
-Endpoint = Callable[[Request], Awaitable[Response]]
+from posefield.http.steps import Handler
 
 
 @dataclass(frozen=True)
 class Route:
-    """An operation at one path, and its endpoint.
+    """An operation at one path, and its handler.
 
     format: format at the end of the path, None for a path without. offers: formats for the
     negotiation by Accept; empty without negotiation.
     """
 
     operation: Operation
-    endpoint: Endpoint
+    handler: Handler
     format: str | None = None
     offers: Offers = ()
 

@@ -1,17 +1,11 @@
-"""Shared state and types of the operations' handlers."""
+"""State that the handlers of all operations share."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Generic
 
-from starlette.requests import Request
-from starlette.responses import Response
-
-from posefield.encode.files.media_types import F
 from posefield.http.access.access_policy import Policy
 from posefield.http.api.settings import Settings
-from posefield.http.concurrency import worker_threads
 from posefield.http.concurrency.clip_batching import Desk
 from posefield.http.concurrency.pose_batching import Batcher
 from posefield.http.decoding.request_body import BodyMemory
@@ -20,7 +14,6 @@ from posefield.http.pages.static_page import Page
 from posefield.http.readiness import Readiness
 from posefield.http.telemetry.telemetry import SILENT, Telling
 from posefield.registry.model_registry import Library
-from posefield.synthesis.synthesizer import Synthesizer
 
 
 @dataclass(frozen=True)
@@ -59,32 +52,3 @@ class Service:
     def library(self) -> Library:
         """Current models; a reload can replace them, so read this once per request."""
         return self.readiness.models.library
-
-
-Handler = Callable[[Service, Request], Awaitable[Response]]
-
-
-@dataclass(frozen=True)
-class Formatted(Generic[F]):
-    """Handler of an operation with several response formats.
-
-    formats: by name, the default first. handler: called with the format that the path or Accept
-    has selected (`request.scope["format"]`).
-    """
-
-    formats: Mapping[str, F]
-    handler: Callable[[F, Service, Request], Awaitable[Response]]
-
-    def __call__(self, service: Service, request: Request) -> Awaitable[Response]:
-        return self.handler(self.formats[request.scope["format"]], service, request)
-
-
-def model(request: Request) -> Synthesizer:
-    """Return the model of a request, which the exchange has put into its scope."""
-    found: Synthesizer = request.scope["model"]
-    return found
-
-
-async def made(quick: bool, make: Callable[[], bytes]) -> bytes:
-    """Return the result of `make`, called here if it is quick, else in a thread."""
-    return make() if quick else await worker_threads.run(make)

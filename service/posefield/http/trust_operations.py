@@ -1,81 +1,137 @@
-"""Handlers of the operations on trust: sigma, why and suggestions."""
+"""Steps of the requests on trust: sigma, why and suggestions."""
 
-import orjson
-from starlette.requests import Request
+from contextlib import AbstractAsyncContextManager, nullcontext
+from functools import partial
+from typing import Any
+
 from starlette.responses import Response
 
 from posefield.common.errors import InvalidField
-from posefield.encode.formats import TableEncoder
+from posefield.encode.formats import GRID_ENCODERS, TableEncoder
 from posefield.encode.tables import model_tables
-from posefield.http import responses, service
-from posefield.http.decoding import request_questions
-from posefield.http.service import Service
+from posefield.http import responses
+from posefield.http.concurrency import worker_threads
+from posefield.http.steps import Context, Steps, from_body, from_url, unchecked
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
-from posefield.question.results import SigmaGrid
+from posefield.question.results import Reasons, SigmaGrid, Suggestions
 from posefield.synthesis import sigma_grid
 from posefield.synthesis.capture_suggestions import suggest
 from posefield.synthesis.explanation import why
-from posefield.synthesis.synthesizer import Synthesizer
 
-GridEncoder = TableEncoder[SigmaGrid]
+Grids = Context[TableEncoder[SigmaGrid]]
+Model = Context[None]
 
 # The first request inverts the matrix of all captured clips: some milliseconds for this many.
 CLIPS_AT_ONCE = 100
 
 
-async def get_sigma(encoder: GridEncoder, served: Service, request: Request) -> Response:
-    """Return a grid of sigma for the query parameters."""
-    return await _grid(served, request, request_questions.of_url(SigmaQuestion, request), encoder)
-
-
-async def query_sigma(encoder: GridEncoder, served: Service, request: Request) -> Response:
-    """Return a grid of sigma for a JSON body."""
-    question = await request_questions.of_body(
-        SigmaQuestion, request, served.settings.body_limit, served.bodies
-    )
-    return await _grid(served, request, question, encoder)
-
-
-async def _grid(
-    served: Service, request: Request, question: SigmaQuestion, encoder: GridEncoder
-) -> Response:
-    model, most = service.model(request), served.settings.grid_limit
+async def limit_grid(context: Grids, question: SigmaQuestion) -> SigmaQuestion:
+    """Return the question; InvalidField for a grid beyond the limit of the settings."""
+    most = context.service.settings.grid_limit
     if len(question) > most:
         expected = f"expected at most {most}"
         raise InvalidField("rows", f"{len(question)} points of columns and rows, {expected}")
-    quick = len(question) <= encoder.at_once
-    content = await service.made(quick, lambda: encoder.encode(sigma_grid.grid(model, question)))
-    return responses.attachment(content, encoder, model.name)
+    return question
 
 
-async def get_why(served: Service, request: Request) -> Response:
-    """Return the captured clips behind an answer, for the query parameters."""
-    return await _why(service.model(request), request_questions.of_url(WhyQuestion, request))
+def grid_places(context: Grids, question: SigmaQuestion) -> AbstractAsyncContextManager[None]:
+    """Return the limit on grids that take a thread."""
+    return worker_threads.WORK if len(question) > context.form.at_once else nullcontext()
 
 
-async def query_why(served: Service, request: Request) -> Response:
-    """Return the captured clips behind an answer, for a JSON body."""
-    question = await request_questions.of_body(
-        WhyQuestion, request, served.settings.body_limit, served.bodies
-    )
-    return await _why(service.model(request), question)
+async def compute_grid(context: Grids, question: SigmaQuestion) -> SigmaGrid:
+    """Return sigma and support on the grid."""
+    if len(question) > context.form.at_once:
+        return await worker_threads.within(sigma_grid.grid, context.model, question)
+    return sigma_grid.grid(context.model, question)
 
 
-async def _why(model: Synthesizer, question: WhyQuestion) -> Response:
-    quick = model.session.card.samples <= CLIPS_AT_ONCE
-    content = await service.made(
-        quick, lambda: orjson.dumps(model_tables.explanation(why(model, question)))
-    )
-    return Response(content, media_type="application/json")
+async def encode_grid(context: Grids, question: SigmaQuestion, answer: SigmaGrid) -> bytes:
+    """Return the grid as bytes."""
+    if len(question) > context.form.at_once:
+        return await worker_threads.within(context.form.encode, answer)
+    return context.form.encode(answer)
 
 
-async def get_suggestions(served: Service, request: Request) -> Response:
-    """Return the control points to capture next, for the query parameters."""
-    model = service.model(request)
-    question = request_questions.of_url(SuggestQuestion, request)
+def send_grid(context: Grids, answer: SigmaGrid, content: bytes) -> Response:
+    """Return the response."""
+    return responses.attachment(content, context.form, context.model.name)
 
-    def make() -> bytes:
-        return orjson.dumps(model_tables.suggestions(suggest(model, question)))
 
-    # Ranking a thousand candidates takes a tenth of a second and more.
-    return Response(await service.made(False, make), media_type="application/json")
+_grid = partial(
+    Steps[TableEncoder[SigmaGrid], SigmaQuestion, SigmaQuestion, SigmaGrid, bytes],
+    GRID_ENCODERS,
+    validate=limit_grid,
+    places=grid_places,
+    synthesise=compute_grid,
+    encode=encode_grid,
+    respond=send_grid,
+)
+GET_SIGMA = _grid(decode=from_url(SigmaQuestion))
+QUERY_SIGMA = _grid(decode=from_body(SigmaQuestion))
+
+
+def why_places(context: Model, question: WhyQuestion) -> AbstractAsyncContextManager[None]:
+    """Return the limit on explanations by models of many clips."""
+    quick = context.model.session.card.samples <= CLIPS_AT_ONCE
+    return nullcontext() if quick else worker_threads.WORK
+
+
+async def explain(context: Model, question: WhyQuestion) -> Reasons:
+    """Return the captured clips behind an answer."""
+    if context.model.session.card.samples <= CLIPS_AT_ONCE:
+        return why(context.model, question)
+    return await worker_threads.within(why, context.model, question)
+
+
+async def encode_why(context: Model, question: WhyQuestion, answer: Reasons) -> dict[str, Any]:
+    """Return the explanation as plain values."""
+    return model_tables.explanation(answer)
+
+
+def send_document(context: Model, answer: object, content: dict[str, Any]) -> Response:
+    """Return the response."""
+    return responses.document(content)
+
+
+_why = partial(
+    Steps[None, WhyQuestion, WhyQuestion, Reasons, dict[str, Any]],
+    {},
+    validate=unchecked,
+    places=why_places,
+    synthesise=explain,
+    encode=encode_why,
+    respond=send_document,
+)
+GET_WHY = _why(decode=from_url(WhyQuestion))
+QUERY_WHY = _why(decode=from_body(WhyQuestion))
+
+
+def suggestion_places(
+    context: Model, question: SuggestQuestion
+) -> AbstractAsyncContextManager[None]:
+    """Return the limit on rankings: a thousand candidates take a tenth of a second and more."""
+    return worker_threads.WORK
+
+
+async def rank(context: Model, question: SuggestQuestion) -> Suggestions:
+    """Return the control points to capture next."""
+    return await worker_threads.within(suggest, context.model, question)
+
+
+async def encode_suggestions(
+    context: Model, question: SuggestQuestion, answer: Suggestions
+) -> dict[str, Any]:
+    """Return the suggestions as plain values."""
+    return model_tables.suggestions(answer)
+
+
+GET_SUGGESTIONS = Steps(
+    {},
+    from_url(SuggestQuestion),
+    unchecked,
+    suggestion_places,
+    rank,
+    encode_suggestions,
+    send_document,
+)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.common.errors import FormError
-from posefield.http.decoding import request_questions
+from posefield.http import steps
 from posefield.question import json_decoding, text_decoding
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 
@@ -85,4 +85,4 @@ def test_bytes_that_are_no_question_are_refused(content):
 @given(st.text(alphabet="ab&=;%+2f é", max_size=24))
 def test_a_query_is_read_as_the_standard_library_reads_it(text):
     raw = text.encode()
-    assert request_questions.pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)
+    assert steps.pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)

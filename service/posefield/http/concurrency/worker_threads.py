@@ -41,18 +41,23 @@ async def run(
     and counts against the limit until it has stopped.
     """
     async with places:
-        cancellation = Cancellation()
-        token = cancel.current.set(cancellation)
-        try:
-            thread = asyncio.ensure_future(to_thread.run_sync(work, *arguments, limiter=_UNBOUNDED))
-        finally:
-            cancel.current.reset(token)
-        try:
-            return await asyncio.shield(thread)
-        except asyncio.CancelledError:
-            cancellation.cancel()
-            await _ended(thread)
-            raise
+        return await within(work, *arguments)
+
+
+async def within(work: Callable[[*Arguments], Result], *arguments: *Arguments) -> Result:
+    """Call `work` in a thread as `run` does, for a caller that holds a place already."""
+    cancellation = Cancellation()
+    token = cancel.current.set(cancellation)
+    try:
+        thread = asyncio.ensure_future(to_thread.run_sync(work, *arguments, limiter=_UNBOUNDED))
+    finally:
+        cancel.current.reset(token)
+    try:
+        return await asyncio.shield(thread)
+    except asyncio.CancelledError:
+        cancellation.cancel()
+        await _ended(thread)
+        raise
 
 
 async def _ended(thread: "asyncio.Future[Result]") -> None:
