@@ -92,6 +92,12 @@ test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, st
 	$(BIN)/python -m pytest -n auto -m system
 	$(BIN)/python tests/interop/run.py
 
+# Everything installable: both distributions of the workspace as wheels and sdists.
+.PHONY: wheels
+wheels: $(PAGE) $(DOCS) ## build wheels and sdists of posefield and posefield-train in dist
+	rm -rf dist
+	for name in posefield posefield-train; do $(BIN)/uv build --quiet --package $$name --out-dir dist; done
+
 .PHONY: audit
 audit: $(ENV) ## ask OSV for known vulnerabilities of what the lock file names; fails where it cannot ask
 	.ci/audit

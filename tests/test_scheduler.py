@@ -123,5 +123,5 @@ def test_without_the_extra_its_name_is_said(command, model_path, tmp_path):
     words = [name, str(model_path), *words, *(["--scheduler", "tcp://a:1"] if words else [])]
     own = [sys.executable, "-c", WITHOUT, *words]
     done = subprocess.run(own, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert ("install posefield[dask]" in done.stderr) == (name == "export"), done.stderr
+    assert ('pip install "posefield[dask]"' in done.stderr) == (name == "export"), done.stderr
     assert not (tmp_path / "made").exists()

@@ -14,16 +14,16 @@ ROOT = Path(__file__).parents[1]
 TESTS = sorted(path for path in (ROOT / "tests").rglob("*.py") if "interop" not in path.parts)
 # Plants a fault in a process of its own, to prove that it is noticed there.
 PLANTS = {ROOT / "tests/contract/watched_serve.py"}
-OWN = {"service", "model_export", "posefield_client", "without_blender"}
+OWN = {"posefield", "posefield_train", "posefield_client", "without_blender"}
 # Marks of pytest itself.
 MARKS = {"parametrize", "skip", "skipif", "usefixtures", "filterwarnings", "xfail"}
 # Of other libraries: they raise where something is not as it should be.
 RAISING = {"raises", "warns", "fail", "validate", "check_schema"}
 # What a test of quaternions has no use for, and would wait for.
 HEAVY = {
-    *OWN - {"service"},
+    *OWN - {"posefield"},
     "anyio", "matplotlib", "moto", "numba", "onnx", "onnxruntime", "pxr", "schemathesis", "scipy",
-    "service.cli", "service.synthesis", "service.web", "starlette",
+    "posefield.cli", "posefield.synthesis", "posefield.inference", "posefield.http", "starlette",
 }  # fmt: skip
 
 
@@ -65,7 +65,7 @@ def patches(tree: ast.Module) -> Iterator[int]:
             # Of pytest's monkeypatch, whatever it is called. Anything is refused but an attribute
             # of another library's module: strings and calls, too.
             of_pytest = isinstance(node.func, ast.Attribute)
-            if of_pytest and names.get(root(node.args[0]), "service") in OWN:
+            if of_pytest and names.get(root(node.args[0]), "posefield") in OWN:
                 yield node.lineno
         if isinstance(node, ast.Assign | ast.AugAssign):
             for target in node.targets if isinstance(node, ast.Assign) else [node.target]:

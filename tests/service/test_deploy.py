@@ -11,10 +11,9 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-import posefield
 from posefield import cli
 
-DEPLOY = Path(posefield.__file__).parent / "deploy"
+DEPLOY = Path(__file__).parents[2] / "service/deploy"
 BIN = Path(sys.executable).parent
 KUBERNETES = "1.37"
 ROWS, CHUNK, PARTS = 24, 5, 3

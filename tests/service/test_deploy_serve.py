@@ -16,7 +16,7 @@ from posefield.http.api.problems import RequestFault
 from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.middleware import request_head
 
-DEPLOY = Path(posefield.__file__).parent / "deploy"
+DEPLOY = Path(__file__).parents[2] / "service/deploy"
 ROOT = Path(__file__).parents[2]
 KUBERNETES = "1.37"
 KINDS = (

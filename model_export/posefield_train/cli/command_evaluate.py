@@ -12,6 +12,7 @@ from posefield.common.errors import InvalidField
 from posefield.console.output import as_json
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import Scheduler
+from posefield_train.source import shipped_recipes
 
 if TYPE_CHECKING:
     from posefield_train.evaluate.learning_curves import Learning
@@ -30,7 +31,9 @@ class Protocol(StrEnum):
 
 
 def evaluate(
-    recipe_file: Annotated[Path, typer.Argument(help="a TOML file", metavar="RECIPE")],
+    recipe: Annotated[
+        Path, typer.Argument(help="a TOML file, or the name of a shipped recipe", metavar="RECIPE")
+    ],
     data: Annotated[
         Path | None, typer.Option(help="folder of the motion data; default: the recipe's")
     ] = None,
@@ -60,6 +63,7 @@ def evaluate(
     output_files.expect_html(report)
     asked = [one.value for one in protocol or []]
     wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
+    recipe_file = shipped_recipes.file_of(recipe, data)
     _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 

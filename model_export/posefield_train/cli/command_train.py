@@ -12,6 +12,7 @@ from posefield.console.output import as_json
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import Place, Scheduler
 from posefield_train.cli.progress_messages import Progress
+from posefield_train.source import shipped_recipes
 
 if TYPE_CHECKING:
     from posefield_train.graph.onnx_export import Exported
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 
 def train_command(
-    recipe_files: Annotated[list[Path], typer.Argument(help="TOML files", metavar="RECIPE...")],
+    recipes: Annotated[
+        list[Path],
+        typer.Argument(help="TOML files, or names of shipped recipes", metavar="RECIPE..."),
+    ],
     output: Annotated[
         Path,
         typer.Option("--output", "-o", help="the .onnx file to write; of several recipes a folder"),
@@ -38,6 +42,7 @@ def train_command(
 ) -> None:
     """Train a recipe's model and write it as one .onnx file; several recipes at once."""
     output_files.expect_html(report)
+    recipe_files = [shipped_recipes.file_of(given, data) for given in recipes]
     if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):
         _train(recipe_files[0], data, output, report, json)
     elif report:

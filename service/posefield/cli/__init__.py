@@ -30,32 +30,65 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 INTERRUPTED = 130
 """Exit code that shells expect after SIGINT."""
 
-# Extra that provides a missing module; the default is the training extra.
+# Modules that each extra provides; the first extra with a missing module is told.
 EXTRAS = {
-    **dict.fromkeys(("joblib", "sklearn"), "evaluate"),
-    "distributed": "dask",
-    "obstore": "store",
-    **dict.fromkeys(("jwt", "cryptography"), "jwt"),
+    "train": ("posefield_train", "scipy", "onnx", "pydantic", "matplotlib"),
+    "evaluate": ("joblib", "sklearn"),
+    "dask": ("distributed",),
+    "store": ("obstore",),
+    "jwt": ("jwt", "cryptography"),
+    "trace": ("opentelemetry",),
+    "parquet": ("pyarrow",),
 }
+TRAINING = {
+    "sample": "Write procedural motions and their recipe.",
+    "train": "Train a recipe's model.",
+    "adapt": "Add a performer to a trained model.",
+    "evaluate": "Measure a model's errors on clips that it has not seen.",
+}
+"""Commands of posefield-train, which are listed without it too."""
 
 
 def main() -> None:
     """Run the command line; MotionErrors and missing modules end as one line and an exit code."""
-    for plugin in entry_points(group="posefield.commands"):
-        # The container image contains only the service.
-        if find_spec(plugin.module.partition(".")[0]):
-            plugin.load()(app)
+    plugins = entry_points(group="posefield.commands")
+    # The container image contains only the service.
+    found = [plugin for plugin in plugins if find_spec(plugin.module.partition(".")[0])]
+    for plugin in found:
+        plugin.load()(app)
+    if not found:
+        _list_training()
     try:
         app()
     except ModuleNotFoundError as fault:
-        extra = EXTRAS.get(fault.name or "", "train")
-        typer.echo(f"posefield: needs {fault.name}: install posefield[{extra}]", err=True)
+        typer.echo(f"posefield: {_missing(fault.name or '')}", err=True)
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)
         sys.exit(_code(fault))
+
+
+def _missing(module: str) -> str:
+    """Return the message for a missing module: all missing ones of its extra, and the pip line."""
+    own = [extra for extra, modules in EXTRAS.items() if module.partition(".")[0] in modules]
+    if not own:
+        return f"needs {module}, which posefield installs: pip install posefield"
+    absent = [name for name in EXTRAS[own[0]] if not find_spec(name)]
+    return f'needs {", ".join(absent)}: pip install "posefield[{own[0]}]"'
+
+
+def _list_training() -> None:
+    """List the training commands, each of which tells how to install them."""
+
+    def absent(context: typer.Context) -> None:
+        raise ModuleNotFoundError(name=EXTRAS["train"][0])
+
+    anything = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
+    for name, purpose in TRAINING.items():
+        text = f'{purpose} Needs pip install "posefield[train]".'
+        app.command(name, help=text, context_settings=anything)(absent)
 
 
 def _code(fault: MotionError) -> int:

@@ -129,4 +129,4 @@ def test_without_pyarrow_the_extra_is_named(labelled_path, tmp_path):
         text=True,
         check=True,
     )
-    assert done.stdout == f"{path}: needs pyarrow to be read: install posefield[parquet]\n"
+    assert done.stdout == f'{path}: needs pyarrow to be read: pip install "posefield[parquet]"\n'

@@ -67,7 +67,7 @@ def _opened(original: Original) -> Iterator[Any]:
         import pyarrow.parquet
     except ModuleNotFoundError as fault:
         raise FileError(
-            original.path, "needs pyarrow to be read: install posefield[parquet]"
+            original.path, 'needs pyarrow to be read: pip install "posefield[parquet]"'
         ) from fault
     try:
         with pyarrow.parquet.ParquetFile(original.path) as file:

@@ -1,0 +1,126 @@
+"""Tests of the wheels and sdists: installed in fresh environments, without the sources."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import httpx
+import pytest
+import serving
+
+ROOT = Path(__file__).parents[1]
+BIN = Path(sys.executable).parent
+NAMES = ("posefield", "posefield-train")
+
+pytestmark = pytest.mark.system
+
+
+def pythons():
+    """Interpreters that .ci/pythons finds, by their version."""
+    listed = subprocess.run(
+        [ROOT / ".ci/pythons", "--list"],
+        env={**os.environ, "UV": str(BIN / "uv")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = re.findall(r"^Python (3\.\d+)\.\S+: (.+)$", listed.stdout, re.MULTILINE)
+    return {version: Path(path) for version, path in found}
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory):
+    """Folder with the wheels and sdists."""
+    folder = tmp_path_factory.mktemp("dist")
+    for name in NAMES:
+        subprocess.run(
+            [BIN / "uv", "build", "--quiet", "--package", name, "--out-dir", folder],
+            cwd=ROOT,
+            check=True,
+        )
+    return folder
+
+
+def installed(dist, folder, python, *wanted):
+    """A fresh environment with these packages, at the versions of the lock file."""
+    pins = folder / "pins.txt"
+    own = {"cwd": ROOT, "check": True, "stdout": subprocess.DEVNULL}
+    export = ["export", "--frozen", "--quiet", "--all-packages", "--all-extras", "--no-dev"]
+    words = ["--no-hashes", "--no-emit-workspace", "--output-file", pins]
+    subprocess.run([BIN / "uv", *export, *words], **own)
+    subprocess.run([BIN / "uv", "venv", "--quiet", "--python", python, folder / "env"], **own)
+    where = ["--python", folder / "env/bin/python", "--find-links", dist, "--constraints", pins]
+    subprocess.run([BIN / "uv", "pip", "install", "--quiet", *where, *wanted], **own)
+    return folder / "env/bin"
+
+
+def run(*words, cwd, code=0):
+    done = subprocess.run(
+        [str(word) for word in words], cwd=cwd, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def assert_serves(posefield, models):
+    """The service answers with the page, the docs and a clip."""
+    with serving.started([posefield, "serve", models]) as child:
+        url = serving.address(child)
+        assert 'id="transport"' in httpx.get(f"{url}/").text
+        assert "swagger" in httpx.get(f"{url}/docs").text.lower()
+        (name,) = (model["name"] for model in httpx.get(f"{url}/v1/models").json()["models"])
+        clip = httpx.get(f"{url}/v1/models/{name}/clip.usdc")
+        assert clip.content.startswith(b"PXR-USDC"), clip.text
+
+
+@pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
+def test_wheels_train_and_serve_in_a_fresh_environment(version, dist, tmp_path):
+    found = pythons()
+    if version not in found:
+        pytest.skip(f"no Python {version}")
+    bin_ = installed(dist, tmp_path, found[version], "posefield[train]")
+    run(bin_ / "posefield", "sample", "reaching", "--output", "sample", cwd=tmp_path)
+    trained = run(
+        *(bin_ / "posefield", "train", "sample/recipe.toml", "--output", "reaching.onnx", "--json"),
+        cwd=tmp_path,
+    )
+    assert json.loads(trained.stdout)["clips"] == 92
+    assert_serves(bin_ / "posefield", tmp_path / "reaching.onnx")
+    # No module of ours but the two packages.
+    for name in ("service", "model_export"):
+        told = run(bin_ / "python", "-c", f"import {name}", cwd=tmp_path, code=1).stderr
+        assert f"ModuleNotFoundError: No module named '{name}'" in told
+
+
+def test_the_service_alone_tells_how_to_get_the_training_commands(dist, tmp_path):
+    bin_ = installed(dist, tmp_path, sys.executable, "posefield")
+    helped = run(bin_ / "posefield", "--help", cwd=tmp_path).stdout
+    assert all(command in helped for command in ("serve", "train", "evaluate"))
+    for words in (["train", "a.toml", "--output", "b.onnx"], ["sample", "--help"]):
+        told = run(bin_ / "posefield", *words, cwd=tmp_path, code=2).stderr
+        assert told == (
+            "posefield: needs posefield_train, scipy, onnx, pydantic, matplotlib: "
+            'pip install "posefield[train]"\n'
+        )
+
+
+def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):
+    (wheel,) = dist.glob("posefield-*.whl")
+    (source,) = dist.glob("posefield-*.tar.gz")
+    with zipfile.ZipFile(wheel) as opened:
+        whole = set(opened.namelist())
+        assert (
+            opened.read("posefield/http/api/openapi.yaml")
+            == (ROOT / "api/openapi.yaml").read_bytes()
+        )
+    pages = {f"posefield/http/pages/{page}/index.html" for page in ("docs", "viewer")}
+    assert pages <= whole
+    assert any(name.endswith("licenses/LICENSE") for name in whole)
+    with tarfile.open(source) as opened:
+        names = {member.name.partition("/")[2] for member in opened if member.isfile()}
+    assert pages | {"posefield/http/api/openapi.yaml", "LICENSE"} <= names
