@@ -46,23 +46,24 @@ class Auto(Part):
     """Measurement that yields a control."""
 
     quantity: Literal[measures.Quantity, "root_height"] = Field(
-        description="left, height, forward: a joint's place in the frame of the first pose, m; "
-        "root_height, m; step_length: the farthest that one foot gets ahead of the other, m; "
-        "stride_length, m, speed, m/s, turn, degrees to the left: of a whole cycle; leg_length, "
-        "stature: of the performer, m"
+        description="left, height, forward: coordinate of a joint in the frame of the first pose, "
+        "m; root_height: height of the root, m; step_length: greatest distance of one foot ahead "
+        "of the other, m; stride_length (m), speed (m/s), turn (degrees to the left): of a whole "
+        "cycle; leg_length, stature: of the performer, m"
     )
     joint: Text | Annotated[list[Text], Field(min_length=1)] | None = Field(
-        default=None, description="of a place: the joint, or several whose middle it is"
+        default=None,
+        description="for a coordinate: the joint, or several joints whose mean position is used",
     )
     joints: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = Field(
         default=None,
-        description="of a step, two feet, those of motion.feet if not said; of a leg, its upper "
-        "end and its lower, those of the roles leftUpperLeg and leftFoot if not said",
+        description="for step_length: two feet, default motion.feet; for leg_length: the upper and "
+        "the lower end of a leg, default the roles leftUpperLeg and leftFoot",
     )
     at: Text | None = Field(
         default=None,
-        description="moment of a place: 'start', 'end', 'highest', 'lowest', 'farthest' (from the "
-        "root), or the column of clips.landmarks that says when",
+        description="moment of a coordinate: 'start', 'end', 'highest', 'lowest', 'farthest' (from "
+        "the root), or a column of clips.landmarks",
     )
 
     @property
@@ -117,7 +118,7 @@ class ControlMeasured(_Named):
     unit: Text = Field(
         # The quantity determines the unit.
         default_factory=lambda read: read["auto"].unit,
-        description="the unit of what is measured, which need not be said",
+        description="unit of the measured quantity; may be omitted",
     )
     description: Text
 

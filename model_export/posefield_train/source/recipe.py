@@ -40,17 +40,21 @@ class Source(Part):
     root_offset: Literal["replace", "add"] | None = Field(
         default=None,
         description="whether root position channels replace the root's OFFSET or add to it; "
-        "asked for where the OFFSET is not zero",
+        "default: replace, with a note if the OFFSET is not zero",
     )
 
 
 class Condition(Part):
     """Selection of rows of the table, by listed values or by a range of a number."""
 
-    among: list[str] | None = Field(default=None, description="the cell is one of these")
-    without: list[str] | None = Field(default=None, description="the cell is none of these")
-    minimum: float | None = Field(default=None, description="the number is at least this")
-    maximum: float | None = Field(default=None, description="the number is at most this")
+    among: list[str] | None = Field(
+        default=None, description="accept rows whose cell is one of these texts"
+    )
+    without: list[str] | None = Field(
+        default=None, description="accept rows whose cell is none of these texts"
+    )
+    minimum: float | None = Field(default=None, description="smallest accepted number")
+    maximum: float | None = Field(default=None, description="largest accepted number")
 
 
 class Clips(Part):
@@ -58,31 +62,35 @@ class Clips(Part):
 
     table: Text = Field(description="CSV file, relative to the data folder")
     file: Text = Field(description="column: motion file, relative to the table")
-    performer: Text | None = Field(default=None, description="column: who moved")
+    performer: Text | None = Field(default=None, description="column: performer")
     first_frame: Text | None = Field(default=None, description="column: first frame, from 0")
-    last_frame: Text | None = Field(default=None, description="column: last frame, counted in")
+    last_frame: Text | None = Field(default=None, description="column: last frame, inclusive")
     landmarks: list[Text] = Field(
-        default=[], description="columns: frames, in order, that happen at one time in all clips"
+        default=[],
+        description="columns: frames of events, in order, that alignment moves to the same time in "
+        "all clips",
     )
-    where: dict[str, Condition] = Field(default={}, description="conditions by column")
+    where: dict[str, Condition] = Field(default={}, description="conditions on rows, by column")
 
 
 class Motion(Part):
     """Conversion of clips to a tensor."""
 
-    frames: Annotated[int, Field(ge=8, le=1000)] = Field(description="aligned frames T")
+    frames: Annotated[int, Field(ge=8, le=1000)] = Field(
+        description="number of aligned frames per clip, T"
+    )
     cyclic: bool = Field(description="whether the last pose leads into the first")
     root: Literal["travelling", "in_place"] = Field(
-        description="in_place takes the straight line of the horizontal travel out"
+        description="in_place removes the straight line of the root's horizontal travel"
     )
     drop_joints: list[Text] = Field(
-        default=[], description="joints left out, with everything that hangs below them"
+        default=[], description="joints to omit, with all their descendants"
     )
     joint_weights: dict[str, Positive] = Field(
-        default={}, description="importance of a joint's position in the metric; 1 if not said"
+        default={}, description="weight of a joint's position in the metric; default: 1"
     )
     feet: list[Text] = Field(
-        default=[], description="joints of the feet, whose sliding on the ground is measured"
+        default=[], description="joints of the feet, for the measurement of foot skate"
     )
 
 
@@ -90,19 +98,19 @@ class Alignment(Part):
     """Time warping."""
 
     knots: Annotated[int, Field(ge=3, le=24)] = Field(
-        default=6, description="free increments of a warp: few, so that it adds no jerk"
+        default=6, description="number of free increments of a time warp; few knots avoid jerk"
     )
     rounds: Annotated[int, Field(ge=0, le=8)] = Field(
-        default=2, description="re-alignments after the one to the medoid"
+        default=2, description="number of re-alignments after the alignment to the medoid"
     )
     reference: Literal["prediction", "mean"] = Field(
         default="prediction",
-        description="what a clip is re-aligned to: what the others predict for it, or their mean",
+        description="reference of the re-alignments: the prediction for a clip, or the mean clip",
     )
     begin: Literal["in_phase", "as_cut"] = Field(
         default="as_cut",
-        description="where a cyclic clip begins: as_cut where its frames say, or in_phase with "
-        "the family, for cycles that were cut at no moment in particular",
+        description="start of a cyclic clip: as_cut at its first frame, or in_phase at the "
+        "family's common phase, for cycles that were cut at arbitrary phases",
     )
 
 
@@ -117,21 +125,21 @@ class Kriging(Part):
         "matern52", "matern32", "gaussian", "exponential", "spherical", "chosen"
     ] = Field(
         default="chosen",
-        description="how alike motions are by their distance; chosen is matern52, or "
-        "gaussian where leave-one-out finds it better by a twentieth",
+        description="covariance of motions as a function of distance; chosen selects gaussian if "
+        "its leave-one-out error is more than 5 % below that of matern52, else matern52",
     )
     drift: Literal[0, 1, "mixed", "chosen"] = Field(
         default="chosen",
-        description="polynomial degree; mixed is one part of what degree zero predicts and two of "
-        "degree one, and chosen is that or degree one, whichever leave-one-out finds better",
+        description="polynomial degree; mixed averages one part of the prediction of degree 0 and "
+        "two parts of that of degree 1; chosen selects mixed or 1 by the leave-one-out error",
     )
     nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
-        default=None, description="share of the sill; fitted by leave-one-out if not said"
+        default=None, description="nugget as a share of the sill; default: fitted by leave-one-out"
     )
     label: Literal["performer"] | None = Field(
         default=None,
-        description="what tells clips apart beside their controls: it enters the distance between "
-        "them, never the drift",
+        description="label of clips besides their controls; it enters the distance between clips "
+        "but not the drift",
     )
 
     @property
@@ -155,9 +163,9 @@ class Kriging(Part):
 class Event(Part):
     """Event of a motion: a joint and the moment at which its position matters."""
 
-    joint: Text = Field(description="the joint: a hand that reaches, a foot that lands")
+    joint: Text = Field(description="joint of the event: a hand that reaches, a foot that lands")
     at: Text = Field(
-        description="'end' for the last frame, or the column of clips.landmarks that says when"
+        description="moment of the event: 'end' for the last frame, or a column of clips.landmarks"
     )
 
 
@@ -165,12 +173,12 @@ class Detail(Part):
     """Level of detail below the model's own size."""
 
     times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
-        description="how many times the budgets, or the errors at the ranks given, it may cost"
+        description="factor on the budgets, or on the errors at the given ranks, for this level"
     )
     drop_joints: list[Text] = Field(
         default=[],
-        description="joints that do not move, nor what hangs below them; their own error is not "
-        "counted against the budgets",
+        description="joints that do not move, with all their descendants; their error does not "
+        "count against the budgets",
     )
 
 
@@ -186,26 +194,29 @@ class Size(Part):
 
     levels: list[Detail] | None = Field(
         default=None,
-        description="coarser levels of detail, each coarser than the one before; three if not "
-        "said, of 2, 4 and 8 times the budgets",
+        description="coarser levels of detail, each coarser than the one before; default: three "
+        "levels of 2, 4 and 8 times the budgets",
     )
 
     ranks: (
         Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=3, max_length=3)] | None
-    ) = Field(default=None, description="of degrees of freedom, frames and samples")
+    ) = Field(default=None, description="ranks of degrees of freedom, frames and samples")
     rms_budget_cm: Positive | None = Field(
-        default=None, description="root-mean-square joint distance, cm"
+        default=None, description="limit of the root-mean-square joint distance, cm"
     )
     p99_budget_cm: Positive | None = Field(
         default=None,
-        description="joint distance that one in a hundred exceeds, over joints, frames, clips; cm",
+        description="limit of the 99th percentile of the joint distances over joints, frames and "
+        "clips, cm",
     )
     effector_budget_cm: Positive | None = Field(
-        default=None, description="root-mean-square distance of the event's joint at its event, cm"
+        default=None,
+        description="limit of the root-mean-square distance of the event's joint at its event, cm",
     )
     cost: Literal["numbers", "operations"] = Field(
         default="numbers",
-        description="what is least within the budgets: numbers stored, or multiply-adds per pose",
+        description="cost to minimise within the budgets: numbers stored in the file, or "
+        "multiply-adds per pose",
     )
 
     @property
@@ -252,9 +263,10 @@ class Recipe(Part):
     schema_version: Literal[1] = Field(alias="schema", description="version of this format")
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
     description: Text
-    licence: Text = Field(description="licence of the motion data, with what it asks to be said")
+    licence: Text = Field(description="licence of the motion data, with its required attribution")
     truth: Literal["reaching"] | None = Field(
-        default=None, description="procedural family whose noise-free motions are known everywhere"
+        default=None,
+        description="procedural family with known noise-free motions at all control values",
     )
     source: Source
     clips: Clips
@@ -265,8 +277,8 @@ class Recipe(Part):
     event: Event | None = None
     roles: dict[Role, Text] = Field(
         default={},
-        description="joints by the part that each plays, for whoever wants the names of Mixamo, "
-        "Unreal, VRM or HumanIK",
+        description="joints by role; exports need them for the joint names of Mixamo, Unreal, VRM "
+        "or HumanIK",
     )
     size: Size
 
