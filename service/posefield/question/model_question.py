@@ -45,7 +45,7 @@ class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     controls: Controls
     extrapolate: Extrapolate = "warn"
     performer: Performer = None
-    nearest: Annotated[int, Meta(description="captured clips to list")] = 10
+    nearest: Annotated[int, Meta(description="number of captured clips to list")] = 10
 
     def __post_init__(self) -> None:
         within("nearest", self.nearest, 1, MOST_NEAREST, "clips")
@@ -54,10 +54,10 @@ class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 class SuggestQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Query for the clips to capture next."""
 
-    count: Annotated[int, Meta(description="points to list")] = 10
+    count: Annotated[int, Meta(description="number of points to list")] = 10
     performer: Annotated[
         str | None,
-        Meta(description="whose clips alone count as captured; everybody's if not said"),
+        Meta(description="performer whose clips alone count as captured; default: all performers"),
     ] = None
 
     def __post_init__(self) -> None:

@@ -26,16 +26,19 @@ Name = Annotated[str, Meta(pattern=rf"^{LEGAL_NAME.pattern}\Z")]
 Controls = Annotated[
     dict[str, float],
     Meta(
-        description="value of a control; a model chooses the controls that are left out",
+        description="value of a control; omitted controls are inferred",
         extra={"word": "control", "metavar": "NAME=VALUE"},
     ),
 ]
 Extrapolate = Annotated[
     Policy,
-    Meta(description="controls like which nothing was captured: answer, warn as well, or refuse"),
+    Meta(
+        description="policy for controls without similar captured clips and for targets out of "
+        "reach: ok, warn or refuse"
+    ),
 ]
 Performer = Annotated[
-    str | None, Meta(description="who moves, by name; somebody never seen if not said")
+    str | None, Meta(description="name of the performer; default: an unseen performer")
 ]
 
 
@@ -67,24 +70,24 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     controls: Controls
     extrapolate: Extrapolate = "warn"
     performer: Performer = None
-    level: Annotated[int, Meta(description="level of detail: 0 is the finest")] = 0
-    joint_sigma: Annotated[bool, Meta(description="say how far each joint may err, too")] = False
+    level: Annotated[int, Meta(description="level of detail; 0 is the finest")] = 0
+    joint_sigma: Annotated[bool, Meta(description="include sigma of each joint, m")] = False
     exact: Annotated[
         Exact,
         Meta(
-            description="measured controls to be met exactly: auto (those given), none, or names",
+            description="measured controls to match exactly: auto (all given), none, or names",
             extra={"metavar": "auto|none|NAME,NAME"},
         ),
     ] = "auto"
     targets: Annotated[
         tuple[Target, ...],
         Meta(
-            description="where a joint is to be, m; MOMENT is seconds, start, end, event, highest, "
-            "lowest or farthest; may be repeated",
+            description="target position of a joint, m; MOMENT is a time in seconds, start, end, "
+            "event, highest, lowest or farthest; may be repeated",
             extra={"word": "target", "metavar": "JOINT@MOMENT=X,Y,Z"},
         ),
     ] = ()
-    pin_feet: Annotated[bool, Meta(description="keep feet that stand where they stand")] = False
+    pin_feet: Annotated[bool, Meta(description="keep the positions of planted feet")] = False
 
     @property
     def corrects(self) -> bool:
@@ -97,7 +100,10 @@ class PoseQuestion(MotionQuestion, frozen=True, kw_only=True):
 
     times: Annotated[
         list[float],
-        Meta(description="seconds from the start of the clip", extra={"word": "time", "unit": "s"}),
+        Meta(
+            description="time from the start of the clip, s; may be repeated",
+            extra={"word": "time", "unit": "s"},
+        ),
     ]
 
 
@@ -114,27 +120,34 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     """
 
     fps: Annotated[
-        float, Meta(description="frames a second", extra={"unit": "frames a second"})
+        float, Meta(description="frame rate, frames a second", extra={"unit": "frames a second"})
     ] = 30.0
-    start: Annotated[float, Meta(description="where the part begins", extra={"unit": "s"})] = 0.0
+    start: Annotated[float, Meta(description="time of the first frame, s", extra={"unit": "s"})] = (
+        0.0
+    )
     end: Annotated[
         float | None,
-        Meta(description="where the part ends, s; the clip's end if not said", extra={"unit": "s"}),
+        Meta(
+            description="latest time of the last frame, s; default: the end of the clip",
+            extra={"unit": "s"},
+        ),
     ] = None
-    names: Annotated[Names, Meta(description="what joints are called")] = "own"
-    root: Annotated[Root, Meta(description="whether the root travels")] = "travelling"
-    loop: Annotated[bool, Meta(description="one whole cycle whose last frame is its first")] = False
+    names: Annotated[Names, Meta(description="naming convention of the joints")] = "own"
+    root: Annotated[Root, Meta(description="whether the root travels or stays in place")] = (
+        "travelling"
+    )
+    loop: Annotated[
+        bool, Meta(description="write one whole cycle whose last frame equals its first")
+    ] = False
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
     """Query for a clip in a file; unit and up are None for the format's defaults."""
 
     unit: Annotated[
-        Unit | None, Meta(description="of length in the file; the format's own if not said")
+        Unit | None, Meta(description="unit of length in the file; default: the format's")
     ] = None
-    up: Annotated[Up | None, Meta(description="axis in the file; the format's own if not said")] = (
-        None
-    )
+    up: Annotated[Up | None, Meta(description="up axis of the file; default: the format's")] = None
 
 
 class NamedClipQuestion(ClipQuestion, frozen=True, kw_only=True):

@@ -19,30 +19,40 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """
 
     # The default crowd fits a browser's tab: some ten megabytes.
-    count: Annotated[int, Meta(description="characters, each on a way of its own")] = 100
+    count: Annotated[int, Meta(description="number of characters, each on its own path")] = 100
     motions: Annotated[
-        int | None, Meta(description="different motions they share; each its own if not said")
+        int | None,
+        Meta(description="number of distinct motions; default: one motion per character"),
     ] = None
-    seconds: Annotated[float, Meta(description="how long they walk", extra={"unit": "s"})] = 5.0
-    fps: Annotated[float, Meta(description="frames a second")] = 30.0
-    seed: Annotated[int, Meta(description="of all that is random")] = 0
+    seconds: Annotated[float, Meta(description="duration, s", extra={"unit": "s"})] = 5.0
+    fps: Annotated[float, Meta(description="frame rate, frames a second")] = 30.0
+    seed: Annotated[int, Meta(description="seed of all random numbers")] = 0
     level: Annotated[
         int | None,
-        Meta(description="level of detail: 0 is the finest; 0 if not said"),
+        Meta(description="level of detail; 0 is the finest; default: 0"),
     ] = None
     camera: Annotated[
         tuple[float, float, float] | None,
         Meta(
-            description="instead of a level: where one looks from, m",
+            description="camera position, m, which selects the level of detail of each pose",
             extra={"metavar": "X,Y,Z"},
         ),
     ] = None
-    fov: Annotated[float | None, Meta(description="vertical field of view, rad")] = None
-    height: Annotated[float | None, Meta(description="of the image, pixels")] = None
-    pixels: Annotated[float | None, Meta(description="that a level's error may cover")] = None
-    instancing: Annotated[Instancing, Meta(description="what characters share in USD")] = (
-        "references"
-    )
+    fov: Annotated[
+        float | None,
+        Meta(description="vertical field of view, rad; default: 60 degrees; requires a camera"),
+    ] = None
+    height: Annotated[
+        float | None,
+        Meta(description="height of the image, pixels; default: 1080; requires a camera"),
+    ] = None
+    pixels: Annotated[
+        float | None,
+        Meta(description="limit of a level's error, pixels; default: 1; requires a camera"),
+    ] = None
+    instancing: Annotated[
+        Instancing, Meta(description="sharing of data between characters in USD")
+    ] = "references"
 
     def __post_init__(self) -> None:
         if self.camera is None:
