@@ -10,10 +10,10 @@ from posefield.console.output import as_json
 
 
 def check(
-    file: Annotated[Path, typer.Argument(help="a usda, usdc, usd or usdz file")],
+    file: Annotated[Path, typer.Argument(help="USD file: usda, usdc, usd or usdz")],
     json: Json = False,
 ) -> None:
-    """Find defects of a USD character that fail in some reader although validators accept them."""
+    """Find defects of a USD character that validators accept but some readers fail on."""
     from posefield.check import check as find
 
     findings = find(file)

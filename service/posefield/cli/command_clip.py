@@ -16,7 +16,7 @@ from posefield.synthesis import clips, poses
 
 @asks(PoseQuestion, usual={"times": [0.0]})
 def pose(model: ModelPath, question: PoseQuestion) -> None:
-    """Print the pose at one or more times, as JSON."""
+    """Print the poses at one or more times as JSON."""
     answer = poses.pose(open_model(model), question)
     tell(answer.trust)
     typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
@@ -25,11 +25,13 @@ def pose(model: ModelPath, question: PoseQuestion) -> None:
 @asks(FileQuestion)
 def clip(
     model: ModelPath,
-    output: Annotated[Path, typer.Option("--output", "-o", help="file; its ending is the format")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="output file; its extension selects the format")
+    ],
     question: FileQuestion,
     json: Json = False,
 ) -> None:
-    """Write a clip as usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack."""
+    """Write a clip as a usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack file."""
     found = encoder(output)
     convention = found.convention(question.unit, question.up)
     answer = clips.clip(open_model(model), question)

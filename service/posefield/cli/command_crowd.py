@@ -19,22 +19,24 @@ COUNT = 500
 def crowd(
     model: ModelPath,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="usd, usda, usdc, usdz or npz, by its ending")
+        Path,
+        typer.Option("--output", "-o", help="output file: usd, usda, usdc, usdz or npz"),
     ],
     question: WalkQuestion,
     count: Annotated[
         int | None,
-        typer.Option(help=f"characters, each on a way of its own; {COUNT} if not said"),
+        typer.Option(help=f"number of characters, each on its own path; default: {COUNT}"),
     ] = None,
     paths: Annotated[
         Path | None,
         typer.Option(
-            help="JSON list of routes instead: waypoints (pairs of x and z, m) and speed (m/s)"
+            help="instead of random paths: JSON list of routes with waypoints (x, z pairs, m) and "
+            "speed (m/s)"
         ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Write a crowd that walks, each character on its own path at its own changing speed."""
+    """Write a walking crowd, each character on its own path at its own varying speed."""
     from posefield.cli import crowd_files
     from posefield.locomotion import crowd_order
 

@@ -33,45 +33,58 @@ from posefield.registry import model_loading
 @asks(FileQuestion, without={"controls", "targets", "joint_sigma"})
 def export(
     model: ModelPath,
-    output: Annotated[str, typer.Option("--output", "-o", help="folder, or an object store's URL")],
+    output: Annotated[
+        str, typer.Option("--output", "-o", help="output folder or URL of an object store")
+    ],
     question: FileQuestion,
     table: Annotated[
         Path | None,
-        typer.Argument(help="CSV, Parquet or JSON Lines, a row a clip", metavar="[QUERIES]"),
+        typer.Argument(
+            help="CSV, Parquet or JSON Lines file, one row per clip", metavar="[QUERIES]"
+        ),
     ] = None,
     grid: Annotated[
         list[str] | None,
-        typer.Option(help="instead: values of a control; every combination", metavar="NAME=VALUES"),
+        typer.Option(
+            help="instead of a table: values of a control; exports every combination",
+            metavar="NAME=VALUES",
+        ),
     ] = None,
-    sample: Annotated[int | None, typer.Option(help="instead: number of random points")] = None,
-    method: Annotated[str | None, typer.Option(help="of sampling, latin or hull")] = None,
-    seed: Annotated[int | None, typer.Option(help="of sampling")] = None,
-    form: Annotated[str, typer.Option("--format", help="file format")] = "usdc",
-    layout: Annotated[str, typer.Option(help=f"one of {', '.join(LAYOUTS)}")] = "folder",
+    sample: Annotated[
+        int | None, typer.Option(help="instead of a table: number of random control points")
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(help="sampling method of --sample: latin or hull")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="random seed of --sample")] = None,
+    form: Annotated[str, typer.Option("--format", help="file format of the clips")] = "usdc",
+    layout: Annotated[
+        str, typer.Option(help=f"layout of the output: {', '.join(LAYOUTS)}")
+    ] = "folder",
     chunk: Annotated[
-        int | None, typer.Option(help="rows done together, and clips of an archive")
+        int | None, typer.Option(help="rows per chunk; also the clips per archive")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="processes; default: one for each core")
+        int | None, typer.Option(help="number of processes; default: one per core")
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            help="instead of processes here: workers of a Dask scheduler, posefield on each",
+            help="run on the workers of this Dask scheduler; posefield must be installed on them",
             metavar="tcp://HOST:PORT",
         ),
     ] = None,
     shard: Annotated[
-        str, typer.Option(help="part I of N alone, from 0/N to N-1/N", metavar="I/N")
+        str, typer.Option(help="export only part I of N; I is 0 to N-1", metavar="I/N")
     ] = "0/1",
     skip_errors: Annotated[
-        bool, typer.Option("--skip-errors", help="leave rows at fault out, and list them")
+        bool, typer.Option("--skip-errors", help="skip invalid rows and list them")
     ] = False,
     verify: Annotated[
         bool,
         typer.Option(
             "--verify",
-            help="compare the SHA-256 of files that earlier runs wrote; default: their sizes",
+            help="verify the SHA-256 of files from earlier runs; default: verify only sizes",
         ),
     ] = False,
     json: Json = False,
@@ -79,7 +92,7 @@ def export(
     """Write a clip for each row of a table, or for each point of a grid or a sampling.
 
     A column of the table takes precedence over the option of the same name. The same command
-    resumes an interrupted export and gives the same files; missing or damaged files are made again.
+    resumes an interrupted export and gives the same files. It rewrites missing or damaged files.
     """
     content = checked_file.read(model)
     opened = model_loading.opened(model.stem, model, content)

@@ -12,7 +12,7 @@ from posefield.motion import measures
 
 
 def inspect(model: ModelPath, json: Json = False) -> None:
-    """Print a model file's controls, skeleton, errors, provenance and cost of a pose here."""
+    """Print a model's controls, skeleton, errors, provenance and time per pose on this machine."""
     opened = session.load(model)
     plain = {
         "identity": f"{model.stem}@{opened.digest}",

@@ -23,11 +23,11 @@ _HEAD, _PRESSED = b"<head>", ".gz"
 
 
 def page(
-    model: Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="folder")],
-    json: Annotated[bool, typer.Option("--json", help="answer as JSON")] = False,
+    model: Annotated[Path, typer.Argument(help="model file", metavar="MODEL")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="output folder")],
+    json: Annotated[bool, typer.Option("--json", help="print the result as JSON")] = False,
 ) -> None:
-    """Write the page with a model in it, for any host of static files."""
+    """Write the viewer page with a model, for static web hosting."""
     content = checked_file.read(model)
     opened = session.load_bytes(content, str(model))
     identity = f"{model.stem}@{opened.digest}"

@@ -11,10 +11,14 @@ from posefield.console.output import as_json
 def serve(
     places: Annotated[
         list[str],
-        typer.Argument(help="model files, folders of them, or URLs of object stores"),
+        typer.Argument(help="model files, folders with model files, or URLs of object stores"),
     ],
-    host: Annotated[str | None, typer.Option(help="address; POSEFIELD_HOST or 127.0.0.1")] = None,
-    port: Annotated[int | None, typer.Option(help="port; POSEFIELD_PORT or 8000")] = None,
+    host: Annotated[
+        str | None, typer.Option(help="IP address; default: POSEFIELD_HOST, else 127.0.0.1")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(help="TCP port; default: POSEFIELD_PORT, else 8000")
+    ] = None,
 ) -> None:
     """Serve the given models over HTTP until interrupted."""
     from posefield.http import server
@@ -24,17 +28,20 @@ def serve(
 
 
 def key(
-    name: Annotated[str, typer.Argument(help="whose key it is, as the log will name it")],
+    name: Annotated[str, typer.Argument(help="name of the key's owner in the log")],
     model: Annotated[
-        list[str] | None, typer.Option(help="a model that it may read; all if none is named")
+        list[str] | None,
+        typer.Option(help="model that the key may read; may be repeated; default: all models"),
     ] = None,
-    metrics: Annotated[bool, typer.Option("--metrics", help="let it read /metrics too")] = False,
+    metrics: Annotated[
+        bool, typer.Option("--metrics", help="allow the key to read /metrics as well")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Create an API key.
 
-    Prints the line for POSEFIELD_KEYS_FILE on standard output, and the key itself, once, on
-    standard error.
+    Prints the line for POSEFIELD_KEYS_FILE on standard output and the key on standard error. The
+    key is not stored.
     """
     from posefield.http.access import api_keys
 

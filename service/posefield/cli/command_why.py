@@ -17,7 +17,7 @@ from posefield.synthesis.explanation import why as find_reasons
 
 @asks(WhyQuestion)
 def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
-    """Explain an answer: the captured clips near it, and the weight of each."""
+    """Print the captured clips nearest to the controls, and their weights."""
     found = find_reasons(open_model(model), question)
     tell(found)
     as_text = model_tables.explanation_text
@@ -31,7 +31,9 @@ def suggest(
     candidates: Annotated[
         Path | None,
         typer.Option(
-            help="CSV, Parquet or JSON Lines of points that can be captured", metavar="FILE"
+            help="CSV, Parquet or JSON Lines file with the candidate points; default: points "
+            "across the sampled ranges",
+            metavar="FILE",
         ),
     ] = None,
     json: Json = False,

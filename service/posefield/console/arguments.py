@@ -10,8 +10,8 @@ from posefield.encode.formats import ENCODERS, Encoder
 from posefield.registry import model_registry
 from posefield.synthesis.synthesizer import Synthesizer
 
-ModelPath = Annotated[Path, typer.Argument(help="a model file", metavar="MODEL")]
-Json = Annotated[bool, typer.Option("--json", help="answer as JSON on standard output")]
+ModelPath = Annotated[Path, typer.Argument(help="model file", metavar="MODEL")]
+Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on standard output")]
 
 
 def open_model(path: Path) -> Synthesizer:

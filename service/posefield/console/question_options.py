@@ -18,7 +18,7 @@ Controls = Annotated[
     typer.Option(
         "--control",
         "-c",
-        help="value of a control, once for each; a model chooses those left out",
+        help="value of a control; may be repeated; omitted controls are inferred",
         metavar="NAME=VALUE",
     ),
 ]
