@@ -20,20 +20,25 @@ def adapt(
     clips: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="BVH files of one new performer, one to five or more", metavar="CLIP..."
+            help="BVH files of one new performer: one or more, typically up to five",
+            metavar="CLIP...",
         ),
     ] = None,
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", help="the .onnx file to write")],
-    performer: Annotated[str, typer.Option(help="their name, by which they are asked for")],
-    unit: Annotated[float, typer.Option(help="length of one unit of the files", metavar="METRES")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="output .onnx file")],
+    performer: Annotated[str, typer.Option(help="performer's name, used in requests")],
+    unit: Annotated[
+        float, typer.Option(help="length of the files' unit in metres", metavar="METRES")
+    ],
     up: Annotated[Up, typer.Option(help="up axis of the files")],
-    licence: Annotated[str, typer.Option(help="of the new clips, with what it asks to be said")],
+    licence: Annotated[
+        str, typer.Option(help="licence of the new clips, with its required attribution")
+    ],
     table: Annotated[
         Path | None,
         typer.Option(
-            help="instead of clips: CSV with columns file, first_frame, last_frame and controls by "
-            "name; what the model can measure may be left out"
+            help="instead of clips: CSV with columns file, first_frame, last_frame and one column "
+            "per control; controls that the model can measure may be omitted"
         ),
     ] = None,
     root_offset: Annotated[
@@ -42,7 +47,7 @@ def adapt(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Add a performer to a model by a few clips, without the data that it was trained from."""
+    """Add a performer to a model from a few clips, without the model's training data."""
     from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
     from posefield_train.adapt.adapted_file import Newcomer
     from posefield_train.source.recipe import Source

@@ -32,33 +32,44 @@ class Protocol(StrEnum):
 
 def evaluate(
     recipe: Annotated[
-        Path, typer.Argument(help="a TOML file, or the name of a shipped recipe", metavar="RECIPE")
+        Path,
+        typer.Argument(help="recipe (TOML file or name of a shipped recipe)", metavar="RECIPE"),
     ],
     data: Annotated[
-        Path | None, typer.Option(help="folder of the motion data; default: the recipe's")
+        Path | None,
+        typer.Option(help="folder of the motion data; default: the recipe's folder"),
     ] = None,
     protocol: Annotated[
         list[Protocol] | None,
-        typer.Option(help="hold out clips or performers, or compare with the truth; default: all"),
+        typer.Option(
+            help="hold out clips or performers, or compare with the noise-free truth; may be "
+            "repeated; default: all"
+        ),
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="the .html file to write")] = None,
+    report: Annotated[Path | None, typer.Option(help="output .html report")] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="the .json file to write", metavar="FILE")
+        Path | None, typer.Option("--json", help="output .json file", metavar="FILE")
     ] = None,
     joined: Annotated[
         Path | None,
         typer.Option(
-            help="another recipe: share of the gap between both that is flagged", metavar="RECIPE"
+            help="another recipe: measure the share of the gap between both families that the "
+            "support flag detects",
+            metavar="RECIPE",
         ),
     ] = None,
     learning: Annotated[
-        bool, typer.Option(help="compare suggested with random captures, on the procedural family")
+        bool,
+        typer.Option(
+            help="compare the errors after suggested and after random captures, for the "
+            "procedural family"
+        ),
     ] = False,
     scheduler: Scheduler = None,
 ) -> None:
-    """Measure the error of a recipe's models on unseen motions, beside other methods.
+    """Measure the error of a recipe's models on held-out motions, and compare other methods.
 
-    Everything is fitted again without the clips that are held out.
+    Each fold fits the whole model again without the held-out clips.
     """
     output_files.expect_html(report)
     asked = [one.value for one in protocol or []]

@@ -14,14 +14,18 @@ from posefield.question.results import ClipAnswer, Trust
 
 
 def sample(
-    family: Annotated[str, typer.Argument(help="reaching")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="folder, or with --truth a file")],
-    truth: Annotated[bool, typer.Option(help="write the noise-free motion of --control")] = False,
+    family: Annotated[str, typer.Argument(help="name of the family: reaching")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="output folder; with --truth, output file")
+    ],
+    truth: Annotated[
+        bool, typer.Option(help="write the noise-free motion at the controls of --control")
+    ] = False,
     control: Controls = None,
-    fps: Annotated[float, typer.Option(help="frames a second, with --truth")] = 120.0,
+    fps: Annotated[float, typer.Option(help="frame rate with --truth, frames a second")] = 120.0,
     json: Json = False,
 ) -> None:
-    """Write a procedural family of motions, or the truth behind it at any control point."""
+    """Write a procedural family of motions, or its noise-free motion at any control point."""
     from posefield_train.sample import noise_free as truths
     from posefield_train.sample import sample_files
 

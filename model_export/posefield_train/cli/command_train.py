@@ -23,24 +23,31 @@ if TYPE_CHECKING:
 def train_command(
     recipes: Annotated[
         list[Path],
-        typer.Argument(help="TOML files, or names of shipped recipes", metavar="RECIPE..."),
+        typer.Argument(
+            help="recipes (TOML files or names of shipped recipes)", metavar="RECIPE..."
+        ),
     ],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="the .onnx file to write; of several recipes a folder"),
+        typer.Option("--output", "-o", help="output .onnx file; for several recipes, a folder"),
     ],
     data: Annotated[
-        Path | None, typer.Option(help="folder of the motion data; the recipe's own if not said")
+        Path | None,
+        typer.Option(help="folder of the motion data; default: the recipe's folder"),
     ] = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="the .html file to write on the training, with a .json beside it"),
+        typer.Option(
+            help="output .html report of the training; a .json file is written next to it"
+        ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(help="of several recipes: processes")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="for several recipes: number of processes")
+    ] = None,
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
-    """Train a recipe's model and write it as one .onnx file; several recipes at once."""
+    """Train the model of each recipe and write it as one .onnx file."""
     output_files.expect_html(report)
     recipe_files = [shipped_recipes.file_of(given, data) for given in recipes]
     if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):

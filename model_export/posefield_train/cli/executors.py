@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Scheduler = Annotated[
     str | None,
     typer.Option(
-        help="run on the workers of a Dask scheduler, which must have posefield installed too",
+        help="run on the workers of this Dask scheduler; posefield must be installed on them",
         metavar="tcp://HOST:PORT",
     ),
 ]
