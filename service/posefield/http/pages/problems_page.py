@@ -31,134 +31,135 @@ class Text:
 
 TEXTS: dict[Kind, Text] = {
     problems.BAD_PARAMETER: Text(
-        "A query parameter or header breaks the contract: it is unknown, missing, given twice, "
-        "no finite number, or none of the words that it may be.",
-        "Send what `detail` says was expected. Asking again as it was will not help.",
+        "A query parameter or header violates the contract: it is unknown, missing or repeated, or "
+        "its value is not a finite number or not one of the allowed words.",
+        "Send the value that `detail` expects. The same request will fail again.",
         "fps: 'abc', expected a finite number",
         {"parameter": "fps"},
     ),
     problems.BAD_BODY: Text(
-        "The body is no JSON, or has a field that is unknown, missing or of another type.",
-        "Compare the field that `pointer` names with the schema of the operation's body.",
+        "The body is not valid JSON, or a field is unknown, missing or of the wrong type.",
+        "Compare the field at `pointer` with the schema of the operation's body.",
         "frames: Object contains unknown field `frames`",
         {"pointer": "/frames"},
     ),
     problems.UNAUTHENTICATED: Text(
-        "The service asks for a key or token, and there is none, or one that is unknown, "
-        "expired or signed by somebody else. `WWW-Authenticate` says which.",
-        "Send `Authorization: Bearer` and a key of the operator's, or a fresh token.",
+        "The service requires a key or a token, and the request has none, or one that is unknown, "
+        "expired or signed by an unknown issuer. `WWW-Authenticate` gives the cause.",
+        "Send `Authorization: Bearer` with a key from the operator, or with a fresh token.",
         "no Authorization; expected a key or token that is known",
     ),
     problems.FORBIDDEN: Text(
-        "The key or token holds, but not for this: it lacks the scope that `WWW-Authenticate` "
-        "names. Models that a key may not read are answered as `unknown-model` instead.",
+        "The key or token is valid but lacks the scope that `WWW-Authenticate` names. For models "
+        "outside a key's scope the problem is `unknown-model` instead.",
         "Ask the operator for a key with that scope.",
         "the key or token has no scope 'metrics' for anything",
     ),
     problems.NO_SUCH_PATH: Text(
-        "No operation lies at this path. A slash at its end counts.",
-        "Look the path up in the contract, at `/docs` or `/openapi.yaml`.",
+        "The contract has no operation at this path. A trailing slash is significant.",
+        "Find the path in the contract at `/docs` or `/openapi.yaml`.",
         "'/v1/models/'; /openapi.yaml names what there is",
     ),
     TABLE[UnknownModel]: Text(
-        "No model of that name, or of that name and hash, answers here, or none that the key "
-        "may read. A hash goes when newer versions of a model have pushed it out.",
-        "Ask `/v1/models` which there are. Under its plain name a model's newest version answers.",
+        "The service has no model with this name, or with this name and hash, in the key's scope. "
+        "The service removes old hashes when newer versions of a model arrive.",
+        "List the models at `/v1/models`. The plain name selects the newest version of a model.",
         "model: no model 'reich'; there are reach@0123456789abcdef",
         {"parameter": "model"},
     ),
     TABLE[UnknownFormat]: Text(
-        "The path ends in a format that this service does not write.",
-        "Choose one of those that `detail` lists, or leave the ending out and send `Accept`.",
+        "The path ends in a format that this operation does not support.",
+        "Use one of the formats in `detail`, or omit the ending and send `Accept`.",
         "format: no format 'fbx'; there are usda, usdc, usdz, json, bvh, glb, npz, arrow, msgpack",
         {"parameter": "format"},
     ),
     problems.METHOD_NOT_ALLOWED: Text(
-        "The path is there, but does not take this method.",
+        "The path exists but does not support this method.",
         "Use one of the methods in the header `Allow`.",
         "PUT, expected one of GET, HEAD, OPTIONS, POST",
     ),
     problems.NOT_ACCEPTABLE: Text(
-        "The header `Accept` accepts none of the formats that the path can answer in.",
-        "Accept one of those that `detail` lists, or ask at a path that ends in a format.",
+        "The header `Accept` allows none of the formats of this path.",
+        "Accept one of the formats in `detail`, or use a path that ends in a format.",
         "Accept 'text/html', expected one of application/json, application/vnd.msgpack, "
         "application/x-npz, application/vnd.apache.arrow.stream",
     ),
     problems.BODY_TOO_LARGE: Text(
-        "The body is larger than the operation takes. It was not read to its end, and the "
-        "connection is closed.",
-        "Ask in several requests, or have the operator raise the limit.",
+        "The body exceeds the limit of the operation. The service did not read it to its end and "
+        "closes the connection.",
+        "Split the request into several, or ask the operator to raise the limit.",
         "more than 65536 bytes, expected at most 65536",
     ),
     problems.URL_TOO_LONG: Text(
-        "The URL is longer than the service reads.",
-        "Ask by POST: each question that a URL can hold can also be a JSON body.",
+        "The URL exceeds the limit.",
+        "Poses, clips, `sigma` and `why` also accept the parameters as the JSON body of a POST.",
         "expected at most 8192 bytes",
     ),
     problems.NOT_JSON: Text(
-        "The body's `Content-Type` is missing or not one that the operation takes.",
+        "The body's `Content-Type` is missing or not supported by the operation.",
         "Send `Content-Type: application/json`, in UTF-8.",
         "Content-Type 'text/plain', expected 'application/json'",
     ),
     TABLE[InvalidField]: Text(
-        "The request keeps the contract, but this model has no answer to it: a control is "
-        "unknown (or one of a crowd's missing), a value is far outside what was sampled, a time "
-        "lies outside the clip, there would be too many frames, the model knows no such performer.",
-        "Change the field that `errors` names. The model's card says what the model has: its "
-        "controls, their ranges, its performers and levels.",
+        "The request conforms to the contract, but the model cannot respond to it. Causes: an "
+        "unknown control (for a crowd, also a missing one), a value far outside the sampled "
+        "range, a time outside the clip, too many frames, or an unknown performer.",
+        "Change the field that `errors` names. The model's card lists the controls with their "
+        "ranges, the performers and the levels.",
         "fps: 10000 frames a second, expected 1 to 1000 frames a second",
         {"parameter": "fps"},
     ),
     TABLE[OutsideSamples]: Text(
-        "Controls lie outside what the model was trained from, or in a gap of it, and "
-        "`extrapolate=refuse` asked for an error rather than a warning.",
-        "Move the controls into the ranges on the model's card and near to clips that were "
-        "captured, which `why` names, or ask with `extrapolate=warn`.",
+        "Controls lie outside the sampled ranges, or in a gap between the samples, and "
+        "`extrapolate=refuse` requests an error instead of a warning.",
+        "Move the controls into the ranges on the model's card and near captured clips, which "
+        "`why` lists, or send `extrapolate=warn`.",
         "controls: turn = 60 deg lies outside what was sampled, -45 to 45 deg",
         {"parameter": "controls"},
     ),
     TABLE[OutOfReach]: Text(
-        "The motion cannot meet a target, or a measured control, by going as far as captured "
-        "motions stray, and `extrapolate=refuse` asked for an error rather than a warning.",
-        "Move the target that `errors` names nearer, or ask with `extrapolate=warn`: the answer "
-        "then goes as near as it can, and its trust says by how much it misses.",
+        "The motion cannot reach a target, or a measured control, within the deviations of "
+        "captured motions, and `extrapolate=refuse` requests an error instead of a warning.",
+        "Move the target that `errors` names nearer, or send `extrapolate=warn`: the response "
+        "then approaches the target as far as possible, and its trust gives the distance left.",
         "targets/0: RightHand at end stays 446.2 cm from its target: out of reach",
         {"parameter": "target"},
     ),
     problems.HEAD_TOO_LARGE: Text(
-        "All header lines together are longer than the service reads.",
-        "Send fewer or shorter headers; cookies are never looked at.",
+        "The header lines together exceed the limit, or there are too many.",
+        "Send fewer or shorter headers. The service ignores cookies.",
         "expected at most 16384 bytes in at most 100 headers",
     ),
     problems.UNKNOWN_HOST: Text(
-        "The header `Host` names neither an address nor a name that the operator has listed. "
-        "A page of another origin could otherwise read a service on the same machine (DNS "
-        "rebinding).",
-        "Ask under a listed name, or list the name in `POSEFIELD_HOSTS`.",
+        "The header `Host` is neither an IP address nor a name that the operator has listed. The "
+        "check prevents DNS rebinding, by which a page of another origin could read a service on "
+        "the same machine.",
+        "Use a listed name, or add the name to `POSEFIELD_HOSTS`.",
         "'evil.example', expected an address or one of localhost (POSEFIELD_HOSTS)",
     ),
     problems.INTERNAL: Text(
-        "The service failed. The request is not at fault.",
-        "Tell the operator `instance`: the service's log has the fault under that id. The same "
-        "request may be sent again, as no request changes anything.",
+        "An internal error occurred. The request is not its cause.",
+        "Report `instance` to the operator: the service's log contains the error under that id. "
+        "The client may repeat the request, because no request changes any state.",
         "see the service's log under the id in `instance`",
     ),
     problems.OVERLOADED: Text(
-        "More requests are open than the service answers at a time. Nothing was asked of a model.",
-        "Send the same request again after as many seconds as `Retry-After` says.",
+        "The number of open requests exceeds the limit. The model was not evaluated.",
+        "Repeat the request after the number of seconds in `Retry-After`.",
         "1000 requests are being answered",
     ),
     problems.LATE: Text(
-        "The answer had not begun when its time was over: the operator's limit, or the shorter "
-        "one that the request asked for by `Prefer: wait=`.",
-        "Send again after `Retry-After`, or ask for less at a time: fewer frames, clips or "
-        "characters.",
+        "The response did not begin within the time limit: the operator's limit, or the shorter "
+        "one that the request sets with `Prefer: wait=`.",
+        "Repeat the request after the number of seconds in `Retry-After`, or request fewer frames, "
+        "clips or characters.",
         "no answer within 30 s",
     ),
     problems.NOT_READY: Text(
-        "Only `/readyz` and its like answer so: there is no model, one of them fails its trial "
-        "question, or the service has been told to end.",
-        "Send requests to another instance. What is still sent to this one is answered.",
+        "Only `/readyz` returns this problem. Causes: the service has no model, a model fails its trial "
+        "request, or the service is shutting down.",
+        "Send requests to another instance. This instance still responds to requests that it "
+        "receives.",
         "there is no model",
     ),
 }
