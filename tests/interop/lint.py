@@ -15,7 +15,7 @@ QUIET = {"REDOCLY_TELEMETRY": "off", "REDOCLY_SUPPRESS_UPDATE_NOTICE": "true"}
 BREAKS = {
     "summary: List the models": "operation-summary",
     "Link: {$ref: '#/components/headers/Help'}": "response-contains-header",
-    "description: A model's name, or name@hash.": "parameter-description",
+    "description: Model name, or name@hash.": "parameter-description",
     "license: {name: Apache-2.0, identifier: Apache-2.0}": "info-license",
     "operationId: getModel": "operation-operationId",
 }

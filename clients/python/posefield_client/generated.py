@@ -33,11 +33,12 @@ class Operation(NamedTuple):
 
 
 class Target(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A joint that is to be in its place at a moment: at a time, or at the start, the end, the
-    event that the model's recipe names, or where the joint is highest, lowest or farthest from
-    the root. The motion that meets it is the nearest to the predicted one, as captured motions
-    stray from predictions. What lies farther off than they stray is approached as far as they
-    go, and `targets` in Trust says by how much it is missed. A joint has one target at one
+    """Target position of a joint at a moment. The moment is a time, the start, the end, the
+    event that the model's recipe names, or the moment at which the joint is highest, lowest or
+    farthest from the root. Among the motions that reach the target, the response is the one
+    closest to the prediction, in the metric of the deviations of captured motions from their
+    predictions. A target beyond these deviations is approached as far as they extend, and
+    `targets` in Trust gives the remaining distance. Each joint has at most one target at a
     moment.
     """
 
@@ -83,7 +84,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A ClipQuestion, and what its file is called."""
+    """A ClipQuestion with the name of its file."""
 
     name: str | UnsetType | None = UNSET
     controls: dict[str, float]
@@ -103,8 +104,8 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Many clips in one format. All are looked at before the answer begins; one without an
-    answer refuses all.
+    """Request for many clips in one format. All clips are validated before the response
+    begins; one invalid clip refuses the whole request.
     """
 
     format: Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack"]
@@ -114,9 +115,9 @@ class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Camera(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where one looks from and through what lens. It has no direction: a character behind it
-    counts by its distance like any other, for a mirror or a shadow may show it. It may stand
-    in nobody.
+    """Position and lens of a camera. It has no direction: a character behind it counts by its
+    distance like any other, because a mirror or a shadow may show it. The camera must not be
+    inside a character.
     """
 
     position: tuple[float, float, float]
@@ -125,9 +126,10 @@ class Camera(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One pose of each of many characters. All lists have one length, the number of
-    characters, in one order; what is no list holds for each of them. Where nothing is a list
-    there is one character. Crowds are the model's predictions: they are held to nothing.
+    """Request for one pose of each of many characters. All lists have the same length, the
+    number of characters, and the same order. A scalar applies to all characters. Without a
+    list there is one character. The poses are the model's predictions; constraints do not
+    apply to crowds.
     """
 
     controls: dict[str, float | tuple[float, ...]]
@@ -147,7 +149,7 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """By default for at most 65,536 points."""
+    """Request for a grid of sigma. Default limit: 65,536 points."""
 
     across: str
     along: str
@@ -183,7 +185,9 @@ class ModelList(Struct, frozen=True, kw_only=True):
 
 
 class Measure(Struct, frozen=True, kw_only=True):
-    """How a control is read off a motion; a control that somebody typed has none. Since 2.2.0."""
+    """Definition of a control that is measured on a motion. Absent for a control whose values
+    were entered in the training table. Since 2.2.0.
+    """
 
     quantity: str
     joints: tuple[int, ...] = ()
@@ -192,7 +196,7 @@ class Measure(Struct, frozen=True, kw_only=True):
 
 
 class Control(Struct, frozen=True, kw_only=True):
-    """One control parameter, its unit and what of it was sampled."""
+    """One control parameter, its unit and its sampled range."""
 
     name: str
     unit: str
@@ -205,8 +209,8 @@ class Control(Struct, frozen=True, kw_only=True):
 
 
 class Skeleton(Struct, frozen=True, kw_only=True):
-    """Joints parents first, their rest offsets, and the end sites that no joint follows. At
-    rest every rotation is the identity.
+    """Joints in an order with parents first, their rest offsets, and the end sites without a
+    joint. At rest every rotation is the identity.
     """
 
     names: tuple[str, ...]
@@ -217,8 +221,8 @@ class Skeleton(Struct, frozen=True, kw_only=True):
 
 
 class Level(Struct, frozen=True, kw_only=True):
-    """A level of detail. Errors are distances between its joints and those of the model that
-    nothing is cut from, over random controls, performers and times, m.
+    """A level of detail. Errors are distances in metres between its joints and those of the
+    untruncated model, over random controls, performers and times.
     """
 
     ranks: tuple[int, int, int]
@@ -235,7 +239,7 @@ class Level(Struct, frozen=True, kw_only=True):
 
 
 class ModelCardKriging(Struct, frozen=True, kw_only=True):
-    """Parameters of the kriging that weighs the captured clips."""
+    """Parameters of the kriging model that weights the captured clips."""
 
     covariance: str
     drifts: tuple[int, ...]
@@ -245,14 +249,14 @@ class ModelCardKriging(Struct, frozen=True, kw_only=True):
 
 
 class ModelCardEvent(Struct, frozen=True, kw_only=True):
-    """What the motion is for; null where the recipe names nothing."""
+    """Main event of the motion; null if the recipe names none."""
 
     joint: int
     share: float
 
 
 class ModelCard(Struct, frozen=True, kw_only=True):
-    """Everything a client needs to know of a model but its weights."""
+    """Description of a model for clients, without its weights."""
 
     identity: str
     name: str
@@ -282,7 +286,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
 
 
 class Met(Struct, frozen=True, kw_only=True):
-    """Something that a motion was held to."""
+    """Residual of one constraint."""
 
     what: str
     miss: float
@@ -291,7 +295,7 @@ class Met(Struct, frozen=True, kw_only=True):
 
 
 class Trust(Struct, frozen=True, kw_only=True):
-    """Where an answer comes from and what it is worth."""
+    """Provenance and uncertainty of a response."""
 
     model: str
     controls: dict[str, float]
@@ -309,7 +313,7 @@ class Trust(Struct, frozen=True, kw_only=True):
 
 
 class Backing(Struct, frozen=True, kw_only=True):
-    """Whether anything like these controls was captured, and by what that was told."""
+    """Whether clips with similar controls were captured, and the quantities that decide it."""
 
     supported: bool
     beyond: dict[str, float]
@@ -329,17 +333,17 @@ class CapturedClip(Struct, frozen=True, kw_only=True):
 
 
 class ReasonsOthers(Struct, frozen=True, kw_only=True):
-    """How many clips are not listed, and what they count for together."""
+    """Number and total weight of the clips that are not listed."""
 
     count: int
     weight: float
 
 
 class Reasons(Struct, frozen=True, kw_only=True):
-    """Whatever the time, the poses are a weighted sum of the captured clips, in the
-    coordinates of the model's motion tensor. All weights, those of `nearest` and of `others`,
-    add up to one. A weight may be negative: a clip that others hide, or from which the field
-    is carried on, is taken away.
+    """At any time, the poses are a weighted sum of the captured clips, in the coordinates of
+    the model's motion tensor. The weights in `nearest` and `others` sum to one. A weight may
+    be negative: of a clip that other clips screen, or of a clip from which the prediction
+    extrapolates.
     """
 
     model: str
@@ -364,7 +368,9 @@ class Suggestion(Struct, frozen=True, kw_only=True):
 
 
 class Suggestions(Struct, frozen=True, kw_only=True):
-    """Each point is ranked as if those before it had been captured already."""
+    """Points to capture, in ranked order. Each rank assumes that the points before it were
+    captured.
+    """
 
     model: str
     performer: str | None
@@ -373,7 +379,7 @@ class Suggestions(Struct, frozen=True, kw_only=True):
 
 
 class ManifestEntry(Struct, frozen=True, kw_only=True):
-    """One clip of an archive, and how far it may be trusted."""
+    """One clip of an archive, with its uncertainty."""
 
     name: str
     file: str
@@ -412,7 +418,7 @@ class ReloadFaults(Struct, frozen=True, kw_only=True):
 
 
 class Reload(Struct, frozen=True, kw_only=True):
-    """What has become of looking for new model files since the start."""
+    """Statistics of the checks for new model files since the start of the service."""
 
     looks: int
     opened: int
@@ -438,7 +444,7 @@ class ProblemErrors(Struct, frozen=True, kw_only=True):
 
 
 class Problem(Struct, frozen=True, kw_only=True):
-    """A problem as RFC 9457 describes it. Every error of this service has this shape."""
+    """A problem as in RFC 9457. Every error of this service has this schema."""
 
     type: str
     title: str

@@ -23,7 +23,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -32,7 +32,7 @@ export interface paths {
         };
         /**
          * Get a model's card
-         * @description What the model says of itself - its controls and their ranges, its skeleton, what training measured.
+         * @description The card describes the model: its controls and their ranges, its skeleton, and the measurements of its training.
          */
         get: operations["getModel"];
         put?: never;
@@ -49,7 +49,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -58,13 +58,13 @@ export interface paths {
         };
         /**
          * Get poses at given times
-         * @description As JSON, or in the format that `Accept` prefers.
+         * @description The response is JSON, or the format that `Accept` prefers.
          */
         get: operations["getPose"];
         put?: never;
         /**
          * Query poses at given times
-         * @description As JSON, or in the format that `Accept` prefers. Poses at many control points are a crowd's.
+         * @description The response is JSON, or the format that `Accept` prefers. For poses at many control points use the crowd operations.
          */
         post: operations["queryPose"];
         delete?: never;
@@ -79,7 +79,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -93,13 +93,13 @@ export interface paths {
         };
         /**
          * Get poses at given times in a format
-         * @description As `json`, `msgpack`, `npz` or `arrow`.
+         * @description The response is `json`, `msgpack`, `npz` or `arrow`.
          */
         get: operations["getPoseInFormat"];
         put?: never;
         /**
          * Query poses at given times in a format
-         * @description As `json`, `msgpack`, `npz` or `arrow`.
+         * @description The response is `json`, `msgpack`, `npz` or `arrow`.
          */
         post: operations["queryPoseInFormat"];
         delete?: never;
@@ -114,7 +114,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -122,14 +122,14 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get a clip in the format that is accepted
-         * @description As binary USD, or in the format that `Accept` prefers; each has a path of its own too.
+         * Get a clip in an accepted format
+         * @description The response is binary USD, or the format that `Accept` prefers. Each format also has its own path.
          */
         get: operations["getClip"];
         put?: never;
         /**
-         * Query a clip in the format that is accepted
-         * @description As binary USD, or in the format that `Accept` prefers; each has a path of its own too.
+         * Query a clip in an accepted format
+         * @description The response is binary USD, or the format that `Accept` prefers. Each format also has its own path.
          */
         post: operations["queryClip"];
         delete?: never;
@@ -144,12 +144,12 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
                  * @example usda
                  */
                 format: components["parameters"]["clipFormat"];
@@ -158,13 +158,13 @@ export interface paths {
         };
         /**
          * Get a clip in a format
-         * @description As `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. In metres with Y up, if not asked otherwise; BVH usually in centimetres, and glTF in metres with Y up alone.
+         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up.
          */
         get: operations["getClipInFormat"];
         put?: never;
         /**
          * Query a clip in a format
-         * @description As `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. In metres with Y up, if not asked otherwise; BVH usually in centimetres, and glTF in metres with Y up alone.
+         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up.
          */
         post: operations["queryClipInFormat"];
         delete?: never;
@@ -179,7 +179,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -190,7 +190,7 @@ export interface paths {
         put?: never;
         /**
          * Query many clips as an archive
-         * @description As zip, or in the format that `Accept` prefers. The archive is sent while the clips are made: one file each, named after it, in the order of the question, the same as the path of its format answers with. The last is `manifest.jsonl`; an answer that ends without it broke off.
+         * @description The response is a zip archive, or the format that `Accept` prefers. The archive is sent while the clips are computed. It contains one file per clip, under the clip's name, in the order of the request; each file equals the response of the clip path in that format. The last file is `manifest.jsonl`; a response without it is incomplete.
          */
         post: operations["queryClips"];
         delete?: never;
@@ -205,7 +205,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -220,8 +220,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Query many clips as an archive of a format
-         * @description As `zip` or `tar`. The archive is sent while the clips are made: one file each, named after it, in the order of the question, the same as the path of its format answers with. The last is `manifest.jsonl`; an answer that ends without it broke off.
+         * Query many clips as an archive in a format
+         * @description The response is `zip` or `tar`. The archive is sent while the clips are computed. It contains one file per clip, under the clip's name, in the order of the request; each file equals the response of the clip path in that format. The last file is `manifest.jsonl`; a response without it is incomplete.
          */
         post: operations["queryClipsInFormat"];
         delete?: never;
@@ -236,7 +236,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -244,14 +244,14 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get a crowd that walks in the format that is accepted
-         * @description As binary USD, or in the format that `Accept` prefers. Each character goes its own way at its own changing speed, the same for the same seed. For models of a cycle that travels. USDZ is sent while it is made, a single layer once it is whole.
+         * Get a walking crowd in an accepted format
+         * @description The response is binary USD, or the format that `Accept` prefers. Each character walks on its own path at its own varying speed; the same seed gives the same crowd. Requires a cyclic model whose root travels at several speeds. USDZ is sent while it is written; a single layer is sent when it is complete.
          */
         get: operations["getCrowd"];
         put?: never;
         /**
-         * Query poses of a crowd in the format that is accepted
-         * @description As an Arrow stream, or in the format that `Accept` prefers. It is also the way to ask for poses at many control points at once: each is a character at the origin.
+         * Query poses of a crowd in an accepted format
+         * @description The response is an Arrow stream, or the format that `Accept` prefers. Use it also for poses at many control points: each is a character at the origin.
          */
         post: operations["queryCrowd"];
         delete?: never;
@@ -266,7 +266,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -274,14 +274,14 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get a crowd that walks in a format
-         * @description As `usda`, `usdc` or `usdz`. Each character goes its own way at its own changing speed, the same for the same seed. For models of a cycle that travels. USDZ is sent while it is made, a single layer once it is whole.
+         * Get a walking crowd in a format
+         * @description The response is `usda`, `usdc` or `usdz`. Each character walks on its own path at its own varying speed; the same seed gives the same crowd. Requires a cyclic model whose root travels at several speeds. USDZ is sent while it is written; a single layer is sent when it is complete.
          */
         get: operations["getCrowdInFormat"];
         put?: never;
         /**
          * Query poses of a crowd in a format
-         * @description As `arrow`, `npz`, `msgpack`, or `json` for at most 1,000 characters.
+         * @description The response is `arrow`, `npz`, `msgpack`, or `json` for at most 1,000 characters.
          */
         post: operations["queryCrowdInFormat"];
         delete?: never;
@@ -296,7 +296,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -304,14 +304,14 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get what an answer is made of
-         * @description The captured clips nearest to these controls, and what each counts for in the poses of the finest level.
+         * Get the captured clips behind a response
+         * @description Lists the captured clips nearest to the controls, and the weight of each in the poses of the finest level.
          */
         get: operations["getWhy"];
         put?: never;
         /**
-         * Query what an answer is made of
-         * @description The captured clips nearest to these controls, and what each counts for in the poses of the finest level.
+         * Query the captured clips behind a response
+         * @description Lists the captured clips nearest to the controls, and the weight of each in the poses of the finest level.
          */
         post: operations["queryWhy"];
         delete?: never;
@@ -326,7 +326,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -334,8 +334,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get which clips to capture next
-         * @description Points within what was sampled at which one more captured clip would say most of what is asked of the model, the one that is worth most first.
+         * Get suggested clips to capture
+         * @description Lists control points within the sampled ranges, ranked by the expected reduction of the kriging variance if one clip is captured there. The most useful point is first.
          */
         get: operations["getSuggestions"];
         put?: never;
@@ -352,7 +352,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -361,13 +361,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured. As JSON, or in the format that `Accept` prefers.
+         * @description Sigma is the expected distance (m) of a captured clip from the response. The grid holds sigma for all values of two controls, at the finest level of detail, and whether clips with similar controls were captured. The response is JSON, or the format that `Accept` prefers.
          */
         get: operations["getSigma"];
         put?: never;
         /**
          * Query sigma over two controls
-         * @description How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured. As JSON, or in the format that `Accept` prefers.
+         * @description Sigma is the expected distance (m) of a captured clip from the response. The grid holds sigma for all values of two controls, at the finest level of detail, and whether clips with similar controls were captured. The response is JSON, or the format that `Accept` prefers.
          */
         post: operations["querySigma"];
         delete?: never;
@@ -382,7 +382,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -396,13 +396,13 @@ export interface paths {
         };
         /**
          * Get sigma over two controls in a format
-         * @description As `json`, `msgpack`, `npz` or `arrow`. How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
+         * @description The response is `json`, `msgpack`, `npz` or `arrow`. Sigma is the expected distance (m) of a captured clip from the response. The grid holds sigma for all values of two controls, at the finest level of detail, and whether clips with similar controls were captured.
          */
         get: operations["getSigmaInFormat"];
         put?: never;
         /**
          * Query sigma over two controls in a format
-         * @description As `json`, `msgpack`, `npz` or `arrow`. How far a captured clip would lie from the answer, over all values of two controls, at the finest level of detail, and whether anything like them was captured.
+         * @description The response is `json`, `msgpack`, `npz` or `arrow`. Sigma is the expected distance (m) of a captured clip from the response. The grid holds sigma for all values of two controls, at the finest level of detail, and whether clips with similar controls were captured.
          */
         post: operations["querySigmaInFormat"];
         delete?: never;
@@ -419,9 +419,9 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Get what is counted
-         * @description For Prometheus: latencies by operation, format and status, open requests, poses answered together, answers
-         *     that clients had already, versions of models.
+         * Get metrics
+         * @description Prometheus metrics: latency by operation, format and status, open requests, poses per batch,
+         *     responses with 304, and versions of models.
          */
         get: operations["getMetrics"];
         put?: never;
@@ -439,7 +439,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Whether the process answers */
+        /** Check liveness */
         get: operations["getLiveness"];
         put?: never;
         post?: never;
@@ -457,11 +457,12 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Whether the models answer
-         * @description The newest model of each name is asked a trial question, at most once a second, and must answer
-         *     as when it was opened. Model files that are new and cannot be used are listed: the version
-         *     before them answers. 503 when a model answers otherwise, when there is none, and from the
-         *     moment that the service is told to end.
+         * Check readiness
+         * @description The service evaluates a trial request on the newest model of each name, at most once a
+         *     second. The output must equal the output at the opening of the model. New model files that
+         *     cannot be used are listed; the previous version stays in service. The status is 503 if an
+         *     output differs, if there is no model, and from the moment at which the service is told to
+         *     stop.
          */
         get: operations["getReadiness"];
         put?: never;
@@ -481,7 +482,7 @@ export interface paths {
         };
         /**
          * Get this document
-         * @description Byte for byte, with its comments.
+         * @description The response equals the source file byte for byte, including its comments.
          */
         get: operations["getContract"];
         put?: never;
@@ -501,7 +502,7 @@ export interface paths {
         };
         /**
          * Get this document as JSON
-         * @description The same, for what reads no YAML.
+         * @description The same content for clients without a YAML parser.
          */
         get: operations["getContractJson"];
         put?: never;
@@ -520,8 +521,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Play with the models
-         * @description As a page with sliders, a character, and what the answers are worth. It loads nothing from elsewhere.
+         * Open the model viewer
+         * @description HTML page with sliders, an animated character and the uncertainty of the responses. The page loads no external resources.
          */
         get: operations["getViewer"];
         put?: never;
@@ -540,8 +541,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Read this document
-         * @description As a page on which each operation can be searched for and tried. It loads nothing from elsewhere.
+         * Read the documentation of the operations
+         * @description HTML page to search and try all operations. The page loads no external resources.
          */
         get: operations["getDocs"];
         put?: never;
@@ -560,8 +561,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Read what each problem means
-         * @description As a page for people, `#` and the last part of a problem's `type` leads to it.
+         * Read the documentation of the problems
+         * @description HTML page. A problem's entry is at the fragment `#` with the last part of its `type`.
          */
         get: operations["getProblems"];
         put?: never;
@@ -576,62 +577,67 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description name@hash of a model; answers under it never change. */
+        /** @description Identity of a model, name@hash. Responses under it never change. */
         Identity: string;
         /**
-         * @description What joints are called: as in the motion that the model was trained from, or as Mixamo,
-         *     Unreal's mannequin, VRM or HumanIK call those that have one of the card's `roles`; the others
-         *     keep their names. Names are all that changes: bones keep their axes and lengths, so that a
-         *     motion still has to be retargeted to a character of that kind. A model without roles has no
-         *     answer but for `own`.
+         * @description Naming convention of the joints: `own` keeps the names of the training data; the others are
+         *     the names of Mixamo, Unreal's mannequin, VRM or HumanIK for joints with one of the card's
+         *     `roles`. Joints without a role keep their names. Only names change. Bones keep their axes
+         *     and lengths, so the motion must still be retargeted to a character of that convention. A
+         *     model without roles accepts only `own`.
          * @default own
          * @enum {string}
          */
         Names: "own" | "mixamo" | "ue5" | "vrm" | "humanik";
         /**
-         * @description In place, the frame that goes evenly along a cycle's arc is taken out, heading and all, or, of
-         *     what is no cycle, the straight way from the first pose of the whole clip to its last, evenly,
-         *     while the heading stays. Heights stay. A model that is in place already is as it is.
+         * @description `in_place` removes the travel of the root. For a cycle it removes the frame that moves
+         *     evenly along the cycle's arc, including its heading. For another motion it removes the
+         *     straight line from the first pose of the whole clip to the last, at constant speed, and
+         *     keeps the heading. Heights are kept. A model that was trained in place is unchanged.
          * @default travelling
          * @enum {string}
          */
         Root: "travelling" | "in_place";
         /**
-         * @description One whole cycle as N = max(1, round(duration * fps)) even steps, N + 1 frames: without `start`
-         *     and `end`. The last frame is exactly the first, or, where the root travels, the first carried by
-         *     the cycle's way and turn. The file plays N / fps seconds; the trust's `duration` is the
-         *     model's. A model that is not cyclic has no answer.
+         * @description One whole cycle in N = max(1, round(duration * fps)) even steps, which gives N + 1 frames.
+         *     Not valid with `start` or `end`. The last frame equals the first exactly or, if the root
+         *     travels, equals the first moved by the travel and the turn of the cycle. The file plays for
+         *     N / fps seconds; `duration` in the trust is the model's. A model that is not cyclic refuses
+         *     it.
          * @default false
          */
         Loop: boolean;
         /**
-         * @description Whether the trust says sigma of each joint, too: `joint_sigma`. Files that hold no trust (BVH) do not say it.
+         * @description Whether the trust includes sigma for each joint, as `joint_sigma`. Files without trust (BVH) omit it.
          * @default false
          */
         JointSigma: boolean;
         /**
-         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that the
-         *     model can measure on a motion: they have a `measure` on its card), `none`, or their names. The
-         *     motion is the nearest to the predicted one, as captured motions stray from predictions, that
-         *     does.
+         * @description Measured controls that the motion must match exactly: `auto` (all given controls that the
+         *     model can measure on a motion: those with a `measure` on its card, except measures of the
+         *     performer's body), `none`, or names of controls. Among the motions that match, the response
+         *     is the one closest to the prediction, in the metric of the deviations of captured motions
+         *     from their predictions.
          * @default auto
          */
         Exact: ("auto" | "none") | components["schemas"]["ControlName"][];
         /**
-         * @description A joint that is to be in its place at a moment: at a time, or at the start, the end, the event
-         *     that the model's recipe names, or where the joint is highest, lowest or farthest from the root.
-         *     The motion that meets it is the nearest to the predicted one, as captured motions stray from
-         *     predictions. What lies farther off than they stray is approached as far as they go, and
-         *     `targets` in Trust says by how much it is missed. A joint has one target at one moment.
+         * @description Target position of a joint at a moment. The moment is a time, the start, the end, the event
+         *     that the model's recipe names, or the moment at which the joint is highest, lowest or
+         *     farthest from the root. Among the motions that reach the target, the response is the one
+         *     closest to the prediction, in the metric of the deviations of captured motions from their
+         *     predictions. A target beyond these deviations is approached as far as they extend, and
+         *     `targets` in Trust gives the remaining distance. Each joint has at most one target at a
+         *     moment.
          */
         Target: {
             /**
-             * @description Name of a joint, as the model's own skeleton has it.
+             * @description Name of a joint in the model's skeleton.
              * @example RightHand
              */
             joint: string;
             /**
-             * @description Where it is to be, x y z, m, in the frame of the clip: that in which the root travels.
+             * @description Target position x y z in metres, in the frame of the clip, in which the root travels.
              * @example [
              *       0.3,
              *       1.2,
@@ -639,14 +645,14 @@ export interface components {
              *     ]
              */
             position: number[];
-            /** @description Seconds from the start of the clip, up to its duration. */
+            /** @description Seconds from the start of the clip, at most its duration. */
             time?: number;
             at?: components["schemas"]["Moment"];
         } & (unknown | unknown);
         /** @enum {string} */
         Moment: "start" | "end" | "event" | "highest" | "lowest" | "farthest";
         /**
-         * @description Joints that are to be in their places. Of a control that the same joint is measured for, the target is the nearer word.
+         * @description Target positions of joints. With `exact` set to `auto`, a target replaces a control that is measured as the position of the same joint at the same moment.
          * @default []
          * @example [
          *       {
@@ -662,45 +668,47 @@ export interface components {
          */
         Targets: components["schemas"]["Target"][];
         /**
-         * @description Whether feet that stand stay where they stand.
+         * @description Whether planted feet keep their positions.
          * @default false
          */
         PinFeet: boolean;
         /**
-         * @description The file's unit of length; null for the format's usual one. glTF is always in metres.
+         * @description Unit of length in the file; null for the format's usual unit. glTF is always in metres.
          * @default null
          * @enum {string|null}
          */
         Unit: "m" | "cm" | null;
         /**
-         * @description The axis that is up in the file; null for the format's usual one. Where it is Z a character that faces straight ahead faces -Y. In glTF Y is always up.
+         * @description Up axis of the file; null for the format's usual axis. With `z`, a character that faces straight ahead faces -Y. In glTF Y is always up.
          * @default null
          * @enum {string|null}
          */
         Up: "y" | "z" | null;
         /**
-         * @description What to do with controls like which nothing was captured: `ok` says no more of it than `supported`;
-         *     `warn` adds a sentence for each control outside its sampled range, or one where the controls lie in
-         *     a gap of what was sampled, and one for each target out of reach; `refuse` answers none of these.
+         * @description Policy for controls without similar captured clips and for targets out of reach. `ok`
+         *     reports the controls only in `supported`. `warn` adds one sentence for each control outside
+         *     its sampled range, or one sentence if the controls lie in a gap between the samples, and one
+         *     sentence for each target out of reach. `refuse` returns an error in all these cases.
          * @default warn
          * @enum {string}
          */
         Extrapolate: "ok" | "warn" | "refuse";
         /**
-         * @description Who moves, of the `performers` that the model's card names; null for somebody who was never seen.
+         * @description Performer, one of `performers` on the model's card; null for an unseen performer.
          * @default null
          * @example tall
          */
         Performer: string | null;
         /**
-         * @description Level of detail, of the `levels` on the model's card; 0 is the finest.
+         * @description Level of detail, an index into `levels` on the model's card; 0 is the finest.
          * @default 0
          * @example 1
          */
         LevelNumber: number;
         /**
-         * @description A number for each control of the model, in the control's unit. In a question some or all of them
-         *     may be left out, of a crowd none: they are then the most typical for those that are given and for the performer.
+         * @description A number for each control of the model, in the control's unit. A request may omit some or
+         *     all of them, except a request for a crowd. Omitted controls are set to their conditional
+         *     mean, given the other controls, the performer and the targets.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -714,7 +722,7 @@ export interface components {
         PoseQuestion: {
             controls: components["schemas"]["Controls"];
             /**
-             * @description Seconds from the start of the clip, up to its duration.
+             * @description Seconds from the start of the clip, at most its duration.
              * @example [
              *       0,
              *       0.5
@@ -732,17 +740,17 @@ export interface components {
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
             /**
-             * @description Frames a second.
+             * @description Frame rate in frames a second.
              * @default 30
              */
             fps: number;
             /**
-             * @description Seconds to the first frame.
+             * @description Time of the first frame in seconds.
              * @default 0
              */
             start: number;
             /**
-             * @description Seconds that the last frame does not pass; null for the clip's duration.
+             * @description Latest time of the last frame in seconds; null for the clip's duration.
              * @default null
              */
             end: number | null;
@@ -768,72 +776,73 @@ export interface components {
             performer?: components["schemas"]["Performer"];
         };
         /**
-         * @description Whatever the time, the poses are a weighted sum of the captured clips, in the coordinates of the
-         *     model's motion tensor. All weights, those of `nearest` and of `others`, add up to one. A weight may
-         *     be negative: a clip that others hide, or from which the field is carried on, is taken away.
+         * @description At any time, the poses are a weighted sum of the captured clips, in the coordinates of the
+         *     model's motion tensor. The weights in `nearest` and `others` sum to one. A weight may be
+         *     negative: of a clip that other clips screen, or of a clip from which the prediction
+         *     extrapolates.
          */
         Reasons: {
             model: components["schemas"]["Identity"];
             controls: components["schemas"]["Controls"];
-            /** @description Who was asked for; null for somebody who was never seen. */
+            /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
             /** @description As in Trust. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
             support?: components["schemas"]["Backing"];
-            /** @description The nearest first. */
+            /** @description Captured clips, the nearest first. */
             nearest: components["schemas"]["CapturedClip"][];
-            /** @description How many clips are not listed, and what they count for together. */
+            /** @description Number and total weight of the clips that are not listed. */
             others: {
                 count: number;
                 weight: number;
             };
         };
-        /** @description Whether anything like these controls was captured, and by what that was told. */
+        /** @description Whether clips with similar controls were captured, and the quantities that decide it. */
         Backing: {
             supported: components["schemas"]["Supported"];
-            /** @description How far each control lies beyond its sampled range, as a share of it. */
+            /** @description Distance of each control beyond its sampled range, as a share of that range. */
             beyond: {
                 [key: string]: number;
             };
-            /** @description The share beyond which nothing is supported. */
+            /** @description Largest supported value of `beyond`. */
             most_beyond: number;
-            /** @description Of a plain field over the controls of the captured clips, from 0 where many are near to 1 where none is. */
+            /** @description Kriging variance of a field over the controls of the captured clips: near 0 where many clips are close, near 1 far from all clips. */
             variance: number;
-            /** @description The variance above which nothing is supported. */
+            /** @description Largest supported value of `variance`. */
             most_variance: number;
         };
-        /** @description Each point is ranked as if those before it had been captured already. */
+        /** @description Points to capture, in ranked order. Each rank assumes that the points before it were captured. */
         Suggestions: {
             model: components["schemas"]["Identity"];
-            /** @description Whose clips alone counted as captured; null for everybody's. */
+            /** @description Performer whose clips alone counted as captured; null if all clips counted. */
             performer: string | null;
-            /** @description Of how many points these were chosen. */
+            /** @description Number of candidate points. */
             candidates: number;
-            /** @description The one that is worth most first. */
+            /** @description Suggested points, the most useful first. */
             suggestions: components["schemas"]["Suggestion"][];
         };
         Suggestion: {
             controls: components["schemas"]["Controls"];
-            /** @description Share by which the mean of `variance`, as Backing has it, falls over all that may be asked, once this is captured. */
+            /** @description Share by which the mean of `variance` (see Backing) over the candidates falls if this point is captured. */
             gain: number;
-            /** @description As Backing has it, at the point itself, before. */
+            /** @description `variance` (see Backing) at this point before it is captured. */
             variance: number;
-            /** @description Source of the captured clip nearest to it. */
+            /** @description Source of the nearest captured clip. */
             nearest: string;
             lacking: components["schemas"]["ControlName"];
-            /** @description By how much the nearest clip differs in that control, in which it differs most, as a share of its range. */
+            /** @description Difference of the nearest clip in the control `lacking`, in which it differs most, as a share of that control's range. */
             gap: number;
         };
         CapturedClip: {
-            /** @description The motion file, and the frames of it where the clip is a part. */
+            /** @description Motion file, and the frame range if the clip is a part of it. */
             source: string;
             controls: components["schemas"]["Controls"];
-            /** @description Who moved; null where performers are not told apart. */
+            /** @description Performer of the clip; null if the model does not distinguish performers. */
             performer: string | null;
-            /** @description From the controls asked for in the model's own metric. At one, two clips have almost nothing to do with each other. */
+            /** @description Distance from the requested controls in the model's metric. At distance 1 the clips are almost uncorrelated. */
             distance: number;
-            /** @description What it counts for. */
+            /** @description Weight of the clip. */
             weight: number;
         };
         /**
@@ -846,7 +855,7 @@ export interface components {
         /** @default 0 */
         Margin: number;
         /**
-         * @description A number for each control that is no axis; of those left out the card's default.
+         * @description A number for each control that is not an axis. Omitted controls take the card's default.
          * @example {
          *       "stature": 1.72
          *     }
@@ -854,15 +863,15 @@ export interface components {
         FixedControls: {
             [key: string]: number;
         };
-        /** @description By default for at most 65,536 points. */
+        /** @description Request for a grid of sigma. Default limit: 65,536 points. */
         SigmaQuestion: {
-            /** @description The control that changes from column to column. */
+            /** @description Control that varies from column to column. */
             across: components["schemas"]["ControlName"];
-            /** @description Another control, which changes from row to row. */
+            /** @description Control that varies from row to row; different from `across`. */
             along: components["schemas"]["ControlName"];
             columns?: components["schemas"]["GridSteps"];
             rows?: components["schemas"]["GridSteps"];
-            /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
+            /** @description Margin of the grid beyond the sampled range on either side, as a share of that range. */
             margin?: components["schemas"]["Margin"];
             controls?: components["schemas"]["FixedControls"];
             performer?: components["schemas"]["Performer"];
@@ -876,26 +885,26 @@ export interface components {
             controls: {
                 [key: string]: number;
             };
-            /** @description Who was asked for; null for somebody who was never seen. */
+            /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
             units: {
                 [key: string]: string;
             };
-            /** @description For each column the value of `across`. */
+            /** @description Value of `across` for each column. */
             across_values: number[];
-            /** @description For each row the value of `along`. */
+            /** @description Value of `along` for each row. */
             along_values: number[];
-            /** @description For each row and column sigma as in Trust, m. */
+            /** @description Sigma as in Trust, in metres, for each row and column. */
             sigma: number[][];
-            /** @description For each row and column whether every control lies in its sampled range. */
+            /** @description For each row and column, whether all controls lie in their sampled ranges. */
             inside: boolean[][];
-            /** @description For each row and column `supported` as in Trust; always there since 2.2.0. */
+            /** @description For each row and column, `supported` as in Trust. Always present since 2.2.0. */
             supported?: boolean[][];
         };
-        /** @description Many clips in one format. All are looked at before the answer begins; one without an answer refuses all. */
+        /** @description Request for many clips in one format. All clips are validated before the response begins; one invalid clip refuses the whole request. */
         ClipsQuestion: {
             /**
-             * @description Of all files, by their ending.
+             * @description File format of all clips, as a file extension.
              * @enum {string}
              */
             format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
@@ -903,27 +912,27 @@ export interface components {
             up?: components["schemas"]["Up"];
             clips: components["schemas"]["NamedClipQuestion"][];
         };
-        /** @description A ClipQuestion, and what its file is called. */
+        /** @description A ClipQuestion with the name of its file. */
         NamedClipQuestion: {
             /**
-             * @description Name of the file but for its ending, no other clip's, be it in other capitals; if null, `clip-` and the clip's place, from 000000.
+             * @description File name without extension, unique without regard to case. Null: `clip-` and the index of the clip, six digits from 000000.
              * @default null
              * @example left
              */
             name: string | null;
             controls: components["schemas"]["Controls"];
             /**
-             * @description Frames a second.
+             * @description Frame rate in frames a second.
              * @default 30
              */
             fps: number;
             /**
-             * @description Seconds to the first frame.
+             * @description Time of the first frame in seconds.
              * @default 0
              */
             start: number;
             /**
-             * @description Seconds that the last frame does not pass; null for the clip's duration.
+             * @description Latest time of the last frame in seconds; null for the clip's duration.
              * @default null
              */
             end: number | null;
@@ -938,13 +947,13 @@ export interface components {
             targets?: components["schemas"]["Targets"];
             pin_feet?: components["schemas"]["PinFeet"];
         };
-        /** @description One clip of an archive, and how far it may be trusted. */
+        /** @description One clip of an archive, with its uncertainty. */
         ManifestEntry: {
             name: string;
             /** @description Path in the archive. */
             file: string;
             bytes: number;
-            /** @description Of the file's content. */
+            /** @description SHA-256 of the file's content. */
             sha256: string;
             frames: number;
             fps: number;
@@ -952,9 +961,9 @@ export interface components {
             controls: components["schemas"]["Controls"];
             performer: string | null;
             level: number;
-            /** @description As in Trust, s. */
+            /** @description As in Trust, in seconds. */
             duration: number;
-            /** @description As in Trust, m. */
+            /** @description As in Trust, in metres. */
             sigma: number;
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
@@ -968,86 +977,86 @@ export interface components {
             /** @description As in Trust. */
             targets?: components["schemas"]["Met"][];
         };
-        /** @description Where an answer comes from and what it is worth. */
+        /** @description Provenance and uncertainty of a response. */
         Trust: {
             model: components["schemas"]["Identity"];
             controls: components["schemas"]["Controls"];
-            /** @description Who was asked for; null for somebody who was never seen. */
+            /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
-            /** @description Level of detail, of those on the card; 0 is the finest. */
+            /** @description Level of detail, an index into the card's levels; 0 is the finest. */
             level: number;
-            /** @description Natural length of the whole clip at these controls, s. */
+            /** @description Natural duration of the whole clip at these controls, in seconds. */
             duration: number;
-            /** @description How far a captured clip at these controls would lie from this one, as a root-mean-square over joints and frames, m. */
+            /** @description Expected distance of a captured clip at these controls from this clip, root mean square over joints and frames, in metres. */
             sigma: number;
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside what was sampled, or one where the controls lie in a gap of it, and one for each of `targets` that is not reached. */
+            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, and one for each element of `targets` that is not reached. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
-            /** @description The controls that can be measured on a motion, as this one has them, in their units; of clips, and of poses that are held to something. */
+            /** @description Values of the measurable controls on this motion, in their units. Present for clips, and for poses with constraints. */
             measured?: {
                 [key: string]: number;
             };
-            /** @description Measured controls and targets that the motion was held to, and how far it stays from each; absent where there are none. */
+            /** @description Measured controls and targets that constrained the motion, each with its remaining distance. Absent without constraints. */
             targets?: components["schemas"]["Met"][];
         };
         /**
-         * @description Names of the controls that were left out, and are the most typical for those that were given and for
-         *     targets; not there where none was. Since 2.2.0.
+         * @description Names of the omitted controls, which are set to their conditional mean given the other
+         *     controls and the targets. Absent if no control was omitted. Since 2.2.0.
          */
         Inferred: string[];
-        /** @description Whether anything like these controls was captured: no control lies more than a tenth of its range beyond it, and captured clips are near, so near as to 19 of 20 captured clips the others are. Always there since 2.2.0. */
+        /** @description True if clips with similar controls were captured: no control lies more than a tenth of its range outside that range, and captured clips are as near as 19 of 20 captured clips are to the others. Always present since 2.2.0. */
         Supported: boolean;
-        /** @description For each joint of the card sigma as it is of that joint alone, m; absent where it was not asked for. */
+        /** @description Sigma of each joint of the card, in metres. Absent unless requested. */
         SigmaByJoint: number[];
-        /** @description Whether somebody captured was asked for; absent where the model tells nobody apart. */
+        /** @description True if the request names a captured performer. Absent if the model does not distinguish performers. */
         PerformerSeen: boolean;
-        /** @description Something that a motion was held to. */
+        /** @description Residual of one constraint. */
         Met: {
             /**
-             * @description A control's name, or joint and moment of a target.
+             * @description Name of a control, or joint and moment of a target.
              * @example RightHand at end
              */
             what: string;
-            /** @description How far the motion stays from it, in `unit`. */
+            /** @description Distance of the motion from the constraint, in `unit`. */
             miss: number;
-            /** @description m, m/s or deg. */
+            /** @description Unit of `miss`: m, m/s or deg. */
             unit: string;
-            /** @description Whether it is met to a millimetre, or a thousandth of its unit. */
+            /** @description True if the residual is at most 0.001 of the unit, which is 1 mm for lengths. */
             reached: boolean;
         };
-        /** @description For each time and joint a unit quaternion w x y z, local to the parent. */
+        /** @description Unit quaternion w x y z for each time and joint, local to the parent. */
         Rotations: components["schemas"]["Quaternion"][][];
-        /** @description For each time the position of the root, m. */
+        /** @description Position of the root for each time, in metres. */
         RootPosition: components["schemas"]["Vector"][];
-        /** @description For each joint its translation from the parent at these controls, m. The root's is not used. */
+        /** @description Translation of each joint from its parent at these controls, in metres. The entry of the root is not used. */
         BoneOffsets: components["schemas"]["Vector"][];
-        /** @description Poses of the joints that the model's card names, in its order. */
+        /** @description Poses of the joints of the model's card, in its order. */
         PoseAnswer: {
             trust: components["schemas"]["Trust"];
-            /** @description The times asked for, s. */
+            /** @description Requested times in seconds. */
             times: number[];
             rotations: components["schemas"]["Rotations"];
             root_position: components["schemas"]["RootPosition"];
             bone_offsets: components["schemas"]["BoneOffsets"];
         };
-        /** @description A clip with the skeleton that it moves. */
+        /** @description A clip with its skeleton. */
         ClipDocument: {
             trust: components["schemas"]["Trust"];
-            /** @description What the numbers are; lengths are metres and Y is up, if nothing else was asked for. */
+            /** @description Units of the numbers. By default lengths are in metres and Y is up. */
             units: {
                 [key: string]: string;
             };
-            /** @description The joints. */
+            /** @description Names of the joints. */
             names: string[];
             /** @description Index of each joint's parent; -1 for the root. */
             parents: number[];
-            /** @description Frames a second. */
+            /** @description Frame rate in frames a second. */
             rate: number;
             frames: number;
-            /** @description Seconds from the first frame, one for each frame. */
+            /** @description Time of each frame, in seconds from the first frame. */
             times: number[];
             rotations: components["schemas"]["Rotations"];
             root_position: components["schemas"]["RootPosition"];
@@ -1055,79 +1064,81 @@ export interface components {
         };
         Quaternion: number[];
         Vector: number[];
-        /** @description One control parameter, its unit and what of it was sampled. */
+        /** @description One control parameter, its unit and its sampled range. */
         Control: {
             name: string;
             unit: string;
             description: string;
             minimum: number;
             maximum: number;
-            /** @description The sampled value in the middle. */
+            /** @description Median of the sampled values. */
             default: number;
-            /** @description The distinct sampled values where they are few, else empty. */
+            /** @description Distinct sampled values if there are few, else empty. */
             values: number[];
             measure?: components["schemas"]["Measure"];
         };
-        /** @description How a control is read off a motion; a control that somebody typed has none. Since 2.2.0. */
+        /** @description Definition of a control that is measured on a motion. Absent for a control whose values were entered in the training table. Since 2.2.0. */
         Measure: {
             /**
-             * @description `left`, `height` and `forward` are where a joint is at a moment, m, from where the root's first pose stands on the
-             *     floor, as it faces; `step_length` is the greatest distance ahead that one foot gets of the other, m; `stride_length`,
-             *     m, `speed`, m/s, and `turn`, degrees to the left, are of a whole cycle; `leg_length` and `stature`, m, are of the
-             *     performer's bones and not of the motion.
+             * @description `left`, `height` and `forward` are coordinates of a joint at a moment, in metres; the
+             *     origin is the first pose's root on the floor, and the axes follow its heading.
+             *     `step_length` is the greatest distance of one foot ahead of the other, in metres.
+             *     `stride_length` (m), `speed` (m/s) and `turn` (degrees to the left) are of a whole
+             *     cycle. `leg_length` and `stature` (m) are of the performer's bones and independent of
+             *     the motion.
              * @enum {string}
              */
             quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "leg_length" | "stature";
-            /** @description Indices of the joints whose middle is looked at, of the two feet of a step, or of the bones of a leg. */
+            /** @description Indices of the joints whose mean position is measured, of the two feet of a step, or of the bones of a leg. */
             joints?: number[];
             /**
-             * @description The moment of a place; `farthest` is from the root.
+             * @description Moment of a position; `farthest` is from the root.
              * @enum {string}
              */
             at?: "start" | "end" | "highest" | "lowest" | "farthest" | "landmark";
-            /** @description Of the duration, at which the landmark is in the mean over captured clips. */
+            /** @description Mean time of the landmark over the captured clips, as a share of the duration. */
             share?: number;
         };
-        /** @description Joints parents first, their rest offsets, and the end sites that no joint follows. At rest every rotation is the identity. */
+        /** @description Joints in an order with parents first, their rest offsets, and the end sites without a joint. At rest every rotation is the identity. */
         Skeleton: {
             names: string[];
             /** @description Index of each joint's parent; -1 for the root. */
             parents: number[];
-            /** @description From the parent, m. */
+            /** @description Offsets from the parent, in metres. */
             offsets: components["schemas"]["Vector"][];
-            /** @description The joint that each end site hangs on. */
+            /** @description Index of the joint of each end site. */
             tip_joints: number[];
-            /** @description From that joint, m. */
+            /** @description Offsets of the end sites from their joints, in metres. */
             tip_offsets: components["schemas"]["Vector"][];
         };
-        /** @description A level of detail. Errors are distances between its joints and those of the model that nothing is cut from, over random controls, performers and times, m. */
+        /** @description A level of detail. Errors are distances in metres between its joints and those of the untruncated model, over random controls, performers and times. */
         Level: {
-            /** @description Of degrees of freedom, frames and samples in the core tensor. */
+            /** @description Ranks of the core tensor: degrees of freedom, frames and samples. */
             ranks: number[];
-            /** @description How many of the captured clips are asked. */
+            /** @description Number of captured clips that the level evaluates. */
             samples: number;
-            /** @description Joints that move; the others keep the family's mean rotation. */
+            /** @description Indices of the joints that move. The others keep the family's mean rotation. */
             joints: number[];
-            /** @description Numbers of the file that the level reads. */
+            /** @description Count of the numbers in the file that the level reads. */
             numbers: number;
-            /** @description The same in float32. */
+            /** @description Size of `numbers` in float32, in bytes. */
             bytes: number;
-            /** @description Multiply-adds of one pose. */
+            /** @description Multiply-add operations per pose. */
             operations: number;
-            /** @description Root mean square. */
+            /** @description Root mean square error, in metres. */
             rms: number;
-            /** @description One joint in a hundred lies farther. */
+            /** @description 99th percentile of the error, in metres. */
             p99: number;
-            /** @description The largest root mean square over the joints of one pose; what levels are chosen by. */
+            /** @description Largest root mean square error over the joints of one pose, in metres; the selection of levels uses it. */
             pose: number;
             max: number;
-            /** @description Root mean square of the joint that the motion is for, at its event. */
+            /** @description Root mean square error of the event's joint at its event, in metres; null without an event. */
             effector: number | null;
         };
-        /** @description Everything a client needs to know of a model but its weights. */
+        /** @description Description of a model for clients, without its weights. */
         ModelCard: {
             identity: components["schemas"]["Identity"];
-            /** @description The name it was trained under. */
+            /** @description Name in the training recipe. */
             name: string;
             description: string;
             controls: components["schemas"]["Control"][];
@@ -1138,70 +1149,71 @@ export interface components {
             /** @description Whether the last pose leads into the first. */
             cyclic: boolean;
             /**
-             * @description Whether the root travels.
+             * @description Whether the root travels or stays in place.
              * @enum {string}
              */
             root: "travelling" | "in_place";
-            /** @description Frames a second of the captured clips. */
+            /** @description Frame rate of the captured clips, frames a second. */
             rate: number;
-            /** @description Frames of the motion tensor. */
+            /** @description Number of frames of the motion tensor. */
             frames: number;
-            /** @description Captured clips in it. */
+            /** @description Number of captured clips in the motion tensor. */
             samples: number;
             /** @description Levels of detail, the finest first. */
             levels: components["schemas"]["Level"][];
-            /** @description Shortest and longest captured clip, s. */
+            /** @description Durations of the shortest and the longest captured clip, in seconds. */
             durations: number[];
-            /** @description Who can be asked for by name; empty where performers are not told apart. */
+            /** @description Names of the performers that a request may name; empty if the model does not distinguish performers. */
             performers: string[];
-            /** @description Controls of each captured clip. */
+            /** @description Control values of each captured clip. */
             examples: number[][];
-            /** @description Whose each captured clip is, by place among the performers; empty where they are not told apart. */
+            /** @description Performer of each captured clip, as an index into `performers`; empty if the model does not distinguish performers. */
             moved_by: number[];
-            /** @description Joints that stand on the ground; empty where the recipe names none. */
+            /** @description Indices of the joints that stand on the ground; empty if the recipe names none. */
             feet: number[];
-            /** @description What training measured. */
+            /** @description Measurements of the training. */
             diagnostics: Record<string, never>;
             /** @description Recipe, hashes of the data, versions, licence. */
             provenance: Record<string, never>;
-            /** @description Joints by the part that each plays, named as the bones of a VRM humanoid; empty where the recipe names none. */
+            /** @description Joints by role, with the bone names of a VRM humanoid as roles; empty if the recipe names none. */
             roles: {
                 [key: string]: string;
             };
             /** @description File and frames of each captured clip. */
             sources: string[];
-            /** @description How far each joint errs, as a share of sigma. */
+            /** @description Error of each joint as a share of sigma. */
             joint_sigma?: number[];
-            /** @description Parameters of the kriging that weighs the captured clips. */
+            /** @description Parameters of the kriging model that weights the captured clips. */
             kriging: {
                 /** @enum {string} */
                 covariance: "exponential" | "gaussian" | "spherical" | "matern32" | "matern52";
-                /** @description Degrees of the drifts that are averaged. */
+                /** @description Degrees of the drifts; their predictions are averaged. */
                 drifts: (0 | 1)[];
-                /** @description For each control, what half of its sampled range is worth as distance. */
+                /** @description Distance of half the sampled range in the model's metric, for each control. */
                 scales: number[];
-                /** @description As a share of the sill. */
+                /** @description Nugget as a share of the sill. */
                 nugget: number;
-                /** @description Distance between two performers. */
+                /** @description Distance between two performers in the model's metric. */
                 label: number;
             };
-            /** @description How far each captured clip lies from what the others predict for it, as a root-mean-square over joints and frames, m. */
+            /** @description Leave-one-out error of each captured clip: its distance from the prediction of the other clips, root mean square over joints and frames, in metres. */
             left_out?: number[];
-            /** @description What the motion is for; null where the recipe names nothing. */
+            /** @description Main event of the motion; null if the recipe names none. */
             event?: {
-                /** @description The joint that counts. */
+                /** @description Index of the event's joint. */
                 joint: number;
-                /** @description When, as a share of the duration, in the mean over the captured clips. */
+                /** @description Mean time of the event over the captured clips, as a share of the duration. */
                 share: number;
             } | null;
         };
-        /** @description A number for each character, or one for all. */
+        /** @description A number for each character, or one number for all. */
         Column: number | number[];
-        /** @description From the origin, m. */
+        /** @description Position x y z from the origin, in metres. */
         Place: number[];
         /**
-         * @description Where one looks from and through what lens. It has no direction: a character behind it counts
-         *     by its distance like any other, for a mirror or a shadow may show it. It may stand in nobody.
+         * @description Position and lens of a camera. It has no direction: a character behind it counts by its
+         *     distance like any other, because a mirror or a shadow may show it. The camera must not be
+         *     inside a character.
          * @example {
          *       "position": [
          *         0,
@@ -1214,19 +1226,19 @@ export interface components {
          */
         Camera: {
             position: components["schemas"]["Place"];
-            /** @description Vertical field of view, rad. */
+            /** @description Vertical field of view in radians. */
             fov: number;
-            /** @description Height of the image, pixels. */
+            /** @description Height of the image in pixels. */
             height: number;
         };
         /**
-         * @description One pose of each of many characters. All lists have one length, the number of characters, in
-         *     one order; what is no list holds for each of them. Where nothing is a list there is one character.
-         *     Crowds are the model's predictions: they are held to nothing.
+         * @description Request for one pose of each of many characters. All lists have the same length, the number
+         *     of characters, and the same order. A scalar applies to all characters. Without a list there
+         *     is one character. The poses are the model's predictions; constraints do not apply to crowds.
          */
         CrowdQuestion: {
             /**
-             * @description For each control of the model its values, in the control's unit. None may be left out.
+             * @description Values of each control of the model, in the control's unit. All controls are required.
              * @example {
              *       "stature": [
              *         1.72,
@@ -1244,7 +1256,7 @@ export interface components {
                 [key: string]: components["schemas"]["Column"];
             };
             /**
-             * @description Seconds from the start of each character's clip, up to its duration. Levels differ a little in how long a clip takes: but at level 0, asked for by number and not mixed, a time up to a tenth after the end is the end.
+             * @description Time of each character, in seconds from the start of its clip, at most its duration. Durations differ slightly between levels: a time after the end by at most a tenth of the duration is set to the end, except at level 0 if the request gives the level as a number and no `from_level`.
              * @example [
              *       0,
              *       0.5
@@ -1252,7 +1264,7 @@ export interface components {
              */
             time: components["schemas"]["Column"];
             /**
-             * @description Where each character's own frame stands; the origin, if null.
+             * @description Position of each character's own frame; null for the origin.
              * @default null
              * @example [
              *       [
@@ -1269,97 +1281,99 @@ export interface components {
              */
             position: components["schemas"]["Place"][] | null;
             /**
-             * @description Turn of each character about +Y, rad; one that faces +Z in its own frame faces +X at a quarter turn.
+             * @description Rotation of each character about +Y in radians. At a quarter turn, a character that faces +Z in its own frame faces +X.
              * @default 0
              */
             heading: components["schemas"]["Column"];
             /**
-             * @description Who each character is, of the `performers` that the model's card names; null for somebody who was never seen.
+             * @description Performer of each character, one of `performers` on the model's card; null for an unseen performer.
              * @default null
              */
             performer: (string | null) | (string | null)[];
             /**
-             * @description Level of detail of each character, or `auto`: the coarsest whose error covers at most `pixels`
-             *     pixels to the `camera`, or the finest, where none does.
+             * @description Level of detail of each character, or `auto`: the coarsest level whose error covers at
+             *     most `pixels` pixels of the `camera`, or the finest level if all errors are larger.
              * @default 0
              */
             level: components["schemas"]["LevelNumber"] | components["schemas"]["LevelNumber"][] | "auto";
             /**
-             * @description With `auto`, the levels of the answer before. A character then goes coarser only where the
-             *     error is a fifth below the limit, so that nobody flickers while the camera trembles.
+             * @description With `auto`, the levels of the previous response. A character then changes to a coarser
+             *     level only if the error is a fifth below the limit. This prevents flicker while the
+             *     camera trembles.
              * @default null
              */
             previous_level: components["schemas"]["LevelNumber"][] | null;
             /**
-             * @description Levels that characters are on their way from, so that a switch does not pop: their poses
-             *     are mixed with those of their level, which with `auto` is held meanwhile, at
-             *     `previous_level`.
+             * @description Levels from which characters are in transition. Their poses are blended with those of
+             *     their current level, so that a change of level does not pop. With `auto`, the current
+             *     level of such a character stays at `previous_level` during the transition.
              * @default null
              */
             from_level: components["schemas"]["LevelNumber"][] | null;
             /**
-             * @description With `from_level`, how much of their way characters have behind them, 0 to 1.
+             * @description With `from_level`, the completed share of the transition, 0 to 1.
              * @default null
              */
             blend: number | number[] | null;
             /**
-             * @description Needed with `auto`, and refused without.
+             * @description Required with `auto`; an error without it.
              * @default null
              */
             camera: components["schemas"]["Camera"] | null;
             /**
-             * @description With `auto`, pixels that an error may cover; 1, if null.
+             * @description With `auto`, the maximum number of pixels that an error may cover; 1 if null.
              * @default null
              */
             pixels: number | null;
             /**
-             * @description With `auto`, milliseconds that all poses together may take by what the levels cost. Where
-             *     `pixels` would take more, the limit is raised to the smallest that fits; where even the
-             *     coarsest level does not, everything is at the coarsest. `warnings` says so.
+             * @description With `auto`, a limit in milliseconds for the computation of all poses, by the cost of
+             *     the levels. If `pixels` requires more time, the pixel limit is raised to the smallest
+             *     value that fits. If the coarsest level exceeds the budget too, all characters have the
+             *     coarsest level. `warnings` reports both cases.
              * @default null
              */
             budget_ms: number | null;
             /**
-             * @description Whether characters walk away from where they were placed.
+             * @description Whether characters walk away from their positions.
              * @default travelling
              * @enum {string}
              */
             root: "travelling" | "in_place";
             extrapolate?: components["schemas"]["Extrapolate"];
         };
-        /** @description A pose of each character in the order of the question, of the joints that `names` names. */
+        /** @description One pose per character, in the order of the request, of the joints in `names`. */
         CrowdPoses: {
             model: components["schemas"]["Identity"];
-            /** @description The joints. */
+            /** @description Names of the joints. */
             names: string[];
             /** @description Index of each joint's parent; -1 for the root. */
             parents: number[];
             units: {
                 [key: string]: string;
             };
-            /** @description Sentences on the crowd as a whole. */
+            /** @description Warnings about the whole crowd. */
             warnings: string[];
-            /** @description For each character and joint a unit quaternion w x y z, local to the parent, the root's in the world. */
+            /** @description Unit quaternion w x y z for each character and joint, local to the parent; that of the root is in world space. */
             rotations: components["schemas"]["Quaternion"][][];
-            /** @description For each character the position of the root in the world, m. */
+            /** @description Position of the root of each character in world space, in metres. */
             root_position: components["schemas"]["Vector"][];
-            /** @description For each character and joint its translation from the parent, m. The root's is not used. */
+            /** @description Translation of each joint from its parent for each character, in metres. The entry of the root is not used. */
             bone_offsets: components["schemas"]["Vector"][][];
-            /** @description Natural length of each character's whole clip in seconds. */
+            /** @description Natural duration of each character's whole clip, in seconds. */
             duration: number[];
-            /** @description As in Trust, m. */
+            /** @description As in Trust, in metres. */
             sigma: number[];
             /** @description As in Trust. */
             supported?: boolean[];
-            /** @description The level of detail of each pose. */
+            /** @description Level of detail of each pose. */
             levels: components["schemas"]["LevelNumber"][];
-            /** @description Pixels that the error of the level covers; absent without a camera. */
+            /** @description Pixels that the error of the level covers. Absent without a camera. */
             error_px?: number[];
         };
         ModelSummary: {
             name: string;
             identity: components["schemas"]["Identity"];
-            /** @description All that answer, the newest first. */
+            /** @description Available versions, the newest first. */
             versions: components["schemas"]["Identity"][];
             description: string;
         };
@@ -1375,7 +1389,7 @@ export interface components {
         Liveness: {
             /** @constant */
             status: "live";
-            /** @description `info.version` of this document, since 2.1.0. */
+            /** @description `info.version` of this document. Since 2.1.0. */
             contract?: string;
         };
         Readiness: {
@@ -1384,39 +1398,39 @@ export interface components {
             models: components["schemas"]["Identity"][];
             reload: components["schemas"]["Reload"];
         };
-        /** @description What has become of looking for new model files since the start. */
+        /** @description Statistics of the checks for new model files since the start of the service. */
         Reload: {
-            /** @description How often was looked. */
+            /** @description Number of checks. */
             looks: number;
-            /** @description Versions that were opened, those at the start among them. */
+            /** @description Number of versions opened, including those at the start. */
             opened: number;
-            /** @description Attempts that failed, one that stays so counted once. */
+            /** @description Number of failed attempts; a persistent failure counts once. */
             failed: number;
             /**
              * Format: date-time
-             * @description When the models last changed.
+             * @description Time of the last change of the models.
              */
             changed: string;
-            /** @description What is wrong now. What answered before still does. */
+            /** @description Present errors. Versions that were in service before stay in service. */
             faults: {
-                /** @description Name of the model; empty for a whole folder or store. */
+                /** @description Name of the model; empty for an error of a whole folder or store. */
                 model: string;
-                /** @description What its file is called besides, if it has several. */
+                /** @description Version name of the model file if the model has several versions. */
                 version: string;
                 detail: string;
             }[];
         };
-        /** @description A problem as RFC 9457 describes it. Every error of this service has this shape. */
+        /** @description A problem as in RFC 9457. Every error of this service has this schema. */
         Problem: {
             /** @enum {string} */
             type: "urn:posefield:problem:bad-parameter" | "urn:posefield:problem:bad-body" | "urn:posefield:problem:unauthenticated" | "urn:posefield:problem:forbidden" | "urn:posefield:problem:no-such-path" | "urn:posefield:problem:unknown-model" | "urn:posefield:problem:unknown-format" | "urn:posefield:problem:method-not-allowed" | "urn:posefield:problem:not-acceptable" | "urn:posefield:problem:body-too-large" | "urn:posefield:problem:url-too-long" | "urn:posefield:problem:unsupported-media-type" | "urn:posefield:problem:invalid-field" | "urn:posefield:problem:outside-samples" | "urn:posefield:problem:out-of-reach" | "urn:posefield:problem:overloaded" | "urn:posefield:problem:late" | "urn:posefield:problem:not-ready" | "urn:posefield:problem:unknown-host" | "urn:posefield:problem:head-too-large" | "urn:posefield:problem:internal-error";
             title: string;
             status: number;
-            /** @description What was found and what was expected, for people. */
+            /** @description The invalid value and the expected one, for people. */
             detail: string;
-            /** @description The request's id. */
+            /** @description Id of the request. */
             instance: string;
-            /** @description Where in the request the fault lies, as far as it lies in one place. */
+            /** @description Locations of the error in the request, if it has a single location. */
             errors: ({
                 /** @description JSON pointer into the body (RFC 6901). */
                 pointer?: string;
@@ -1427,7 +1441,7 @@ export interface components {
         };
     };
     responses: {
-        /** @description The crowd that walks; as binary USD, if nothing else is preferred. */
+        /** @description The walking crowd. Default format: binary USD. */
         Crowd: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1445,7 +1459,7 @@ export interface components {
                 "model/vnd.usdz+zip": string;
             };
         };
-        /** @description The poses; as an Arrow stream, if nothing else is preferred. */
+        /** @description The poses. Default format: Arrow stream. */
         CrowdPoses: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1462,7 +1476,7 @@ export interface components {
                 "application/json": components["schemas"]["CrowdPoses"];
             };
         };
-        /** @description The poses, and how far they may be trusted; as JSON, if nothing else is preferred. */
+        /** @description The poses and their uncertainty. Default format: JSON. */
         Poses: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1479,7 +1493,7 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
             };
         };
-        /** @description The clip; as binary USD, if nothing else is preferred. */
+        /** @description The clip. Default format: binary USD. */
         Clip: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1508,7 +1522,7 @@ export interface components {
                 "application/vnd.msgpack": string;
             };
         };
-        /** @description Which clips to capture next. */
+        /** @description Suggested clips to capture. */
         Suggestions: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1521,7 +1535,7 @@ export interface components {
                 "application/json": components["schemas"]["Suggestions"];
             };
         };
-        /** @description What the answer is made of. */
+        /** @description The captured clips behind the response, and their weights. */
         Reasons: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1534,7 +1548,7 @@ export interface components {
                 "application/json": components["schemas"]["Reasons"];
             };
         };
-        /** @description The grid; as JSON, if nothing else is preferred. */
+        /** @description The grid. Default format: JSON. */
         SigmaGrid: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1551,7 +1565,7 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
             };
         };
-        /** @description The archive; as zip, if nothing else is preferred. */
+        /** @description The archive. Default format: zip. */
         Clips: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1581,7 +1595,7 @@ export interface components {
                 "application/yaml": components["schemas"]["ContractDocument"];
             };
         };
-        /** @description This document. */
+        /** @description This document as JSON. */
         ContractJson: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1594,7 +1608,7 @@ export interface components {
                 "application/json": components["schemas"]["ContractDocument"];
             };
         };
-        /** @description A page of HTML that stands alone. */
+        /** @description A self-contained HTML page. */
         Page: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1608,7 +1622,7 @@ export interface components {
                 "text/html": string;
             };
         };
-        /** @description The document is the one that If-None-Match names. */
+        /** @description The document matches If-None-Match. */
         PageNotModified: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1619,7 +1633,7 @@ export interface components {
             };
             content?: never;
         };
-        /** @description The request breaks this document; nothing was asked of a model. */
+        /** @description The request violates this document. The model was not evaluated. */
         BadRequest: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1631,7 +1645,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description This service asks for a key or token, and there is none, or one that does not hold. */
+        /** @description This service requires a key or a token, and the request has none or an invalid one. */
         Unauthenticated: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1657,7 +1671,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description No such model, or none that the key may read, or no such format. */
+        /** @description Unknown model or format, or a model outside the key's scope. */
         NotFound: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1669,7 +1683,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The path does not take this method. */
+        /** @description The path does not support this method. */
         MethodNotAllowed: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1682,7 +1696,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description `Accept` accepts none of the formats that this path answers in; the detail lists them. What of the header cannot be read counts for nothing. */
+        /** @description `Accept` allows none of the formats of this path; `detail` lists them. Parts of the header that cannot be parsed are ignored. */
         NotAcceptable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1695,7 +1709,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The URL is longer than the service reads, by default 8 KiB. */
+        /** @description The URL exceeds the limit, by default 8 KiB. */
         UrlTooLong: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1707,7 +1721,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The header `Host` names neither an address nor a name that the operator has listed. */
+        /** @description The header `Host` is neither an IP address nor a name that the operator has listed. */
         UnknownHost: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1719,7 +1733,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description All headers together are longer than the service reads, by default 16 KiB, or more than 100. */
+        /** @description The headers together exceed the limit, by default 16 KiB, or number more than 100. */
         HeadTooLarge: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1731,7 +1745,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The body is larger than the service accepts, by default 64 KiB. The connection is closed. */
+        /** @description The body exceeds the limit, by default 64 KiB. The server closes the connection. */
         BodyTooLarge: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1743,7 +1757,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The body is not `application/json` in UTF-8, nor of another type that the path takes. */
+        /** @description The body is neither `application/json` in UTF-8 nor another media type of the path. */
         UnsupportedMediaType: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1755,7 +1769,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The model has no answer - a control unknown or out of reach (of a crowd, missing), a performer or level it does not know, a time outside the clip, too many frames, something that no motion can be held to, or, with `extrapolate` refuse, controls like which nothing was captured or a target out of reach. */
+        /** @description The request is valid, but the model cannot respond to it. Causes: an unknown control or one out of range (for a crowd, also a missing one), an unknown performer or level, a time outside the clip, too many frames, an invalid constraint, or, with `extrapolate` set to `refuse`, controls without similar captured clips or a target out of reach. */
         Unanswerable: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1767,7 +1781,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The answer is the one that If-None-Match names. No model was asked. */
+        /** @description The response matches If-None-Match. The model was not evaluated. */
         NotModified: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1778,7 +1792,7 @@ export interface components {
             };
             content?: never;
         };
-        /** @description The service has too much to do, or the answer took too long. The same request will do later. */
+        /** @description The service is overloaded, or the response took too long. The client may repeat the request later. */
         Overloaded: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1791,7 +1805,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The service should not be sent requests now. */
+        /** @description The service is not ready. Do not send requests now. */
         NotReady: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1803,7 +1817,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The service failed. */
+        /** @description Internal error of the service. */
         InternalError: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
@@ -1818,12 +1832,12 @@ export interface components {
     };
     parameters: {
         /**
-         * @description A model's name, or name@hash.
+         * @description Model name, or name@hash.
          * @example reach
          */
         model: string;
         /**
-         * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+         * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
          * @example usda
          */
         clipFormat: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
@@ -1848,13 +1862,15 @@ export interface components {
          */
         archiveFormat: "zip" | "tar";
         /**
-         * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-         *     The model's card gives their names, units and sampled ranges; a value outside the range is
-         *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-         *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-         *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-         *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-         *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
+         * @description One query parameter for each control of the model, with the control's name:
+         *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
+         *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
+         *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
+         *     mean of the captured clips, given the other controls, the performer if one is named, and the
+         *     targets. An omitted control with few sampled values takes the nearest of them. The trust
+         *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+         *     `exact` set to the measured controls given before (`none` if there are none), gets the same
+         *     response. The names of the other parameters are reserved.
          * @example {
          *       "stature": 1.72,
          *       "hip_height": 0.9,
@@ -1865,121 +1881,121 @@ export interface components {
         controls: {
             [key: string]: number;
         };
-        /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+        /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
         ifNoneMatch: string;
         /**
-         * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
+         * @description Seconds from the start of the clip, at most its duration. Repeat the parameter for several poses.
          * @example [
          *       0,
          *       0.5
          *     ]
          */
         time: number[];
-        /** @description Frames a second. A clip has at most 10,000 frames. */
+        /** @description Frame rate in frames a second. A clip has at most 10,000 frames. */
         fps: number;
-        /** @description Seconds from the start of the whole clip to the first frame. */
+        /** @description Time of the first frame, in seconds from the start of the whole clip. */
         start: number;
-        /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
+        /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. */
         end: number;
-        /** @description What joints are called. */
+        /** @description Naming convention of the joints. */
         names: components["schemas"]["Names"];
-        /** @description Whether the root travels. */
+        /** @description Whether the root travels or stays in place. */
         root: components["schemas"]["Root"];
-        /** @description Whether the clip is a loop. */
+        /** @description Whether the clip is one whole cycle. */
         loop: components["schemas"]["Loop"];
-        /** @description Whether the trust says how far each joint may err. */
+        /** @description Whether the trust includes sigma for each joint. */
         jointSigma: components["schemas"]["JointSigma"];
         /**
-         * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-         *     the model can measure on a motion), `none`, or names of controls with commas between.
+         * @description Measured controls that the motion must match exactly: `auto` (all given controls that the
+         *     model can measure on a motion), `none`, or control names separated by commas.
          * @example none
          */
         exact: string;
         /**
-         * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-         *     moment is its `at`, or its `time` in seconds. Repeated for several.
+         * @description Target position of a joint at a moment, JOINT@MOMENT:X,Y,Z in metres. The moment is `at` of
+         *     the schema Target, or `time` in seconds. Repeat the parameter for several targets.
          * @example [
          *       "RightHand@end:0.3,1.2,0.4"
          *     ]
          */
         target: string[];
-        /** @description Whether feet that stand stay where they stand. */
+        /** @description Whether planted feet keep their positions. */
         pinFeet: components["schemas"]["PinFeet"];
-        /** @description The file's unit of length; the format's usual one, if left out. glTF has no other than `m`. */
+        /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
         unit: "m" | "cm";
-        /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. In glTF no other than `y` is up. */
+        /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
         up: "y" | "z";
-        /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
+        /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
-        /** @description Characters. */
+        /** @description Number of characters. */
         count: number;
-        /** @description How many different motions they share; left out, each character has its own. Not with a camera. */
+        /** @description Number of distinct motions that the characters share. Default: one motion per character. Not valid with a camera. */
         motions: number;
-        /** @description How long they walk. */
+        /** @description Duration in seconds. */
         seconds: number;
-        /** @description Frames a second. */
+        /** @description Frame rate in frames a second. */
         crowdFps: number;
-        /** @description Of all that is random. */
+        /** @description Seed of all random numbers. */
         seed: number;
         /**
-         * @description Where one looks from, x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest, where none does; a switch takes a quarter of a second. It may stand in nobody.
+         * @description Camera position x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest level if all errors are larger. A transition between levels takes 0.25 s. The camera must not be inside a character.
          * @example 30,1.7,-60
          */
         camera: string;
-        /** @description How many captured clips are listed at most, the nearest first. */
+        /** @description Maximum number of captured clips in the list, the nearest first. */
         nearest: components["schemas"]["Nearest"];
-        /** @description How many points. */
+        /** @description Number of points. */
         suggestions: number;
         /**
-         * @description Whose clips alone count as captured, of the `performers` that the model's card names; everybody's, if left out.
+         * @description Performer whose clips alone count as captured, one of `performers` on the model's card. Default: the clips of all performers count.
          * @example tall
          */
         whose: string;
         /**
-         * @description The control that changes from column to column.
+         * @description Control that varies from column to column.
          * @example turn
          */
         across: components["schemas"]["ControlName"];
         /**
-         * @description Another control, which changes from row to row.
+         * @description Control that varies from row to row; different from `across`.
          * @example target_height
          */
         along: components["schemas"]["ControlName"];
-        /** @description Values of `across`, evenly from the least that was sampled to the greatest. */
+        /** @description Number of values of `across`, evenly spaced from the smallest to the largest sampled value. */
         columns: components["schemas"]["GridSteps"];
-        /** @description Values of `along`. By default at most 65,536 points in all. */
+        /** @description Number of values of `along`. The default limit of the whole grid is 65,536 points. */
         rows: components["schemas"]["GridSteps"];
-        /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
+        /** @description Margin of the grid beyond the sampled range on either side, as a share of that range. */
         margin: components["schemas"]["Margin"];
-        /** @description One parameter for each other control that is not at its default. */
+        /** @description One parameter for each other control with a value other than its default. */
         fixedControls: {
             [key: string]: number;
         };
-        /** @description With a camera, its vertical field of view, rad; 60 degrees, if left out. */
+        /** @description Vertical field of view of the camera in radians. Default: 60 degrees. Requires `camera`. */
         fov: number;
-        /** @description With a camera, the height of the image, pixels; 1080, if left out. */
+        /** @description Height of the image in pixels. Default: 1080. Requires `camera`. */
         height: number;
-        /** @description With a camera, how many pixels the error of a level may cover; 1, if left out. */
+        /** @description Maximum number of pixels that a level's error may cover. Default: 1. Requires `camera`. */
         pixels: number;
-        /** @description What characters share. `references` opens in everything that composes layers, `scenegraph` is least to draw but Blender imports it as one character at rest, `flatten` is one layer for readers that compose nothing, such as three.js. */
+        /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
         instancing: "references" | "scenegraph" | "flatten";
-        /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+        /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
         level: components["schemas"]["LevelNumber"];
         /**
-         * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-         *     somebody who was never seen. A model that names none has no answer for any name.
+         * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+         *     without named performers refuses every name.
          * @example tall
          */
         performer: string;
     };
     requestBodies: {
-        /** @description By default at most 32 MiB and 100,000 characters. */
+        /** @description Default limits: 32 MiB and 100,000 characters. */
         CrowdQuestion: {
             content: {
                 "application/json": components["schemas"]["CrowdQuestion"];
             };
         };
-        /** @description By default at most 8 MiB, 10,000 clips, 1,000,000 frames in all, and targets of a cost of 2,000 in all: a target counts as one, as four where the clip leaves controls open, and pinned feet as four. */
+        /** @description Default limits: 8 MiB, 10,000 clips, 1,000,000 frames in all, and a total target cost of 2,000. A target costs 1, or 4 if the clip omits controls; pinned feet cost 4. */
         ClipsQuestion: {
             content: {
                 "application/json": components["schemas"]["ClipsQuestion"];
@@ -1992,55 +2008,55 @@ export interface components {
         };
     };
     headers: {
-        /** @description How to ask - `Bearer`, and what is wrong with what was sent (RFC 6750). */
+        /** @description Authentication scheme, `Bearer`, and the error of the credentials that were sent (RFC 6750). */
         Challenge: string;
-        /** @description The request's id, also `instance` of a problem. */
+        /** @description Id of the request; also `instance` of a problem. */
         RequestId: string;
-        /** @description The methods this path takes. */
+        /** @description Methods of this path. */
         Allow: string;
         /**
-         * @description Strong entity tag: it names these bytes, follows from the model's file and the request alone, and
-         *     costs nothing to compare. Send it back in If-None-Match.
+         * @description Strong entity tag of these bytes. It depends only on the model file and the request, so a
+         *     comparison needs no evaluation of the model. Send it in If-None-Match.
          */
         ETag: string;
-        /** @description Answers under `name@hash` are immutable; under a name they have to be asked for again, if the service is not told otherwise; everything else is not to be stored. */
+        /** @description Responses under `name@hash` are immutable. Responses under a plain name must be revalidated, unless the operator configures otherwise. All other responses must not be stored. */
         CacheControl: string;
-        /** @description To be kept by everybody, and to be asked for again. */
+        /** @description Any cache may store the response but must revalidate it. */
         PageCacheControl: "public, no-cache";
-        /** @description The page may load nothing from elsewhere; its own styles and scripts are named by their digests. */
+        /** @description The page may load no external resources. Its own styles and scripts are listed by digest. */
         PagePolicy: string;
-        /** @description What this problem means, on the page of problems. */
+        /** @description Link to the explanation of this problem on `/problems`. */
         Help: string;
-        /** @description Headers of the request that the answer depends on. */
+        /** @description Request headers on which the response depends. */
         Vary: string;
-        /** @description Seconds after which to ask again. */
+        /** @description Seconds until the client should repeat the request. */
         RetryAfter: number;
-        /** @description A file name for the clip, from the model's name. */
+        /** @description File name from the model's name. */
         Disposition: string;
-        /** @description A file name from the model's name; absent where the answer is JSON. */
+        /** @description File name from the model's name; absent for JSON. */
         OwnDisposition: string;
-        /** @description Which model answered, as name@hash. */
+        /** @description Model of the response, as name@hash. */
         Model: components["schemas"]["Identity"];
-        /** @description As `sigma` in Trust, metres. */
+        /** @description `sigma` of Trust, in metres. */
         Sigma: number;
-        /** @description As `duration` in Trust, seconds. */
+        /** @description `duration` of Trust, in seconds. */
         Duration: number;
         /**
-         * @description Values of the controls that were left out, and are the most typical for those that were given: a JSON
-         *     object in ASCII; absent where none was. Since 2.2.0.
+         * @description Values of the omitted controls, set to the conditional mean given the other controls: a JSON
+         *     object in ASCII. Absent if no control was omitted. Since 2.2.0.
          */
         Inferred: string;
-        /** @description As `supported` in Trust; always there since 2.2.0. */
+        /** @description `supported` of Trust. Always present since 2.2.0. */
         Supported: "true" | "false";
         /**
-         * @description One header line for each warning; absent without warnings. Each is a JSON string in ASCII, so
-         *     that the lines joined by commas and put in brackets are a JSON array.
+         * @description One header line per warning; absent without warnings. Each value is a JSON string in ASCII,
+         *     so that the lines, joined by commas and enclosed in brackets, form a JSON array.
          */
         Warning: string;
         /**
-         * @description One header line for each of `targets` in Trust that is not reached; absent where all are. Each
-         *     is a JSON object in ASCII with `what`, `miss` and `unit`, so that the lines joined by commas and
-         *     put in brackets are a JSON array.
+         * @description One header line per element of `targets` in Trust that is not reached; absent if all are
+         *     reached. Each value is a JSON object in ASCII with `what`, `miss` and `unit`, so that the
+         *     lines, joined by commas and enclosed in brackets, form a JSON array.
          */
         Missed: string;
     };
@@ -2057,7 +2073,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description The models this service answers for. */
+            /** @description The models of this service. */
             200: {
                 headers: {
                     "X-Request-Id": components["headers"]["RequestId"];
@@ -2083,12 +2099,12 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2127,13 +2143,15 @@ export interface operations {
         parameters: {
             query: {
                 /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
+                 * @description One query parameter for each control of the model, with the control's name:
+                 *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
+                 *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
+                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
+                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
+                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
+                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     `exact` set to the measured controls given before (`none` if there are none), gets the same
+                 *     response. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -2143,49 +2161,49 @@ export interface operations {
                  */
                 controls?: components["parameters"]["controls"];
                 /**
-                 * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
+                 * @description Seconds from the start of the clip, at most its duration. Repeat the parameter for several poses.
                  * @example [
                  *       0,
                  *       0.5
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
+                /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
+                /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+                /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @description Measured controls that the motion must match exactly: `auto` (all given controls that the
+                 *     model can measure on a motion), `none`, or control names separated by commas.
                  * @example none
                  */
                 exact?: components["parameters"]["exact"];
                 /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @description Target position of a joint at a moment, JOINT@MOMENT:X,Y,Z in metres. The moment is `at` of
+                 *     the schema Target, or `time` in seconds. Repeat the parameter for several targets.
                  * @example [
                  *       "RightHand@end:0.3,1.2,0.4"
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
+                /** @description Whether planted feet keep their positions. */
                 pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2216,7 +2234,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2250,13 +2268,15 @@ export interface operations {
         parameters: {
             query: {
                 /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
+                 * @description One query parameter for each control of the model, with the control's name:
+                 *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
+                 *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
+                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
+                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
+                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
+                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     `exact` set to the measured controls given before (`none` if there are none), gets the same
+                 *     response. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -2266,49 +2286,49 @@ export interface operations {
                  */
                 controls?: components["parameters"]["controls"];
                 /**
-                 * @description Seconds from the start of the clip, up to its duration. Repeated for several poses.
+                 * @description Seconds from the start of the clip, at most its duration. Repeat the parameter for several poses.
                  * @example [
                  *       0,
                  *       0.5
                  *     ]
                  */
                 time: components["parameters"]["time"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
+                /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
+                /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+                /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @description Measured controls that the motion must match exactly: `auto` (all given controls that the
+                 *     model can measure on a motion), `none`, or control names separated by commas.
                  * @example none
                  */
                 exact?: components["parameters"]["exact"];
                 /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @description Target position of a joint at a moment, JOINT@MOMENT:X,Y,Z in metres. The moment is `at` of
+                 *     the schema Target, or `time` in seconds. Repeat the parameter for several targets.
                  * @example [
                  *       "RightHand@end:0.3,1.2,0.4"
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
+                /** @description Whether planted feet keep their positions. */
                 pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2343,7 +2363,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2381,13 +2401,15 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
+                 * @description One query parameter for each control of the model, with the control's name:
+                 *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
+                 *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
+                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
+                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
+                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
+                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     `exact` set to the measured controls given before (`none` if there are none), gets the same
+                 *     response. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -2396,58 +2418,58 @@ export interface operations {
                  *     }
                  */
                 controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
+                /** @description Frame rate in frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
+                /** @description Time of the first frame, in seconds from the start of the whole clip. */
                 start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
+                /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
+                /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
+                /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+                /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
-                /** @description What joints are called. */
+                /** @description Naming convention of the joints. */
                 names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
+                /** @description Whether the root travels or stays in place. */
                 root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
+                /** @description Whether the clip is one whole cycle. */
                 loop?: components["parameters"]["loop"];
                 /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @description Measured controls that the motion must match exactly: `auto` (all given controls that the
+                 *     model can measure on a motion), `none`, or control names separated by commas.
                  * @example none
                  */
                 exact?: components["parameters"]["exact"];
                 /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @description Target position of a joint at a moment, JOINT@MOMENT:X,Y,Z in metres. The moment is `at` of
+                 *     the schema Target, or `time` in seconds. Repeat the parameter for several targets.
                  * @example [
                  *       "RightHand@end:0.3,1.2,0.4"
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
+                /** @description Whether planted feet keep their positions. */
                 pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. glTF has no other than `m`. */
+                /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
                 unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. In glTF no other than `y` is up. */
+                /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
                 up?: components["parameters"]["up"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2478,7 +2500,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2508,13 +2530,15 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
+                 * @description One query parameter for each control of the model, with the control's name:
+                 *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
+                 *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
+                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
+                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
+                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
+                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     `exact` set to the measured controls given before (`none` if there are none), gets the same
+                 *     response. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -2523,63 +2547,63 @@ export interface operations {
                  *     }
                  */
                 controls?: components["parameters"]["controls"];
-                /** @description Frames a second. A clip has at most 10,000 frames. */
+                /** @description Frame rate in frames a second. A clip has at most 10,000 frames. */
                 fps?: components["parameters"]["fps"];
-                /** @description Seconds from the start of the whole clip to the first frame. */
+                /** @description Time of the first frame, in seconds from the start of the whole clip. */
                 start?: components["parameters"]["start"];
-                /** @description Seconds from the start of the whole clip that the last frame does not pass; by default its duration. */
+                /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. */
                 end?: components["parameters"]["end"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
+                /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
-                /** @description Whether the trust says how far each joint may err. */
+                /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+                /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
-                /** @description What joints are called. */
+                /** @description Naming convention of the joints. */
                 names?: components["parameters"]["names"];
-                /** @description Whether the root travels. */
+                /** @description Whether the root travels or stays in place. */
                 root?: components["parameters"]["root"];
-                /** @description Whether the clip is a loop. */
+                /** @description Whether the clip is one whole cycle. */
                 loop?: components["parameters"]["loop"];
                 /**
-                 * @description Which measured controls the motion meets exactly: `auto` (of those that were given all that
-                 *     the model can measure on a motion), `none`, or names of controls with commas between.
+                 * @description Measured controls that the motion must match exactly: `auto` (all given controls that the
+                 *     model can measure on a motion), `none`, or control names separated by commas.
                  * @example none
                  */
                 exact?: components["parameters"]["exact"];
                 /**
-                 * @description A joint that is to be in its place at a moment, JOINT@MOMENT:X,Y,Z. See the schema Target: the
-                 *     moment is its `at`, or its `time` in seconds. Repeated for several.
+                 * @description Target position of a joint at a moment, JOINT@MOMENT:X,Y,Z in metres. The moment is `at` of
+                 *     the schema Target, or `time` in seconds. Repeat the parameter for several targets.
                  * @example [
                  *       "RightHand@end:0.3,1.2,0.4"
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether feet that stand stay where they stand. */
+                /** @description Whether planted feet keep their positions. */
                 pin_feet?: components["parameters"]["pinFeet"];
-                /** @description The file's unit of length; the format's usual one, if left out. glTF has no other than `m`. */
+                /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
                 unit?: components["parameters"]["unit"];
-                /** @description The axis that is up in the file; the format's usual one, if left out. Where it is Z a character that faces straight ahead faces -Y. In glTF no other than `y` is up. */
+                /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
                 up?: components["parameters"]["up"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
                  * @example usda
                  */
                 format: components["parameters"]["clipFormat"];
@@ -2609,12 +2633,12 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description Extension of the file: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
                  * @example usda
                  */
                 format: components["parameters"]["clipFormat"];
@@ -2645,7 +2669,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2677,7 +2701,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2710,39 +2734,39 @@ export interface operations {
     getCrowd: {
         parameters: {
             query?: {
-                /** @description Characters. */
+                /** @description Number of characters. */
                 count?: components["parameters"]["count"];
-                /** @description How many different motions they share; left out, each character has its own. Not with a camera. */
+                /** @description Number of distinct motions that the characters share. Default: one motion per character. Not valid with a camera. */
                 motions?: components["parameters"]["motions"];
-                /** @description How long they walk. */
+                /** @description Duration in seconds. */
                 seconds?: components["parameters"]["seconds"];
-                /** @description Frames a second. */
+                /** @description Frame rate in frames a second. */
                 fps?: components["parameters"]["crowdFps"];
-                /** @description Of all that is random. */
+                /** @description Seed of all random numbers. */
                 seed?: components["parameters"]["seed"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+                /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
-                 * @description Where one looks from, x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest, where none does; a switch takes a quarter of a second. It may stand in nobody.
+                 * @description Camera position x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest level if all errors are larger. A transition between levels takes 0.25 s. The camera must not be inside a character.
                  * @example 30,1.7,-60
                  */
                 camera?: components["parameters"]["camera"];
-                /** @description With a camera, its vertical field of view, rad; 60 degrees, if left out. */
+                /** @description Vertical field of view of the camera in radians. Default: 60 degrees. Requires `camera`. */
                 fov?: components["parameters"]["fov"];
-                /** @description With a camera, the height of the image, pixels; 1080, if left out. */
+                /** @description Height of the image in pixels. Default: 1080. Requires `camera`. */
                 height?: components["parameters"]["height"];
-                /** @description With a camera, how many pixels the error of a level may cover; 1, if left out. */
+                /** @description Maximum number of pixels that a level's error may cover. Default: 1. Requires `camera`. */
                 pixels?: components["parameters"]["pixels"];
-                /** @description What characters share. `references` opens in everything that composes layers, `scenegraph` is least to draw but Blender imports it as one character at rest, `flatten` is one layer for readers that compose nothing, such as three.js. */
+                /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2773,7 +2797,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2802,39 +2826,39 @@ export interface operations {
     getCrowdInFormat: {
         parameters: {
             query?: {
-                /** @description Characters. */
+                /** @description Number of characters. */
                 count?: components["parameters"]["count"];
-                /** @description How many different motions they share; left out, each character has its own. Not with a camera. */
+                /** @description Number of distinct motions that the characters share. Default: one motion per character. Not valid with a camera. */
                 motions?: components["parameters"]["motions"];
-                /** @description How long they walk. */
+                /** @description Duration in seconds. */
                 seconds?: components["parameters"]["seconds"];
-                /** @description Frames a second. */
+                /** @description Frame rate in frames a second. */
                 fps?: components["parameters"]["crowdFps"];
-                /** @description Of all that is random. */
+                /** @description Seed of all random numbers. */
                 seed?: components["parameters"]["seed"];
-                /** @description Level of detail, of the `levels` on the model's card; 0 is the finest. */
+                /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
-                 * @description Where one looks from, x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest, where none does; a switch takes a quarter of a second. It may stand in nobody.
+                 * @description Camera position x,y,z in metres. Each pose then has the coarsest level of detail whose error covers at most `pixels` pixels, or the finest level if all errors are larger. A transition between levels takes 0.25 s. The camera must not be inside a character.
                  * @example 30,1.7,-60
                  */
                 camera?: components["parameters"]["camera"];
-                /** @description With a camera, its vertical field of view, rad; 60 degrees, if left out. */
+                /** @description Vertical field of view of the camera in radians. Default: 60 degrees. Requires `camera`. */
                 fov?: components["parameters"]["fov"];
-                /** @description With a camera, the height of the image, pixels; 1080, if left out. */
+                /** @description Height of the image in pixels. Default: 1080. Requires `camera`. */
                 height?: components["parameters"]["height"];
-                /** @description With a camera, how many pixels the error of a level may cover; 1, if left out. */
+                /** @description Maximum number of pixels that a level's error may cover. Default: 1. Requires `camera`. */
                 pixels?: components["parameters"]["pixels"];
-                /** @description What characters share. `references` opens in everything that composes layers, `scenegraph` is least to draw but Blender imports it as one character at rest, `flatten` is one layer for readers that compose nothing, such as three.js. */
+                /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2869,7 +2893,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2903,13 +2927,15 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description One query parameter for each control of the model, named after it: `?stature=1.72&turn=20`.
-                 *     The model's card gives their names, units and sampled ranges; a value outside the range is
-                 *     answered with a warning (see `extrapolate`), up to a hundred times the width of the range away.
-                 *     Controls that are left out (since 2.2.0) are the most typical for those that are given and for the
-                 *     performer, where one is named: the mean of the captured clips under these conditions, of a control with
-                 *     few sampled values the nearest of those. The answer's trust names them as `inferred`; asked for with
-                 *     the values that it gives, and with `exact` naming those that were given (or none), the same answer comes. The names of the other parameters are reserved.
+                 * @description One query parameter for each control of the model, with the control's name:
+                 *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
+                 *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
+                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
+                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
+                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
+                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     `exact` set to the measured controls given before (`none` if there are none), gets the same
+                 *     response. The names of the other parameters are reserved.
                  * @example {
                  *       "stature": 1.72,
                  *       "hip_height": 0.9,
@@ -2918,24 +2944,24 @@ export interface operations {
                  *     }
                  */
                 controls?: components["parameters"]["controls"];
-                /** @description How many captured clips are listed at most, the nearest first. */
+                /** @description Maximum number of captured clips in the list, the nearest first. */
                 nearest?: components["parameters"]["nearest"];
-                /** @description What to do with controls like which nothing was captured and targets out of reach - answer, answer with warnings, or refuse. */
+                /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2965,7 +2991,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -2997,21 +3023,21 @@ export interface operations {
     getSuggestions: {
         parameters: {
             query?: {
-                /** @description How many points. */
+                /** @description Number of points. */
                 count?: components["parameters"]["suggestions"];
                 /**
-                 * @description Whose clips alone count as captured, of the `performers` that the model's card names; everybody's, if left out.
+                 * @description Performer whose clips alone count as captured, one of `performers` on the model's card. Default: the clips of all performers count.
                  * @example tall
                  */
                 performer?: components["parameters"]["whose"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -3039,37 +3065,37 @@ export interface operations {
         parameters: {
             query: {
                 /**
-                 * @description The control that changes from column to column.
+                 * @description Control that varies from column to column.
                  * @example turn
                  */
                 across: components["parameters"]["across"];
                 /**
-                 * @description Another control, which changes from row to row.
+                 * @description Control that varies from row to row; different from `across`.
                  * @example target_height
                  */
                 along: components["parameters"]["along"];
-                /** @description Values of `across`, evenly from the least that was sampled to the greatest. */
+                /** @description Number of values of `across`, evenly spaced from the smallest to the largest sampled value. */
                 columns?: components["parameters"]["columns"];
-                /** @description Values of `along`. By default at most 65,536 points in all. */
+                /** @description Number of values of `along`. The default limit of the whole grid is 65,536 points. */
                 rows?: components["parameters"]["rows"];
-                /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
+                /** @description Margin of the grid beyond the sampled range on either side, as a share of that range. */
                 margin?: components["parameters"]["margin"];
-                /** @description One parameter for each other control that is not at its default. */
+                /** @description One parameter for each other control with a value other than its default. */
                 controls?: components["parameters"]["fixedControls"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -3100,7 +3126,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -3134,37 +3160,37 @@ export interface operations {
         parameters: {
             query: {
                 /**
-                 * @description The control that changes from column to column.
+                 * @description Control that varies from column to column.
                  * @example turn
                  */
                 across: components["parameters"]["across"];
                 /**
-                 * @description Another control, which changes from row to row.
+                 * @description Control that varies from row to row; different from `across`.
                  * @example target_height
                  */
                 along: components["parameters"]["along"];
-                /** @description Values of `across`, evenly from the least that was sampled to the greatest. */
+                /** @description Number of values of `across`, evenly spaced from the smallest to the largest sampled value. */
                 columns?: components["parameters"]["columns"];
-                /** @description Values of `along`. By default at most 65,536 points in all. */
+                /** @description Number of values of `along`. The default limit of the whole grid is 65,536 points. */
                 rows?: components["parameters"]["rows"];
-                /** @description Share of a control's sampled range by which the grid goes beyond it on either side. */
+                /** @description Margin of the grid beyond the sampled range on either side, as a share of that range. */
                 margin?: components["parameters"]["margin"];
-                /** @description One parameter for each other control that is not at its default. */
+                /** @description One parameter for each other control with a value other than its default. */
                 controls?: components["parameters"]["fixedControls"];
                 /**
-                 * @description Who moves, of the `performers` that the model's card names. Left out, the answer is for
-                 *     somebody who was never seen. A model that names none has no answer for any name.
+                 * @description Performer, one of `performers` on the model's card. Default: an unseen performer. A model
+                 *     without named performers refuses every name.
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
             };
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -3199,7 +3225,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description A model's name, or name@hash.
+                 * @description Model name, or name@hash.
                  * @example reach
                  */
                 model: components["parameters"]["model"];
@@ -3272,7 +3298,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description It does. */
+            /** @description The process responds. */
             200: {
                 headers: {
                     "X-Request-Id": components["headers"]["RequestId"];
@@ -3300,7 +3326,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description They do. */
+            /** @description All models are ready. */
             200: {
                 headers: {
                     "X-Request-Id": components["headers"]["RequestId"];
@@ -3324,7 +3350,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path?: never;
@@ -3346,7 +3372,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path?: never;
@@ -3368,7 +3394,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path?: never;
@@ -3390,7 +3416,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path?: never;
@@ -3412,7 +3438,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Entity tags of answers that the client has. Where one is the answer's, 304 comes instead of it. */
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
                 "If-None-Match"?: components["parameters"]["ifNoneMatch"];
             };
             path?: never;
