@@ -651,7 +651,7 @@ class Hiding:
         return None if hidden else self.finder.find_spec(name, *rest)
 
 sys.meta_path[:] = [Hiding(finder) for finder in sys.meta_path]
-from service import cli
+from posefield import cli
 cli.main()
 """
 

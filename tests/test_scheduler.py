@@ -15,15 +15,15 @@ from posefield.common.errors import ClusterError
 
 pytestmark = pytest.mark.system
 
-KIT = dask_scheduler.Kit(("service",), ("numpy", "onnxruntime"))
+KIT = dask_scheduler.Kit(("posefield",), ("numpy", "onnxruntime"))
 
 # Every client in a process of its own: its loop and sockets are nobody else's.
 CONNECT = f"""
 import sys
-from service import scheduler
+from posefield.common import dask_scheduler
 from posefield.common.errors import ClusterError
 try:
-    with scheduler.connect(sys.argv[1], scheduler.{KIT!r}, 3.0) as client:
+    with dask_scheduler.connect(sys.argv[1], dask_scheduler.{KIT!r}, 3.0) as client:
         print(len(client.scheduler_info()["workers"]), "workers")
 except ClusterError as fault:
     print(fault)
@@ -63,15 +63,15 @@ def test_a_worker_without_posefield_is_named(cluster, tmp_path):
 
 def test_a_worker_with_another_source_is_named(cluster, tmp_path):
     copy = tmp_path / "older"
-    shutil.copytree(Path(posefield.__file__).parent, copy / "service")
+    shutil.copytree(Path(posefield.__file__).parent, copy / "posefield")
     cluster.add(path=str(copy))
     assert connect(cluster.address) == "2 workers"
-    with (copy / "service" / "crowds.py").open("a") as file:
+    with (copy / "posefield" / "cli/crowd_files.py").open("a") as file:
         file.write("# one more line\n")
     cluster.add(path=str(copy))
     found = connect(cluster.address)
     assert found.count("worker tcp://") == 1
-    assert f"expected {dask_scheduler.installed(KIT)['service']}" in found
+    assert f"expected {dask_scheduler.installed(KIT)['posefield']}" in found
 
 
 @pytest.mark.parametrize("address", ["nonsense", "nope://127.0.0.1:8786", ""])
@@ -92,11 +92,12 @@ def test_no_workers(tmp_path):
 
 def test_another_source_or_version_is_a_difference(tmp_path):
     here = dask_scheduler.installed(KIT)
-    assert set(here) == {"Python", "service", "numpy", "onnxruntime"}
+    assert set(here) == {"Python", "posefield", "numpy", "onnxruntime"}
     assert dask_scheduler.differences(here, here) == ""
-    there = {**here, "numpy": "1.0", "service": "source 00000000"}
+    there = {**here, "numpy": "1.0", "posefield": "source 00000000"}
     assert dask_scheduler.differences(there, here) == (
-        f"service source 00000000, expected {here['service']}, numpy 1.0, expected {here['numpy']}"
+        f"posefield source 00000000, expected {here['posefield']}, "
+        f"numpy 1.0, expected {here['numpy']}"
     )
 
 

@@ -24,7 +24,7 @@ MAIN = "from posefield.cli import main; main()"
 JOBS = """
 import os, sys, time
 from pathlib import Path
-from model_export import cluster
+from posefield_train.parallel import dask_jobs as cluster
 from posefield.common.errors import ClusterError
 
 class Shared:
@@ -148,13 +148,13 @@ def test_a_worker_that_joins_with_another_source_is_refused(cluster, jobs, tmp_p
     start, marks = jobs
     for package in (posefield_train, posefield):
         shutil.copytree(Path(package.__file__).parent, tmp_path / "older" / package.__name__)
-    with (tmp_path / "older" / "service" / "crowds.py").open("a") as file:
+    with (tmp_path / "older" / "posefield" / "cli/crowd_files.py").open("a") as file:
         file.write("# one more line\n")
     running = start(count=1000)
     wait_for(lambda: len(ran(marks)) >= 8)
     cluster.add(path=str(tmp_path / "older"))
     said, _ = running.communicate()
-    assert re.fullmatch(r"tcp://127.0.0.1:\d+: service source \w+, expected source \w+\n", said)
+    assert re.fullmatch(r"tcp://127.0.0.1:\d+: posefield source \w+, expected source \w+\n", said)
 
 
 def test_without_workers_it_ends(cluster, jobs):

@@ -19,7 +19,7 @@ from posefield.common.errors import ClusterError
 from posefield_train.parallel.jobs import Arguments
 
 KIT = dask_scheduler.Kit(
-    ("service", "model_export"),
+    ("posefield", "posefield_train"),
     ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn"),
 )
 """Packages whose versions determine a result."""

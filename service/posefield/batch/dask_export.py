@@ -29,7 +29,7 @@ from posefield.batch.target import open_target
 from posefield.common import dask_scheduler
 from posefield.common.errors import ClusterError, FileError
 
-KIT = dask_scheduler.Kit(("service",), MAKERS)
+KIT = dask_scheduler.Kit(("posefield",), MAKERS)
 """Code and packages on which a chunk's bytes depend."""
 AHEAD = 3
 """Chunks submitted for each thread of the workers, so that none waits for the next."""

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.system
 FIRST = """
 import sys, threading
 from pxr import Sdf
-import service.encode.{module}
+import posefield.encode.{module}
 ready = threading.Barrier(6)
 def make():
     ready.wait()
@@ -27,7 +27,10 @@ for thread in threads:
 """
 
 
-@pytest.mark.parametrize("module", ["usd", "animation", "library", "crowd.scene"])
+MODULES = ("usd.usd_clip", "usd.usd_animation", "usd.usd_library", "usd_crowd.crowd_scene")
+
+
+@pytest.mark.parametrize("module", MODULES)
 def test_threads_do_not_wait_for_each_other(module):
     words = [sys.executable, "-c", FIRST.format(module=module)]
     for _ in range(4):

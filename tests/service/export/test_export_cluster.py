@@ -160,8 +160,8 @@ def test_a_scheduler_that_dies_is_said(words, undisturbed, mortal, tmp_path):
 
 def test_a_worker_that_came_later_with_another_source_is_refused(words, mortal, tmp_path):
     copy = tmp_path / "older"
-    shutil.copytree(Path(posefield.__file__).parent, copy / "service")
-    with (copy / "service" / "crowds.py").open("a") as file:
+    shutil.copytree(Path(posefield.__file__).parent, copy / "posefield")
+    with (copy / "posefield" / "cli/crowd_files.py").open("a") as file:
         file.write("# one more line\n")
     target = tmp_path / "made"
     process = begun(words(target, "--scheduler", mortal.address), target, 10)
@@ -170,7 +170,7 @@ def test_a_worker_that_came_later_with_another_source_is_refused(words, mortal, 
     mortal.add(path=str(copy))
     code, said = ended(process)
     assert code == 2
-    assert re.search(r"posefield: tcp://\S+: service source \w+, expected source \w+\n", said)
+    assert re.search(r"posefield: tcp://\S+: posefield source \w+, expected source \w+\n", said)
 
 
 def test_a_chunk_that_takes_its_workers_with_it_ends_it(words, undisturbed, monkeypatch, tmp_path):

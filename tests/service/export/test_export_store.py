@@ -11,7 +11,7 @@ from posefield.batch.run import Shard
 from posefield.batch.store_target import Store
 from posefield.batch.target import open_target
 from posefield.common.errors import FileError
-from posefield.registry import model_sources
+from posefield.registry import object_store
 
 pytestmark = pytest.mark.system
 
@@ -54,7 +54,7 @@ def paths(url):
     """Path of every object under a URL."""
     import obstore
 
-    return [meta["path"] for batch in obstore.list(model_sources.connect(url)) for meta in batch]
+    return [meta["path"] for batch in obstore.list(object_store.connect(url)) for meta in batch]
 
 
 @pytest.mark.parametrize("layout", ["folder", "tar"])

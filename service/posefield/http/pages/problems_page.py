@@ -156,8 +156,8 @@ TEXTS: dict[Kind, Text] = {
         "no answer within 30 s",
     ),
     problems.NOT_READY: Text(
-        "Only `/readyz` returns this problem. Causes: the service has no model, a model fails its trial "
-        "request, or the service is shutting down.",
+        "Only `/readyz` returns this problem. Causes: the service has no model, a model fails its "
+        "trial request, or the service is shutting down.",
         "Send requests to another instance. This instance still responds to requests that it "
         "receives.",
         "there is no model",
